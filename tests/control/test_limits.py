@@ -88,3 +88,28 @@ def test_series_goes_to_a_limit_and_on():
     assert "held stiffness" in series.lines()[0][1]
     with pytest.raises(fb.ModelError, match="stable= is for mechanisms without controllers"):
         m.equilibria("most", values, stable=True)
+
+
+def test_from_a_settled_motion():
+    """Its end is the guess: positions and controllers' states; so it is for what has no controllers."""
+    m = servo()
+    run = m.simulate(8, outputs=3)
+    e = m.equilibrium(start=run)
+    assert e["A.angle"] == pytest.approx(0.5, abs=1e-9)
+    assert e["pid.integral"] == pytest.approx(run["pid.integral"][-1], abs=1e-2)
+    with pytest.raises(fb.ModelError, match="or a result of simulate, not str"):
+        m.equilibrium(start="settled")
+
+
+def test_of_two_rests_that_where_the_motion_ended():
+    """An arm with a soft spring upright leans either way; drawn to the right, and pushed over to the left."""
+    m = fb.Mechanism("arm", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("arm", mass=1, inertia=0.1, position=(0.02, 0.3)), fb.Revolute("A", "ground", "arm", at=(0, 0)))
+    m.add(fb.CoordinateSpring("spring", "A.angle", stiffness=2.5, damping=1.0, rest=0.0))
+    m.add(fb.Motor("push", "A", torque="where(t < 2, 3, 0)"))
+    run = m.simulate(20, outputs=3)
+    e, other = m.equilibrium(t=20, start=run), m.equilibrium(t=20)
+    assert e["A.angle"] == pytest.approx(run["A.angle"][-1], abs=0.1)  # it swings a little still
+    assert e["A.angle"] > 0.5 and other["A.angle"] < -0.5
+    with pytest.raises(fb.ModelError, match="another one"):
+        servo().equilibrium(start=run)

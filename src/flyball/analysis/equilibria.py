@@ -17,6 +17,7 @@ from ..errors import AnalysisError, ModelError, NotConverged
 from ..model.model import Model, listing, suggest
 from ..results.equilibria import EquilibriumSeries, Jump
 from ..results.equilibrium import UNSTABLE, Equilibrium
+from ..results.result import Result
 from ..tables.numbers import unused
 from .assembly.start import Assembly
 from .compiled import compiled
@@ -45,7 +46,7 @@ class EquilibriaOptions(Options):
     values: Sequence[float] | np.ndarray
     t: float
     parameters: Mapping[str, float] | None
-    start: Equilibrium | None
+    start: Equilibrium | Result | None
     stable: bool
     progress: bool | Callable[[float], None]
 
@@ -63,13 +64,11 @@ def equilibria(model: Model, o: EquilibriaOptions) -> EquilibriumSeries:
         for k, value in enumerate(points):
             before = len(way.jumps)
             try:
-                if model.controllers:
-                    here = value if k == 0 else points[k - 1]
-                    last = done.equilibria[-1] if k else o.start
-                    done.equilibria.append(way.controlled(last, here, value, FEWER if k else 0))
+                if k and model.controllers:
+                    done.equilibria.append(way.controlled(done.equilibria[-1], points[k - 1], value, FEWER))
                 elif x is None:
                     first = single(model, resting(*way.given(value), o.start, o.stable))
-                    x = way.rest(first)
+                    x = None if model.controllers else way.rest(first)
                     done.equilibria.append(first)
                 else:
                     x = way.settled(way.follow(x, points[k - 1], value, HALVINGS), value)
@@ -155,7 +154,7 @@ class _Way:
             return self.follow(self.follow(x, here, middle, halvings - 1), middle, there, halvings - 1)
         return self.jump(x, there, lambda: pushed(x, self.at(x, there)))
 
-    def controlled(self, last: Equilibrium | None, here: float, there: float, halvings: int) -> Equilibrium:
+    def controlled(self, last: Equilibrium, here: float, there: float, halvings: int) -> Equilibrium:
         """The equilibrium with controllers, whose search begins at the last one; nearer steps where that is far."""
         try:
             found = single(self.model, resting(*self.given(there), last))
@@ -163,7 +162,7 @@ class _Way:
             if not halvings:
                 raise
         else:
-            if here == there or last is None or _moved(last.assembly, found.assembly) <= LONGEST:
+            if _moved(last.assembly, found.assembly) <= LONGEST:
                 return found
             if not halvings:
                 self.jumps.append(Jump(float(there), last, found))

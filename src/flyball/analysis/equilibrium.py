@@ -12,6 +12,7 @@ from ..errors import ModelError, SingularityError
 from ..model.model import Model
 from ..model.touching import holds_at_times
 from ..results.equilibrium import EIGENVALUES, MULTIPLIERS, STABLE, UNSTABLE, Equilibrium
+from ..results.result import Result
 from .assemble import assemble
 from .assembly.start import Assembly
 from .linear.controlled import found_rest
@@ -24,6 +25,7 @@ from .linear.spectrum import spectrum
 from .linear.stability import by_eigenvalues, stability
 from .linear.turning import turning as turn
 from .linearize import LinearizeOptions, small_motions, without_inputs
+from .motion.start import begin as begin_motion
 from .options import Options
 from .resting.rest import rest
 from .steps import tangent_step
@@ -40,7 +42,7 @@ class EquilibriumOptions(Options):
 
     t: float
     parameters: Mapping[str, float] | None
-    start: Equilibrium | None
+    start: Equilibrium | Result | None
     stable: bool
     preload: tuple[str, ...]
     turning: tuple[str, ...]
@@ -64,7 +66,7 @@ class EquilibriumOptions(Options):
 
 
 def resting(
-    t: float, parameters: Mapping[str, float] | None, start: Equilibrium | None = None, stable: bool = False
+    t: float, parameters: Mapping[str, float] | None, start: Equilibrium | Result | None = None, stable: bool = False
 ) -> EquilibriumOptions:
     """What other analyses ask: where it rests."""
     return EquilibriumOptions(t=t, parameters=parameters, start=start, stable=stable, preload=(), turning=())
@@ -75,7 +77,7 @@ def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     if model.controllers:
         return _controlled(model, o)
     a = assemble(model, t=o.t, parameters=o.parameters)
-    begin = _begun(a, o.start)
+    begin = _begun(a, _guess(model, o))
     if holds_at_times(model):
         _refuse_smooth_only(o)
         return rest(model, begin, o.parameters)
@@ -92,8 +94,9 @@ def _controlled(model: Model, o: EquilibriumOptions) -> Equilibrium:
         if getattr(o, name):
             raise ModelError(f"{name}= is for mechanisms without controllers; leave it out")
     a = assemble(model, t=o.t, parameters=o.parameters)
-    begin, c = _begun(a, o.start), a.compiled
-    z = (begin if o.start is None else o.start.assembly).compiled.z.tolist()
+    guess, c = _guess(model, o), a.compiled
+    begin = _begun(a, guess)
+    z = (guess or begin).compiled.z.tolist()
     at = dict(zip((x.name for x in c.structure.controls), z, strict=False))
     q, way = found_rest(model.snapshot(), c, a.t, begin.q, at)
     out = finished(Rest.at(c, a.t, q), {}, way)
@@ -111,14 +114,31 @@ def _refuse_smooth_only(o: EquilibriumOptions) -> None:
             )
 
 
-def _begun(a: Assembly, start: Equilibrium | None) -> Assembly:
-    """Where the search begins: as assembled, or at another equilibrium."""
-    if start is None:
+def _guess(model: Model, o: EquilibriumOptions) -> Assembly | None:
+    """The other equilibrium, or the end of the motion, that is to be begun at; controllers' states with it."""
+    if isinstance(o.start, Result):
+        start = begin_motion(model, o.start.final[0], o.parameters, o.start, "absolute")
+        s = start.assembly.compiled.structure
+        start.assembly.compiled.z = start.y[s.nq + s.nv :].copy()
+        return start.assembly
+    if o.start is None:
+        return None
+    if isinstance(o.start, Equilibrium):
+        at: Assembly = o.start.assembly
+        return at
+    raise ModelError(
+        f"start must be an equilibrium of {model.name!r}, or a result of simulate, not {type(o.start).__name__}"
+    )
+
+
+def _begun(a: Assembly, guess: Assembly | None) -> Assembly:
+    """Where the search begins: as assembled, or where the guess is."""
+    if guess is None:
         return a
     s = a.compiled.structure
-    if not isinstance(start, Equilibrium) or list(start.assembly.compiled.structure.place) != list(s.place):
+    if list(guess.compiled.structure.place) != list(s.place):
         raise ModelError(f"start must be an equilibrium of {s.model.name!r}, or of one with the same bodies")
-    q, _ = a.compiled.take(start.assembly.compiled, start.assembly.t, start.assembly.q, start.assembly.v)
+    q, _ = a.compiled.take(guess.compiled, guess.t, guess.q, guess.v)
     return Assembly(a.compiled, a.t, q, np.zeros(s.nv))
 
 

@@ -194,10 +194,13 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
 
 @formula
 def blend(way, a, b):
-    """A on the one side of a corner (way 1), b on the other (-1); while sliding along it, what is between."""
-    if way.real >= 1.0:
+    """A on the one side of a corner (way 1), b on the other (-1); while sliding along it, what is between.
+
+    Beyond them it goes on as between: the motion is to leave there, but the side that would hold it has to be found.
+    """
+    if way.real == 1.0:  # b may be no number there
         return a
-    if way.real <= -1.0:
+    if way.real == -1.0:
         return b
     return b + 0.5 * (1.0 + way) * (a - b)
 

@@ -3,11 +3,15 @@
 Where ``sign(u)`` decides, a law reads a number instead, 1 or -1, which changes only when u has passed zero; so the law
 goes on smoothly beyond the corner, and a step may end on it. Between -1 and 1 stands what holds the motion on u = 0
 (Filippov, *Differential Equations with Discontinuous Righthand Sides*, 1988).
+
+What is made of sides is affine in each of them, and goes on so beyond 1 and -1: there the side is looked for that would
+hold the motion where none does any more, by which it is seen that it leaves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import replace
 from typing import Any
 
 from ..model.grammar import Node
@@ -34,12 +38,17 @@ def on_one_side(node: Node, moving: Collection[str], corners: Corners) -> Node:
         return _made(node, BETWEEN_SIDES, _truth(condition, moving, corners), a, b)
     args = tuple(on_one_side(arg, moving, corners) for arg in node.args)
     if node.kind in ("abs", "sign") and _moves(node.args[0], moving):
+        if _of_sides_alone(args, moving):
+            return _affine(_made(node, node.kind, *args))
         side = _side(node, args[0], corners)
         return side if node.kind == "sign" else _made(node, "*", side, args[0])
     if node.kind in ("min", "max"):
         out = args[0]
         for k, arg in enumerate(args[1:]):
             if _moves(arg, moving) or any(_moves(x, moving) for x in node.args[: k + 1]):
+                if _of_sides_alone((out, arg), moving):
+                    out = _affine(_made(node, node.kind, out, arg))
+                    continue
                 side = _side(node, difference(out, arg), corners)
                 out = _made(node, BETWEEN_SIDES, side, *((out, arg) if node.kind == "max" else (arg, out)))
             else:
@@ -63,17 +72,44 @@ def _truth(node: Node, moving: Collection[str], corners: Corners) -> Node:
         return _made(node, "where", node, Node("number", value=1.0), Node("number", value=-1.0))
     if node.kind in ("<", "<="):
         a, b = (on_one_side(arg, moving, corners) for arg in node.args)
+        if _of_sides_alone((a, b), moving):
+            return _affine(_made(node, "sign", difference(b, a)))
         return _side(node, difference(b, a), corners)
-    parts = [_truth(arg, moving, corners) for arg in node.args]
+    first, *others = [_truth(arg, moving, corners) for arg in node.args]
     if node.kind == "not":
-        return _made(node, "neg", parts[0])
-    return _made(node, "min" if node.kind == "and" else "max", *parts)
+        return _made(node, "neg", first)
+    for other in others:  # not the lesser, or larger, of two: a side beyond 1 is to be seen through the other
+        known = Node("number", value=-1.0 if node.kind == "and" else 1.0)
+        first = _made(node, BETWEEN_SIDES, first, *((other, known) if node.kind == "and" else (known, other)))
+    return first
+
+
+def _of_sides_alone(args: Iterable[Node], moving: Collection[str]) -> bool:
+    """Whether these move by sides, and by nothing else, time included."""
+    nodes = [n for arg in args for n in arg.walk()]
+    return any(n.kind == SIDE for n in nodes) and not any(
+        n.kind == "name" and (n.value == "t" or n.value in moving) for n in nodes
+    )
+
+
+def _affine(node: Node) -> Node:
+    """What is made of sides alone, between its values for sides of 1 and -1."""
+    at = next((n.value for n in node.walk() if n.kind == SIDE), None)
+    if at is None:
+        return node
+    values = (_affine(_with_side(node, at, value)) for value in (1.0, -1.0))
+    return _made(node, BETWEEN_SIDES, Node(SIDE, (), at, node.start, node.stop), *values)
+
+
+def _with_side(node: Node, at: int, value: float) -> Node:
+    """A node with a number in place of one side."""
+    if node.kind == SIDE and node.value == at:
+        return Node("number", value=value)
+    return replace(node, args=tuple(_with_side(arg, at, value) for arg in node.args)) if node.args else node
 
 
 def _side(node: Node, u: Node, corners: Corners) -> Node:
     """The side of u = 0 that the law is on."""
-    if not any(n.kind == "name" for n in u.walk()):  # it is made of sides alone
-        return _made(node, "sign", u)
     if u.kind == "neg":
         return _made(node, "neg", _side(node, u.args[0], corners))
     at, way = corners(u)

@@ -25,7 +25,7 @@ class Statics(Model):
         *,
         t: float | str = 0.0,
         parameters: Mapping[str, float | str] | None = None,
-        start: Equilibrium | None = None,
+        start: Equilibrium | Result | None = None,
         stable: bool = False,
         preload: Sequence[str] = (),
         turning: Sequence[str] = (),
@@ -42,8 +42,9 @@ class Statics(Model):
             Time at which laws of forces and drivers are taken.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
-        start : Equilibrium, optional
-            Guess in place of the drawn positions: an equilibrium of the same mechanism. Described speeds stay.
+        start : Equilibrium or Result, optional
+            Guess in place of the drawn positions, and of controllers' initial states: an equilibrium of the same
+            mechanism, or a motion of it, whose end is taken. Described speeds stay; time is ``t``, not the motion's.
         stable : bool
             Go on from an unstable equilibrium to a stable one. Not with ``preload`` or ``turning``.
         preload : sequence of str
@@ -79,7 +80,7 @@ class Statics(Model):
         *,
         t: float | str = 0.0,
         parameters: Mapping[str, float | str] | None = None,
-        start: Equilibrium | None = None,
+        start: Equilibrium | Result | None = None,
         stable: bool = False,
         progress: bool | Callable[[float], None] = True,
     ) -> EquilibriumSeries:
@@ -97,8 +98,8 @@ class Statics(Model):
             Time at which laws of forces and drivers are taken.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
-        start : Equilibrium, optional
-            Guess for the first value, in place of the drawn positions.
+        start : Equilibrium or Result, optional
+            Guess for the first value, in place of the drawn positions; of a motion its end.
         stable : bool
             Leave a branch where it becomes unstable; else it is followed on. Not with controllers.
         progress : bool or callable

@@ -217,6 +217,8 @@ class Study:
                 missed.insert(0, f"{text}, mean {y.mean():.6g}, standard deviation {y.std():.3g}")
             if missed:
                 out.append((name, "; ".join(missed)))
+        if any(name.startswith(("mean(", "rms(")) for name in self.of):
+            out.append(("mean, rms", "over the output times, each of which counts alike"))
         remarks = {k: text for k, text in self.remarks.items() if text != self.doubtful.get(k)}
         out += self._listed("failed", self.reasons, "reasons")
         out += self._listed("doubtful", self.doubtful, "doubtful")

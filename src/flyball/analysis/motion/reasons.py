@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...constraints.modes import BRANCH
 from ...equations import motion
 from ...equations.engine import MOTION
 from ...equations.loads import wide
@@ -27,8 +28,10 @@ from ...tables.system import (
     GAMMA,
     GUILTY,
     LOAD,
+    MODE,
     NU,
     NU_DOT,
+    OFF,
     RATE,
     REVOLUTE,
     ROW_LAW,
@@ -233,10 +236,23 @@ def _not_finite(a: Assembly, clock: ex.Clock, method: str) -> str:
     if force:
         return f"the equations of motion are not finite just after t = {t:.6g} s: {force}"
     wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)
+    if not wrong.any() and (corners := _held_on(a)):
+        return (
+            f"just after t = {t:.6g} s nothing was found that holds the motion on the corner of the "
+            f"{' and the '.join(corners)}, or lets it go. Make that law smooth there: max(-1, min(1, x / width)) for "
+            f"sign(x)"
+        )
     return (
         f"the equations of motion are not finite just after t = {t:.6g} s, first at "
         f"{_component(a, int(np.argmax(wrong)))}. Look for a law that divides by zero or leaves its range"
     )
+
+
+def _held_on(a: Assembly) -> list[str]:
+    """Laws on whose corners the motion is held."""
+    mode = a.compiled.work.switch[MODE]
+    specs = enumerate(a.compiled.structure.switches)
+    return [x.switch.label for k, x in specs if x.switch.kind == BRANCH and mode[k] != OFF]
 
 
 def broken_force(c: Compiled, t: float) -> str:
