@@ -323,7 +323,7 @@ class Run:
         self.pauses.happened()
         clock.count[ex.STARTED] = 0
         at, over = here.t, self.guarded and not here.stopped and self.legs.over()
-        before = expressions(here) if over else {}
+        before = {g: x for g, x in expressions(here).items() if g not in fired} if over else {}
         self.legs.passed()
         if here.c.system is not system:  # another value of a parameter: laws have other corners
             self.legs.whole()
