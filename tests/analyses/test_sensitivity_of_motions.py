@@ -32,7 +32,15 @@ def damped() -> fb.Mechanism:
 @pytest.mark.parametrize("coordinates", LAYERS)
 def test_work_and_energies_of_a_damped_oscillator(coordinates):
     """What the damper takes is what the total loses; by mass, damping, stiffness and start."""
-    of = ["mass.x", "damper.work", "energy.total", "energy.kinetic", "energy.potential", "energy.balance"]
+    of = [
+        "mass.x",
+        "damper.work",
+        "spring.work",
+        "energy.total",
+        "energy.kinetic",
+        "energy.potential",
+        "energy.balance",
+    ]
     found = damped().sensitivity(of, analysis="motion", t_end=1.0, outputs=6, coordinates=coordinates)
 
     def state(t, m, c, k, x):
@@ -52,6 +60,7 @@ def test_work_and_energies_of_a_damped_oscillator(coordinates):
         "energy.kinetic": kinetic,
         "energy.potential": potential,
         "energy.total": lambda *p: kinetic(*p) + potential(*p),
+        "spring.work": lambda *p: 0.5 * p[3] * p[4] ** 2 - potential(*p),
         "damper.work": lambda *p: kinetic(*p) + potential(*p) - 0.5 * p[3] * p[4] ** 2,
     }
     for name, form in forms.items():

@@ -18,13 +18,14 @@ from flyball.analysis.runs.reading import readings
 from flyball.analysis.runs.runner import runner
 from flyball.analysis.runs.single import Motion
 from flyball.analysis.runs.soft import Filling, derived, soft
+from flyball.analysis.runs.spread import LEAST, Spread
 from flyball.errors import ModelError
 from flyball.tables.spanning import spanning
 from flyball.tables.structure import Choices, structure
 from flyball.tables.values import values
 from tests.complex_steps import with_parameters
 from tests.identities.test_complex_values import with_forces
-from tests.mechanisms import example
+from tests.mechanisms import EXAMPLES, example
 from tests.study.rigs import oscillator
 
 
@@ -224,3 +225,21 @@ def test_what_only_floats_take_is_computed_by_itself():
     a, b = runner(q, points)(points, lambda: False), compute(q, points)
     assert a.status.tolist() == b.status.tolist()
     assert a.values[0].tobytes() == b.values[0].tobytes()
+
+
+def test_blocks_of_runs_are_spread_for_every_example():
+    """What only floats take is computed run by run, without a word: none but what has to be a whole number may."""
+    alone, tried = set(), 0
+    for path in sorted(EXAMPLES.glob("*.toml")):
+        m = example(path.name).snapshot()
+        for name, x in m.parameters.items():
+            if not isinstance(x, int | float) or not x:
+                continue
+            points = x * np.linspace(1.0, 1.0001, LEAST)[:, None]
+            tables = Spread((structure(m),), m.parameters, [name], points)
+            tables.of(points[0])
+            tried += 1
+            if tables.useless:
+                alone.add((path.stem, name))
+    assert tried > 50
+    assert alone == {("ratchet", "teeth")}

@@ -12,7 +12,7 @@ from ..compiler.jit import formula
 from ..constraints.modes import STATIC
 from ..forces.joint_friction import load as pressed
 from ..math.scalar import sign
-from ..math.vec import add, load3, scale
+from ..math.vec import add
 from ..tables.system import (
     DIAGONAL,
     F_APPLIED,
@@ -35,14 +35,13 @@ from ..tables.system import (
     SLIDING,
     SWITCH_OTHER,
     SWITCH_ROW,
-    TERM_ROW,
     TOLD,
     VALUE,
 )
 from .dispatch import effort
 from .loads import law, wide
 from .records import load
-from .rows import COEFFICIENT, measured
+from .rows import carried, measured
 from .sliding import slides
 
 SUBSTITUTIONS = 80
@@ -80,9 +79,8 @@ def reaction_loads(S, W):
         for x in range(S.load_i.shape[0]):
             if S.load_i[x, 0] == n:
                 term = S.load_i[x, 1]
-                c = W.row[LAM, S.term_i[term, TERM_ROW]] * S.term_x[term, COEFFICIENT]
-                force = add(force, scale(c, load3(W.T, term, 0)))
-                torque = add(torque, scale(c, load3(W.T, term, 3)))
+                f, m = carried(S, W, term)
+                force, torque = add(force, f), add(torque, m)
         W.sensed[RETURNED, n] = pressed(wide(S.force_x, k), load(W.FK, S.force_i[k, FORCE_M]), force, torque)
 
 

@@ -56,7 +56,6 @@ from ..tables.system import (
     SWITCH_PARTNER,
     SWITCH_ROW,
     SWITCH_STIFFNESS,
-    TEMPO,
     UNIT,
     UPPER,
     VALUE,
@@ -65,6 +64,7 @@ from .control import column_of
 from .dispatch import effort
 from .friction import loads_end
 from .loads import law, wide
+from .pace import pace, quickest
 from .rows import measured, way_of
 from .sliding import slides, watched_place
 
@@ -149,20 +149,12 @@ def distance(S, m, x, rate):
 
 
 @formula
-def pace(S, m):
-    """What rates of quantity m are compared with: the mechanism's length, or a radian, at its own rate."""
-    return S.glob[UNIT + m] * S.glob[TEMPO]
-
-
-@formula
 def grains(S, W, t, trial, so_far, out):
     """What is rounding of every guard at the state last evaluated, into ``out`` (ng,).
 
     ``trial`` is scratch of the shape of ``W.sensed``, ``so_far`` the fastest rate: what was rounded of that is kept.
     """
-    fastest, strongest = 0.0, 0.0
-    for m in range(measured(S)):
-        fastest = max(fastest, magnitude(W.sensed[RATE, m]))
+    fastest, strongest = quickest(S, W), 0.0
     for k in range(S.row_i.shape[0]):
         strongest = max(strongest, magnitude(W.row[LAM, k]))
     for g in range(S.guard_i.shape[0]):
@@ -229,9 +221,7 @@ def astray(S, W, t, span, out):
     fastest = -1.0
     for g in range(S.guard_i.shape[0]):
         if S.guard_i[g, GUARD_KIND] == G_CORNER:
-            if fastest < 0.0:
-                for m in range(measured(S)):
-                    fastest = max(fastest, magnitude(W.sensed[RATE, m]))
+            fastest = quickest(S, W) if fastest < 0.0 else fastest
             s = S.guard_i[g, GUARD_OF]
             out[g] = OTHER * (terms(S, W, t, s, span, fastest) if W.switch[MODE, s] == OFF else 1.0)
 

@@ -23,18 +23,17 @@ from ..tables.system import (
     FORCE_SWITCH,
     FORCE_WORK,
     INERTIA,
-    LENGTH,
     LOAD,
     MASS,
     NV,
     PARENT,
     RATE,
     SLIDING,
-    TEMPO,
     V0,
     VALUE,
 )
 from .dispatch import effort, inputs, wrench
+from .pace import own_speed
 from .records import load
 from .rows import way_of
 from .sliding import slide
@@ -145,6 +144,12 @@ def power(F, M, force, torque):
 
 
 @formula
+def at_rest(S):
+    """Sliding no faster than this [m/s] is at rest."""
+    return SLOW * own_speed(S).real
+
+
+@formula
 def way(S, W, k, rate):
     """Which way what force k acts along slides: as its switch says, where there is none by the sign of the rate."""
     s = S.force_i[k, FORCE_SWITCH]
@@ -152,7 +157,7 @@ def way(S, W, k, rate):
         return sign(rate)
     told = W.sensed[VALUE, way_of(S, W, s)]
     if told.real == BY_RATE:
-        return sign(rate) if magnitude(rate) > SLOW * (S.glob[LENGTH] * S.glob[TEMPO]).real else 0.0 * told
+        return sign(rate) if magnitude(rate) > at_rest(S) else 0.0 * told
     return told
 
 

@@ -32,6 +32,7 @@ from ..tables.system import (
 from .dispatch import row_biases, row_values
 from .kinematics import motions, poses
 from .made import run
+from .pace import own_speed
 from .rows import row_times
 from .solve import REFINEMENTS, factor, reuse, solve
 from .tree import rates, retract, unrated
@@ -219,7 +220,7 @@ def steer(S, W, v, tol_v, factored):
             solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         for d in range(step.shape[0]):
             v[d] += step[d]
-    return 0, worst / (S.glob[LENGTH] * S.glob[TEMPO] + size), factored
+    return 0, worst / (own_speed(S) + size), factored
 
 
 @formula

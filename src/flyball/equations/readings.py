@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from ..compiler.jit import formula
 from ..math.scalar import sqrt
-from ..math.vec import add, cross, load3, neg, scale, sub
-from ..tables.system import EFFORT, LAM, TERM_F, TERM_M, TERM_ROW, VALUE
+from ..math.vec import add, cross, load3, neg, sub
+from ..tables.system import EFFORT, LAM, TERM_F, TERM_M, VALUE
 from .control import column_of
 from .friction import loads_end
 from .loads import effort_of
-from .rows import COEFFICIENT
+from .rows import carried
 
 FORCE, TORQUE = 6, 7  # columns of their sizes, after those of their components
 
@@ -40,8 +40,7 @@ def through(S, W, at, what):
     """Add what term ``what`` of a joint's rows does to the joint's wrench, on its second body, about M's origin."""
     nt = S.term_i.shape[0]
     k = what if what < nt else what - nt
-    c = W.row[LAM, S.term_i[k, TERM_ROW]] * S.term_x[k, COEFFICIENT]
-    force, torque = scale(c, load3(W.T, k, 0)), scale(c, load3(W.T, k, 3))
+    force, torque = carried(S, W, k)
     if what >= nt:  # told of the other body, at the other frame: the reverse of both, about this one
         arm = sub(load3(W.FK, S.term_i[k, TERM_M], 0), load3(W.FK, S.term_i[k, TERM_F], 0))
         force, torque = neg(force), neg(add(torque, cross(arm, force)))

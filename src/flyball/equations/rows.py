@@ -12,13 +12,14 @@ from __future__ import annotations
 from ..compiler.jit import formula
 from ..laws.evaluation import evaluate_jet
 from ..math.scalar import atan2, cos, sin
-from ..math.vec import neg, put3
+from ..math.vec import load3, neg, put3, scale
 from ..tables.system import (
     BIAS,
     DIAGONAL,
     G_VALUE,
     GAMMA,
     HOLD,
+    LAM,
     MIX_COUNT,
     MIX_FROM,
     MIX_ROW,
@@ -58,6 +59,13 @@ def parameters(T, k):
 def measured(S):
     """Number of measured quantities."""
     return S.row_p.shape[0] - 1 - S.row_i.shape[0]
+
+
+@formula
+def carried(S, W, k):
+    """What the multiplier of term k's row does through it: (force, torque) on its second body, about M's origin."""
+    c = W.row[LAM, S.term_i[k, TERM_ROW]] * S.term_x[k, COEFFICIENT]
+    return scale(c, load3(W.T, k, 0)), scale(c, load3(W.T, k, 3))
 
 
 @formula

@@ -16,7 +16,6 @@ from ..tables.system import (
     FORCE_WORK,
     G_ASTRAY,
     G_CONE,
-    LENGTH,
     LOAD,
     MODE,
     OFF,
@@ -27,9 +26,9 @@ from ..tables.system import (
     SWITCH_REST,
     SWITCH_ROW,
     SWITCH_SLIDING,
-    TEMPO,
     VALUE,
 )
+from .pace import own_speed
 from .rows import way_of
 
 SLOW = 1e-10  # lengths of the mechanism, at its own rate: slower sliding in space goes the way of its switch
@@ -65,7 +64,7 @@ def heading(S, W, sensed, s):
     square = u * u + v * v
     if (way * way + side * side).real > FRESH:
         return begins(S, (way, side), (u, v), square)
-    slow = SLOW * S.glob[LENGTH] * S.glob[TEMPO]
+    slow = SLOW * own_speed(S)
     if square.real <= slow.real * slow.real:
         return way, side, u * way + v * side
     speed = sqrt(square) if (u * way + v * side).real >= 0.0 else -sqrt(square)
@@ -75,7 +74,7 @@ def heading(S, W, sensed, s):
 @formula
 def begins(S, way, velocity, square):
     """The same of what has just begun to slide: velocity + c exp(-(speed / c)^2) way, c = FIRST lengths at its rate."""
-    first = FIRST * S.glob[LENGTH] * S.glob[TEMPO]
+    first = FIRST * own_speed(S)
     c = first * exp(-square / (first * first)) / FRESH
     a, b = velocity[0] + c * way[0], velocity[1] + c * way[1]
     size = sqrt(a * a + b * b)
@@ -133,6 +132,6 @@ def watched_place(S, W, sensed, lam, kind, s):
     speed, size = sqrt(u * u + v * v), sqrt(way * way + side * side)
     turned = (way * u + side * v) / size - TURNED * speed
     if size * size > FRESH:
-        pace = S.glob[LENGTH] * S.glob[TEMPO]
+        pace = own_speed(S)
         return min(turned + BACK * pace, OVER * FIRST * pace - speed)
     return turned

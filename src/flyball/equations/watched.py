@@ -15,7 +15,6 @@ import numpy as np
 from ..compiler.bound import Bound, Written
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
-from ..math.scalar import magnitude
 from ..numerics.integrators.clock import SPAN, Clock, T
 from ..numerics.integrators.expected import expect
 from ..numerics.integrators.loop import advance, nothing, whole
@@ -45,6 +44,7 @@ from .callbacks import Going, Own, levels
 from .engine import Sheet, engine
 from .guards import FIRM, KEPT, astray, grains
 from .guards import watch as guards
+from .pace import quickest
 from .rows import measured
 from .sampled import Sampling
 from .sampled import advance as from_instant_to_instant
@@ -90,15 +90,6 @@ def still(S, W, K):
             least = LEFT * max(fastest, K.still[m])
             x = W.sensed[VALUE, nm + m]
             W.sensed[VALUE, nm + m] -= min(max(x, -least), least)
-
-
-@formula
-def quickest(S, W):
-    """The largest rate that is measured."""
-    fastest = 0.0
-    for m in range(measured(S)):
-        fastest = max(fastest, magnitude(W.sensed[RATE, m]))
-    return fastest
 
 
 @formula

@@ -86,10 +86,10 @@ def added(result: Any) -> dict[str, np.ndarray]:
     return {k: x + (result.begun.done.get(k, 0.0) if k in ADDED else 0.0) for k, x in result.exchanged.items()}
 
 
-def _first(result: Any, name: str) -> float:
+def _first(result: Any, name: str) -> Any:
     """Stored in a force at the start, and the work of that before it [J]; at the first output if nobody said."""
     if result.begun.y is None:
-        return float(result[name].energy[:1].sum())
+        return result[name].energy[:1].sum()  # complex where derivatives are asked for
     known = result.__dict__.setdefault("_at_first", {})
     if not known:
         every = result.stretches.all if result.stretches is not None else ()

@@ -91,9 +91,8 @@ def suspected(result: Result, runs: int) -> np.ndarray:
     runs : int
         How many they are.
     """
-    ledgers = [whole(result)]
-    ledgers += apart(result) if result.health.options.get("rtol") is not None else []
     rtol = result.health.options.get("rtol")
+    ledgers = [whole(result), *(apart(result) if rtol is not None else [])]
     found = np.full(runs, rtol is not None and rtol > LOOSE) | perhaps_late(ledgers[0].of_runs(runs))
     for x in ledgers:
         for _, _, lost, _, allowed in _excesses(x.of_runs(runs), len(result.t) // runs):

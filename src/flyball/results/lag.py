@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .ledger import Ledger
 
 LATE = 0.05  # part of the longest way of a body by which one may be off
+SOON = 0.25  # of the time between two rows: what several motions are looked at for
 STILL = 1e-6  # part of the mechanism's length that is no way
 TURNING = 0.1  # part of the largest kinetic energy below which a motion that comes back is at its turning point
 
@@ -28,7 +29,7 @@ def late(x: Ledger) -> str:
     unknown = x.works or r.exchanged or r.bulk or r.pieces
     if unknown or not 1 < r.health.steps <= len(r.t) or not x.kinetic.max() > 0.0:
         return ""
-    faster = x.balance / (2.0 * (x.kinetic + np.abs(x.balance)) + 1e-300)
+    faster = _faster(x)
     faster[_turns(x)] = 0.0
     lag = np.r_[0.0, np.cumsum(0.5 * (faster[1:] + faster[:-1]) * np.diff(r.t))]
     off, name, way = 0.0, "", STILL * r.values.length
@@ -49,13 +50,21 @@ def late(x: Ledger) -> str:
 
 
 def perhaps_late(x: Ledger) -> np.ndarray:
-    """Which of several motions may be late, (runs,): by a part of the time between two rows, at turning points too."""
+    """Which of several motions may be late, (runs,): by a part of the time between two rows, at turning points too.
+
+    In that time, which a step may take, it may go some of its ways.
+    """
     if x.works or x.result.exchanged or x.result.bulk:
         return np.zeros(len(x.kinetic), bool)
     width = np.diff(x.result.t[: x.kinetic.shape[-1]])
-    faster = np.abs(x.balance) / (2.0 * (x.kinetic + np.abs(x.balance)) + 1e-300)
+    faster = np.abs(_faster(x))
     lag = (0.5 * (faster[:, 1:] + faster[:, :-1]) * width).sum(axis=-1)
-    return lag > LATE * width.mean() if len(width) else lag > 0.0
+    return lag > SOON * LATE * width.mean() if len(width) else lag > 0.0
+
+
+def _faster(x: Ledger) -> np.ndarray:
+    """Part by which it is too fast at every output time, dE / 2T: half of what moves at most."""
+    return x.balance / (2.0 * (x.kinetic + np.abs(x.balance)) + 1e-300)
 
 
 def _turns(x: Ledger) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..numerics.forest import root, unite
 from ..tables.system import BETWEEN, FORCE_ALONG, FORCE_F, FORCE_M, MASS, NV, PARENT, SLIDING, System
 from .booked import GIVEN
 from .energy import EXCHANGED, gravity, kinetic
@@ -137,22 +138,15 @@ def apart(result: Result) -> list[Ledger]:
 
 def connected(S: System) -> np.ndarray:
     """The part to which each row of the body table belongs, (nb,): joints, couplings and forces connect them."""
-    nb = len(S.body_i)
-    first = list(range(nb))  # of what each hangs together with, as far as it is known: a body before it, or itself
-
-    def root(b: int) -> int:
-        while first[b] != b:
-            first[b] = first[first[b]]
-            b = first[b]
-        return b
-
+    first = list(
+        range(len(S.body_i))
+    )  # of what each hangs together with, as far as it is known: a body before it, or itself
     pairs = [(b, int(row[PARENT])) for b, row in enumerate(S.body_i) if row[PARENT] >= 0]
     some = [*(_of_line(S, k) for k in range(len(S.row_i))), *(_of_force(S, k) for k in range(len(S.force_i)))]
     pairs += [(int(bodies[0]), int(b)) for bodies in some for b in bodies[1:]]
     for i, j in pairs:
-        i, j = sorted((root(i), root(j)))
-        first[j] = i
-    return np.unique([root(b) for b in range(nb)], return_inverse=True)[1]
+        unite(first, i, j)
+    return np.unique([root(first, b) for b in range(len(first))], return_inverse=True)[1]
 
 
 def _of_line(S: System, k: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Islands: what contacts and lines connect, found by union and find (Tarjan 1975) in linear time.
+"""Islands: what contacts and lines connect (`numerics/forest.py`).
 
 What stands still (`NONE`) connects nothing; nodes and groups do, also such as no impulse moves.
 """
@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiler.jit import formula, kernel
+from ..forest import root, unite
 from .problem import NONE
 
 
@@ -25,25 +26,6 @@ class Islands(NamedTuple):
     member_p: np.ndarray  # (ni + 1,)
     team: np.ndarray  # (ng,)
     team_p: np.ndarray  # (ni + 1,)
-
-
-@formula
-def root(parent, i):
-    """The root of i; paths are halved on the way."""
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
-
-
-@formula
-def unite(parent, i, j):
-    """Two become one; the smaller number leads, so that nothing depends on the order of contacts."""
-    i, j = root(parent, i), root(parent, j)
-    if i < j:
-        parent[j] = i
-    elif j < i:
-        parent[i] = j
 
 
 @formula

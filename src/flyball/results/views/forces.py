@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from ...constraints.modes import BY_RATE
-from ...equations.loads import SLOW, power, wide
+from ...equations.loads import at_rest, power, wide
 from ...errors import AnalysisError
 from ...laws.call import STACK_RESERVE
 from ...laws.evaluation import evaluate
 from ...math.scalar import sign
 from ...math.vec import dot, sub
 from ...model.force import CoordinateForce, JointForce
-from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD, LENGTH, SPARE, TEMPO
+from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD, SPARE
 from ..booked import basis
 from ..records import coordinate_frames, turned
 from .base import Curves, View
@@ -74,8 +74,7 @@ class ForceView(View):
         stretches = self._result.stretches
         if s < 0 or stretches is None:
             return sign(rate)
-        slow = SLOW * (self._x.system.glob[LENGTH] * self._x.system.glob[TEMPO]).real
-        by_rate = np.where(np.abs(rate) > slow, sign(rate), 0.0)
+        by_rate = np.where(np.abs(rate) > at_rest(self._x.system), sign(rate), 0.0)
         return np.where(stretches.sigma[s] == BY_RATE, by_rate, stretches.sigma[s] + 0.0 * rate)
 
     def _rows(self) -> list[int]:

@@ -6,8 +6,9 @@ import numpy as np
 
 from ....equations.watched import Loop
 from ....numerics.integrators.watching import AWAY
-from ....tables.system import G_CORNER, G_LOWER, G_UPPER, GUARD_KIND, GUARD_OF, SWITCH_MEASURED
+from ....tables.system import G_CORNER, GUARD_KIND, GUARD_OF, SWITCH_MEASURED
 from .here import Here
+from .looked import DISTANCES
 
 HARDLY = 0.5  # of its rate at a stop, at the begin of the step: it began to move in between
 
@@ -22,7 +23,7 @@ def astray(here: Here, loop: Loop) -> frozenset[int]:
         kind, s = S.guard_i[g, [GUARD_KIND, GUARD_OF]].tolist()
         if kind == G_CORNER:
             out.add(s)
-        elif kind in (G_LOWER, G_UPPER):
+        elif kind in DISTANCES:
             before, now = np.abs(loop.desk.moving[:, 1, S.switch_i[s, SWITCH_MEASURED]])
             if before <= HARDLY * now:
                 out.add(s)

@@ -1,0 +1,29 @@
+"""What rates are compared with: a mechanism's own speed, and the quickest of what is measured."""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..math.scalar import magnitude
+from ..tables.system import LENGTH, RATE, TEMPO, UNIT
+from .rows import measured
+
+
+@formula
+def own_speed(S):
+    """The mechanism's length at its own rate [m/s]."""
+    return S.glob[LENGTH] * S.glob[TEMPO]
+
+
+@formula
+def pace(S, m):
+    """The same for quantity m, whose unit may be a radian."""
+    return S.glob[UNIT + m] * S.glob[TEMPO]
+
+
+@formula
+def quickest(S, W):
+    """The largest rate that is measured."""
+    fastest = 0.0
+    for m in range(measured(S)):
+        fastest = max(fastest, magnitude(W.sensed[RATE, m]))
+    return fastest
