@@ -5,6 +5,7 @@ that of the process and ``ratio`` what it is of the kernels'; ``wall`` is a cloc
 the neighbours too: its ratio is to the kernels of the same points alone, called by as many threads right before each
 study, the least of both. Of some studies the quickest. ``simulate``: CPU of `m.simulate` with a curve read, in a loop
 over some of the points. Stiffnesses and torques only forces see; with another length all tables are others.
+What is being done is told as it begins, and each row as it is found; by tables all takes some four times as long.
 Usage: ``python study.py [--runs 10000] [--threads 1 2] [--vary stiffness d] [--repeats 3] [--engines made tables]``.
 """
 
@@ -109,14 +110,20 @@ def points(m: fb.Mechanism, name: str, runs: int) -> np.ndarray:
     return value * (1 - part) + 2.0 * value * part * u
 
 
+def say(text: str) -> None:
+    """At once: a row takes minutes where the machine is shared."""
+    print(f"{time.strftime('%H:%M:%S')} {text}", flush=True)
+
+
 def measured(
     m: fb.Mechanism, name: str, runs: int, threads: int, made: bool, repeats: int
 ) -> tuple[fb.Study, float, float, Kernels, float]:
     """(study, CPU seconds, wall seconds, its kernels, wall seconds of these): the least of each."""
-    kernels = Kernels(m, asked(m, name, FEW, threads, made))
+    kernels = Kernels(m, asked(m, name, min(FEW, runs), threads, made))
     kernels.points = points(m, name, runs)
     found, cpu, wall, alone = None, np.inf, np.inf, np.inf
-    for _ in range(repeats):
+    for k in range(repeats):
+        say(f"  {k + 1} of {repeats}: {runs} kernels alone, then the study")
         alone = min(alone, kernels.wall(threads))
         start = time.process_time(), time.perf_counter()
         found = asked(m, name, runs, threads, made)
@@ -133,6 +140,17 @@ def alone(m: fb.Mechanism, study: fb.Study) -> float:
     return (time.process_time() - start) / count
 
 
+def row(
+    m: fb.Mechanism, s: fb.Study, what: tuple[str, bool, int], took: tuple[float, float, float], each: float
+) -> dict[str, object]:
+    """Of the table: CPU and wall seconds of a run and what the latter is of the kernels', CPU seconds of a kernel."""
+    name, made, threads = what
+    cpu, wall, ratio = took
+    told = {"varied": name, "engine": "made" if made else "tables", "runs": len(s), "threads": threads}
+    times = {"kernel": 1e3 * each, "cpu": 1e3 * cpu, "ratio": cpu / each, "wall": 1e3 * wall, "wall_ratio": ratio}
+    return told | times | {"simulate": 1e3 * alone(m, s)}
+
+
 def main() -> None:
     """Command line."""
     told = argparse.ArgumentParser(description=__doc__)
@@ -143,26 +161,24 @@ def main() -> None:
     told.add_argument("--engines", nargs="+", default=["made", "tables"])
     asked = told.parse_args()
     m, rows, runs = example("andrews.toml"), [], asked.runs
+    print(timing.heading(), flush=True)
+    say("the engine is compiled if it is not yet, which takes 20 to 30 s of CPU time")
+    m.simulate(0.03, specialize=False)
     for made in (engine == "made" for engine in asked.engines):
         for name in asked.vary:
             for threads in asked.threads:
+                say(f"{name}, {'made code' if made else 'tables'}, threads: {threads}")
                 s, cpu, wall, kernels, calls = measured(m, name, runs, threads, made, asked.repeats)
-                each = kernels.each(asked.repeats)
                 rows.append(
-                    {
-                        "varied": name,
-                        "engine": "made" if made else "tables",
-                        "runs": runs,
-                        "threads": threads,
-                        "kernel": 1e3 * each,
-                        "cpu": 1e3 * cpu / runs,
-                        "ratio": cpu / runs / each,
-                        "wall": 1e3 * wall / runs,
-                        "wall_ratio": wall / calls,
-                        "simulate": 1e3 * alone(m, s),
-                    }
+                    row(
+                        m,
+                        s,
+                        (name, made, threads),
+                        (cpu / runs, wall / runs, wall / calls),
+                        kernels.each(asked.repeats),
+                    )
                 )
-                print(f"{name}, {rows[-1]['engine']}, {threads} threads: done", flush=True)
+                say("  " + ", ".join(f"{COLUMNS[k]} {timing.text(x)}" for k, x in list(rows[-1].items())[4:]))
     print(timing.table(rows, COLUMNS))
 
 

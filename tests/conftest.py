@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import gc
+
 import pytest
 
 from tests.layers import LAYERS, take
+
+LONG = ("program/test_added_elements", "robust/test_random", "view/test_p", "checkpoints/", "identities/", "view/")
+"""Files that take longest, wherever they stand: one that began last would leave one of two processes alone."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Longest files first."""
+    items.sort(key=lambda item: next((k for k, x in enumerate(LONG) if f"tests/{x}" in item.nodeid), len(LONG)))
 
 
 @pytest.fixture(params=LAYERS)
@@ -12,3 +22,10 @@ def layer(request, monkeypatch) -> str:
     """One coordinate layer after the other, in force for the test."""
     take(request.param, monkeypatch)
     return request.param
+
+
+@pytest.fixture(scope="module", autouse=True)
+def only_what_is_new_is_looked_at() -> None:
+    """Garbage is looked for among what a file of tests makes: thirteen thousand tests and what Numba keeps are a second."""
+    gc.collect()
+    gc.freeze()

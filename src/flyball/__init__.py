@@ -72,7 +72,8 @@ Read a result
 When something is wrong
     FlyballError is the base of all errors: ModelError, UnitError and ExpressionError for what was written;
     AssemblyError, SimulationError, MobilityError, SingularityError, NotConverged and AnalysisError for what was asked.
-    StartWarning tells what of a described start could not be kept, Interrupted that the user ended what computes.
+    Interrupted, a KeyboardInterrupt, has what was computed until the user ended it. StartWarning tells what of a
+    described start could not be kept.
 
 Orientations by themselves: ``help(fb.rotations)``. From a shell: ``flyball --help``.
 """

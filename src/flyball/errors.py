@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 import warnings
 from pathlib import Path
@@ -25,6 +26,18 @@ class UnitError(ModelError):
 
 class ExpressionError(ModelError):
     """An expression cannot be read, or uses a name that is not known."""
+
+
+def cannot_write(path: str | os.PathLike, error: OSError) -> ModelError:
+    """The error to raise where a file cannot be written."""
+    path = Path(path)
+    if not path.parent.is_dir():
+        why = f"there is no folder {os.fspath(path.parent)!r}; make it first, or write elsewhere"
+    elif path.is_dir():
+        why = f"it is a folder; name a file in it, for instance {os.fspath(path / 'page.html')!r}"
+    else:
+        why = error.strerror or str(error)
+    return ModelError(f"cannot write {os.fspath(path)!r}: {why}")
 
 
 def warn(text: str, category: type[Warning]) -> None:
@@ -57,11 +70,15 @@ class StartWarning(UserWarning):
     """A velocity that was described is not the one that a motion starts with: the constraints do not allow it."""
 
 
-class Interrupted(UserWarning):
-    """The user interrupted an analysis: what it returns is the part that was computed, and says so.
+class Interrupted(KeyboardInterrupt):
+    """The user interrupted an analysis. ``result`` holds what was computed up to then.
 
-    ``warnings.simplefilter("error", fb.Interrupted)`` makes an exception of it, for scripts that must not go on.
+    It is a ``KeyboardInterrupt``: scripts and loops end by it, as by any other.
     """
+
+    def __init__(self, message: str, result: Any = None) -> None:
+        super().__init__(message if result is None else f"{message} (``result`` of this exception has it)")
+        self.result = result
 
 
 class SingularOrientationError(FlyballError, ValueError):

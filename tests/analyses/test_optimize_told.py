@@ -26,3 +26,17 @@ def test_the_reason_is_told_in_our_words():
     assert "`" not in found.message
     few = spring().optimize(["b.y"], ["k"], target=[-0.2], analysis="equilibrium", evaluations=1)
     assert "as evaluations= allows" in few.message
+
+
+@pytest.mark.parametrize("how", [{"target": [-0.2]}, {"minimize": lambda y: float((y[0, 0] + 0.2) ** 2)}])
+def test_an_interrupt_keeps_the_best(how):
+    def stop(done):
+        if done > 0.03:
+            raise KeyboardInterrupt
+
+    with pytest.raises(fb.Interrupted, match=r"interrupted by the user after [4-9] analyses") as ended:
+        spring().optimize(["b.y"], ["k"], analysis="equilibrium", progress=stop, evaluations=100, **how)
+    best = ended.value.result
+    assert not best.success
+    assert best.cost < best.start_cost
+    assert best.values[0, 0] == pytest.approx(-9.81 / best.parameters["k"], rel=1e-9)

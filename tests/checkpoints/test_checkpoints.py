@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.analysis import simulate as simulating
 from flyball.analysis.checkpoints import keeper
+from flyball.analysis.checkpoints.heeded import heeded
 from flyball.analysis.motion import part
 
 from .motions import (
@@ -99,13 +101,54 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, monkeypatch):
     m, path = double_pendulum(), tmp_path / "run.nc"
     cut(monkeypatch)
     run = m.simulate(4, checkpoint=tmp_path / "whole.nc")
-    broken = m.simulate(4, checkpoint=path, progress=stop)
+    with pytest.raises(fb.Interrupted, match="from where the same call goes on") as ended:
+        m.simulate(4, checkpoint=path, progress=stop)
+    broken = ended.value.result
     assert not broken.health.success
-    assert "the same call goes on from t = " in broken.health.message
     n = len(broken.t)
     assert 0.5 < broken.t[-1] < 4.0
     assert np.array_equal(broken["b.x"], run["b.x"][:n])
     assert_same(run, m.simulate(4, checkpoint=path))
+
+
+def test_an_interrupt_of_a_long_part_ends_it_in_order(tmp_path, monkeypatch):
+    """Ctrl-C: what a part that should have ended long ago has computed is in the file, and not computed again."""
+    path, sent = tmp_path / "run.nc", []
+
+    def ctrl_c(fraction):
+        if fraction > 0.4 and not sent:
+            sent.append(fraction)
+            signal.raise_signal(signal.SIGINT)
+
+    m = double_pendulum()
+    cut(monkeypatch, 10**9)  # all of it is one part
+    monkeypatch.setattr(part, "OLD", 0.0)
+    monkeypatch.setattr(simulating, "SLICE", 1e-9)
+    with pytest.raises(fb.Interrupted, match="interrupted by the user at t = ") as ended:
+        m.simulate(4, checkpoint=path, progress=ctrl_c)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    broken, kept = ended.value.result, fb.load_result(path)
+    assert_same(broken, kept)
+    t = kept.final[0]
+    assert 4 * sent[0] <= t < 4 * sent[0] + 0.5
+    assert f"{path} holds it to t = {t:.6g} s" in broken.health.message
+    begun = []
+    run = m.simulate(4, checkpoint=path, progress=begun.append)
+    assert begun[0] >= sent[0]
+    assert run["b.x"][: len(kept.t)] == pytest.approx(kept["b.x"], abs=0)
+    plain = m.simulate(4, rtol=1e-9)
+    assert run["b.x"] == pytest.approx(plain["b.x"], abs=1e-3)
+
+
+def test_a_second_interrupt_ends_it_at_once(monkeypatch):
+    monkeypatch.setattr(part, "OLD", 0.0)
+    own = part.Part(0.0)
+    with heeded(own):
+        signal.raise_signal(signal.SIGINT)
+        assert own.asked
+        assert own.due()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
 
 
 def test_a_failure_has_the_whole_motion_up_to_it(tmp_path, monkeypatch):

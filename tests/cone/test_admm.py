@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flyball.numerics.cone.admm import admm
-from flyball.numerics.cone.problem import CONVERGED, COULOMB, ENDED, ENOUGH, MOST
+from flyball.numerics.cone.problem import CONVERGED, COULOMB, CUT, ENDED, ENOUGH, MOST, RESIDUAL, STALLED
 from tests.cone.enlarge import solved
 from tests.cone.problems import KINDS, dense, impulses, random_problem
 from tests.cone.test_gauss_seidel import cone_lack
@@ -19,14 +19,16 @@ PLAIN = [k for k in KINDS if "rolling" not in k]
 @pytest.mark.parametrize("kind", PLAIN)
 @pytest.mark.parametrize("seed", range(4))
 def test_it_solves(seed, kind, coulomb):
-    if coulomb and (seed, kind) in NOT_FOUND:
-        pytest.skip("the fixed point of De Saxce's additions is not found: it is cut, and says so")
     P, X, W, O, F = random_problem(seed, **KINDS[kind])
     _, DK, N, b = dense(P, X)
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
     O.count[MOST], O.real[ENOUGH], O.count[COULOMB] = 20_000, 1e-10, coulomb
     solved(admm, P, X, W, O, F)
     p = impulses(P, X)
+    if coulomb and (seed, kind) in NOT_FOUND:  # the fixed point of De Saxce's additions
+        assert O.count[ENDED] in (CUT, STALLED)
+        assert O.real[RESIDUAL] > O.real[ENOUGH]
+        return
     assert O.count[ENDED] == CONVERGED
     assert cone_lack(P, p, N @ p + b, coulomb=bool(coulomb)) < 1e-8 * (1 + abs(p).max())
     after = np.concatenate([X.v[:, :6].ravel(), X.wide])

@@ -232,3 +232,32 @@ def test_more_accurate_where_asked():
     for rtol in (1e-5, 1e-8):
         r = m.simulate(1, outputs=201, rtol=rtol)
         assert np.abs(r["x"].output - np.sin(200 * r.t)).max() < 100 * rtol
+
+
+def test_outputs_of_systems_keep_their_names():
+    ct = pytest.importorskip("control")
+    one = ct.ss([[-1.0]], [[1.0]], [[2.0]], [[0.0]], outputs=["A speed"])
+    two = ct.ss([[-1.0]], [[1.0]], [[2.0], [3.0]], [[0.0], [0.0]], outputs=["fast", "slow"])
+    bare = ct.ss([[-1.0]], [[1.0]], [[2.0]], [[0.0]])
+    m = slide(
+        fb.StateSpace.from_control("K", one, inputs=["1"]),
+        fb.StateSpace.from_control("L", two, inputs=["1"]),
+        fb.StateSpace.from_control("M", two, inputs=["1"], outputs=["p", "q"]),
+        fb.StateSpace.from_control("N", bare, inputs=["1"]),
+        force="K + L.slow + N",
+    )
+    run = m.simulate(1.0, outputs=5)
+    exact = 1.0 - np.exp(-run.t)
+    for name, factor in (
+        ("K.A_speed", 2),
+        ("L.fast", 2),
+        ("L.slow", 3),
+        ("M.q", 3),
+        ("N.output", 2),
+        ("drive.force", 7),
+    ):
+        assert run[name] == pytest.approx(factor * exact, abs=1e-6)
+    linear = m.linearize(["drive"], ["K", "A.displacement"], about=m.equilibrium())
+    assert linear.C[0][linear.states.index("K.x")] == pytest.approx(2.0)
+    with pytest.raises(fb.ModelError, match=r"has several outputs; name one: L\.fast, L\.slow"):
+        slide(fb.StateSpace.from_control("L", two, inputs=["1"]), force="L")

@@ -96,7 +96,9 @@ def test_names_that_laws_read_with_a_dot():
 
 @pytest.mark.parametrize("x", [float("nan"), float("inf")])
 def test_matrices_of_finite_numbers(x):
-    with pytest.raises(fb.ModelError, match=f"row 2 of A of StateSpace 'K': the value is {x}, a finite number"):
+    with pytest.raises(
+        fb.ModelError, match=f"row 2, column 2 of A of StateSpace 'K': the value is {x}, a finite number"
+    ):
         slide(fb.StateSpace("K", inputs=["t"], A=[[0, 1], [0, x]], B=[[0], [1]], C=[[1, 0]]), force="K")
 
 
@@ -125,7 +127,6 @@ def test_friction_of_a_negative_coefficient_in_a_single_run():
         lambda m: m.inverse_dynamics([0, 1]),
         lambda m: m.prepare(),
         lambda m: m.sensitivity(["A.displacement"], ["k"]),
-        lambda m: m.equilibria("k", [1, 2]),
         lambda m: m.symbolic(),
         lambda m: m.simulate(1, method="variational", step=0.01),
         lambda m: m.simulate(1, method="impulse"),
@@ -202,3 +203,29 @@ def test_what_a_limited_controller_cannot_hold_is_told_with_and_without_states(g
     m = slide(pid, force="pid + 3").changed({"spring": None})
     with pytest.raises(fb.NotConverged, match=r"2 N push along cart\.x and nothing holds against it"):
         m.equilibrium()
+
+
+def test_units_of_limits_and_of_set_points_are_compared():
+    def pid(**fields):
+        return slide(fb.PID("pid", **{"setpoint": "20 cm", "measured": "A.displacement", "kp": 1, **fields}))
+
+    with pytest.raises(fb.UnitError, match=r"PID 'pid': lower is '-2 kg'; '3 N'"):
+        pid(lower="-2 kg", upper="3 N")
+    with pytest.raises(fb.UnitError, match=r"setpoint of PID 'pid': '20 deg': expected a length"):
+        pid(setpoint="20 deg")
+    pid(lower="-2 kN", upper="3 N")
+    pid(lower="-2", upper="3 N")
+    pid(setpoint="20 deg", measured="57.3*A.displacement")  # what has no unit says nothing
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (lambda: fb.StateSpace("K", inputs=["t"], A=[["nan"]], B=[[1]], C=[[1]]), "row 1, column 1 of A of StateSpace 'K'"),
+        (lambda: fb.StateSpace("K", inputs=["t"], D=[[1], [float("nan")]]), "row 2, column 1 of D of StateSpace 'K'"),
+        (lambda: fb.StateSpace("K", inputs=["t", "q"], D=[[1, 1]]), "input 2 of StateSpace 'K': unknown name 'q'"),
+    ],
+)  # fmt: skip
+def test_an_entry_of_a_matrix_is_named(made, said):
+    with pytest.raises(fb.ModelError, match=said):
+        slide(made(), force="K")

@@ -80,3 +80,14 @@ def test_at_rest_without_loads(kd, goal):
     d = F / (F + T) * X[4] - kd / (F + T) * (X[0] + X[5])
     A = np.vstack([E[:3, :3] @ X[:3] + np.outer(E[:3, 3], X[3] - 80 * X[0] + d), X[3] - 60 * T * X[0], d, -X[0]])
     np.testing.assert_allclose(np.sort_complex(w), np.sort_complex(np.linalg.eigvals(A)), atol=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [1e-7, -1e-7, 3e-12])
+def test_modes_and_equilibria_say_the_same(ratio):
+    """A spring and a negative damper of so small a ratio: it grows, and both say so."""
+    m = fb.Mechanism("slide", planar=True)
+    m.add(fb.Body("cart", mass=1.0, inertia=1.0), fb.Prismatic("A", "ground", "cart", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Actuator("drive", coordinate="A.displacement", force=f"-value + {2 * ratio}*rate"))
+    e = m.equilibrium()
+    assert e.stability == ("unstable" if ratio > 0 else "stable")
+    assert m.modes(about=e).stable == (ratio < 0)

@@ -141,7 +141,9 @@ def test_an_interrupt_keeps_what_there_is():
         if fraction > 0.3:
             raise KeyboardInterrupt
 
-    run = pendulum(note("A.angle + pi/2")).simulate(10.0, progress=stop, outputs=1001)
+    with pytest.raises(fb.Interrupted) as ended:
+        pendulum(note("A.angle + pi/2")).simulate(10.0, progress=stop, outputs=1001)
+    run = ended.value.result
     assert not run.health.success
     assert "interrupted" in run.health.message
     assert 2.0 < run.t[-1] < 10.0

@@ -199,7 +199,9 @@ def test_interrupt_keeps_what_was_computed(monkeypatch):
         if part > 0.5:
             raise KeyboardInterrupt
 
-    r = actuated().simulate(2.0, outputs=201, progress=stop)
+    with pytest.raises(fb.Interrupted, match="interrupted by the user at t = ") as ended:
+        actuated().simulate(2.0, outputs=201, progress=stop)
+    r = ended.value.result
     assert not r.health.success
     assert "interrupted by the user at t = " in r.health.message
     assert 0.9 < r.t[-1] < 2.0

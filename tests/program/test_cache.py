@@ -1,6 +1,6 @@
 """Compiled code is kept between processes, and never served when the sources have changed.
 
-The processes themselves are those of `tests.program.conftest`: compiling costs twenty seconds each time.
+Small kernels in processes of their own; what is compiled for a whole motion is `test_added_elements`'.
 """
 
 from pathlib import Path
@@ -14,33 +14,6 @@ from flyball.equations.residual import stepped
 from flyball.equations.variation import variation_kernel
 from flyball.numerics.ldl import factor_kernel
 from tests.program.copied import Copy
-
-
-def test_the_copy_is_what_ran(runs):
-    copy, *each = runs
-    assert {r["where"] for r in each} == {str(copy.package / "__init__.py")}
-
-
-def test_a_second_process_compiles_nothing(runs):
-    _, first, second, _ = runs
-    assert first["misses"] == len(first["kernels"]) > 0
-    assert (second["misses"], second["hits"]) == (0, len(second["kernels"]))
-    assert second["kernels"] == first["kernels"]
-    assert first["y"] == second["y"] == pytest.approx(-5.0, abs=1e-9)
-
-
-def test_an_edited_formula_is_never_served_from_the_cache(runs):
-    """Numba's own cache looks at the kernel's file only, and would go on with the old formula."""
-    *_, edited = runs
-    assert runs[1]["y"] == pytest.approx(-5.0, abs=1e-9)
-    assert edited["y"] == pytest.approx(5.0, abs=1e-9)
-    assert edited["misses"] > 0
-
-
-def test_the_right_hand_side_is_compiled_once(runs):
-    """One engine holds it, whatever is simulated: planar, spatial, with and without constraints."""
-    _, first, *_ = runs
-    assert first["kernels"] == ["engine", "through"]
 
 
 def names_of(kernel):
@@ -82,18 +55,50 @@ def test_stamps_see_every_way_to_import(tmp_path, monkeypatch):
     assert stamp.compiled_files() < set(stamp.stamped(elsewhere))
 
 
-@pytest.mark.parametrize("damage", [b"", b"not a pickle", None])
-def test_damaged_cache_files_are_compiled_anew(tmp_path, damage):
-    """Empty, foreign or cut short: as if they were not there, and written again."""
-    small = Copy(tmp_path)
-    script = """
+FACTOR = """
 import numpy as np
 from flyball.numerics.ldl import analyse, factor_kernel
 P, _ = analyse(1, np.zeros(0, int), np.zeros(0, int))
 L, D, Y = np.zeros(len(P.Li)), np.zeros(1), np.zeros(1)
+"""
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
+    return Copy(tmp_path_factory.mktemp("copied"))
+
+
+@pytest.fixture
+def small(package, tmp_path):
+    """A copy of the package with an empty cache."""
+    return package.with_cache(tmp_path)
+
+
+def test_an_edited_formula_is_never_served_from_the_cache(small):
+    """Numba's own cache looks at the kernel's file only, and would go on with the old formula of another."""
+    script = FACTOR + "says = factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)\n"
+    script += "print(json.dumps(cache_counts() | {'says': int(says), 'inverse': D[0]}))\n"
+    first = small.run(script)
+    assert (first["misses"], first["says"], first["inverse"]) == (1, 0, 0.25)
+    was, becomes = "return lambda x: not (x.real == 0.0 or x.real != x.real)", "return lambda x: x.real != x.real"
+    small.edit("math/scalar.py", was, becomes)
+    try:
+        edited = small.run(script)
+    finally:
+        small.edit("math/scalar.py", becomes, was)
+    assert (edited["misses"], edited["says"]) == (1, 1), "no pivot is good any more"
+
+
+@pytest.mark.parametrize("damage", [b"", b"not a pickle", None])
+def test_damaged_cache_files_are_compiled_anew(small, damage):
+    """Empty, foreign or cut short: as if they were not there, and written again."""
+    script = (
+        FACTOR
+        + """
 factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)
 print(json.dumps(cache_counts() | {"inverse": D[0]}))
 """
+    )
     assert small.run(script)["misses"] == 1
     files = [f for f in small.cache.rglob("*.nb?") if f.is_file()]
     assert {f.suffix for f in files} == {".nbi", ".nbc"}
@@ -104,29 +109,27 @@ print(json.dumps(cache_counts() | {"inverse": D[0]}))
     assert small.run(script)["hits"] == 1
 
 
-def test_a_file_that_cannot_be_read_now_is_left_as_it_is(tmp_path):
+def test_a_file_that_cannot_be_read_now_is_left_as_it_is(small):
     """A read error says nothing of what is in a file: the code is compiled, and the files stay for others."""
-    small = Copy(tmp_path)
-    script = """
-import numpy as np
+    script = (
+        FACTOR
+        + """
 from numba.core import caching
-from flyball.numerics.ldl import analyse, factor_kernel
 def refuse(self, name):
     raise PermissionError(13, "Permission denied")
 if READ:
     caching.IndexDataCacheFile._load_index = lambda self: refuse(self, "index")
-P, _ = analyse(1, np.zeros(0, int), np.zeros(0, int))
-L, D, Y = np.zeros(len(P.Li)), np.zeros(1), np.zeros(1)
 import warnings
 with warnings.catch_warnings(record=True) as told:
     warnings.simplefilter("always")
     factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)
 print(json.dumps(cache_counts() | {"inverse": D[0], "told": [str(w.message) for w in told]}))
 """
-    assert small.run("READ = False" + script)["misses"] == 1
+    )
+    assert small.run("READ = False\n" + script)["misses"] == 1
     before = {f: f.read_bytes() for f in small.cache.rglob("*.nb?")}
-    again = small.run("READ = True" + script)
+    again = small.run("READ = True\n" + script)
     assert (again["misses"], again["inverse"]) == (1, 0.25)
     assert any("cannot be kept" in text for text in again["told"])
     assert {f: f.read_bytes() for f in small.cache.rglob("*.nb?")} == before
-    assert small.run("READ = False" + script)["hits"] == 1
+    assert small.run("READ = False\n" + script)["hits"] == 1

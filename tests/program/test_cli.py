@@ -105,7 +105,11 @@ def test_a_run_that_cannot_go_on_keeps_what_was_computed(here: Path) -> None:
 def test_an_interrupted_run_is_written(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     r = slider_crank()
     r.health.success, r.health.message = False, "interrupted by the user at t = 1 s"
-    monkeypatch.setattr(fb.Mechanism, "simulate", lambda *_, **__: r)
+
+    def stopped(*_, **__):
+        raise fb.Interrupted(r.health.message, r)
+
+    monkeypatch.setattr(fb.Mechanism, "simulate", stopped)
     said = Said("run", "crank.toml", "--no-plots", "--no-animation")
     assert said.code == 130
     assert "interrupted by the user" in said.out

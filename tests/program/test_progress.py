@@ -125,7 +125,7 @@ import sys
 from flyball.analysis import progress
 progress.AFTER = 0.05
 from tests.program.test_progress import pendulum
-pendulum().simulate(40.0, rtol=1e-12, max_step=1e-4)
+pendulum().simulate(10.0, rtol=1e-12, max_step=1e-4)
 print("done")
 """
 

@@ -179,7 +179,9 @@ def test_an_interrupt_while_code_is_made_keeps_what_was_computed(maker, monkeypa
 
     maker.price_of_making = 1e6
     monkeypatch.setattr(maker, "code", interrupted)
-    r = four_bar().simulate(20.0, outputs=20001)
+    with pytest.raises(fb.Interrupted) as ended:
+        four_bar().simulate(20.0, outputs=20001)
+    r = ended.value.result
     assert not r.health.success
     assert "interrupted by the user" in r.health.message
     assert 0.0 < r.t[-1] < 20.0

@@ -64,14 +64,28 @@ def test_what_a_function_returns_is_told_shortly():
     assert "returned None; one" in s.reasons[0]
 
 
+def test_an_interrupted_run_is_none_of_the_study(tmp_path):
+    """The interrupt comes within the second run, on the thread that asked: it was taken for done, at the time reached."""
+    m, calls = oscillator(), []
+
+    def looked(model, parameters):
+        calls.append(parameters)
+        return model.simulate(1e4, outputs=11, parameters=parameters, progress=stop if len(calls) == 2 else False)
+
+    with pytest.raises(fb.Interrupted) as ended:
+        m.study({"k": [50.0, 60.0, 70.0]}, {"t": lambda r: r.t[-1]}, analysis=looked, threads=1)
+    assert ended.value.result["t"][0] == 1e4
+    assert ended.value.result.done.tolist() == [True, False, False]
+
+
 def test_an_interrupt_is_loud(tmp_path):
     m = oscillator()
-    with pytest.warns(fb.Interrupted, match="interrupted by the user at t = "):
-        part = m.simulate(1e4, outputs=11, progress=stop)
-    assert not part.health.success
-    with pytest.warns(fb.Interrupted, match="nothing is in .*begins anew"):
+    with pytest.raises(fb.Interrupted, match="interrupted by the user at t = ") as ended:
+        m.simulate(1e4, outputs=11, progress=stop)
+    assert not ended.value.result.health.success
+    with pytest.raises(fb.Interrupted, match=r"nothing is in .*begins anew"):
         m.simulate(100, outputs=11, progress=stop, checkpoint=tmp_path / "r.nc")
     assert not (tmp_path / "r.nc").exists()
-    with pytest.warns(fb.Interrupted, match=r"\d+ of 200 runs are missing"):
+    with pytest.raises(KeyboardInterrupt, match=r"\d+ of 200 runs are missing"):
         m.study({"k": np.linspace(50, 150, 200)}, ["end(b.x)"], t_end=0.1, progress=stop, file=tmp_path / "s.nc")
     assert not fb.load_study(tmp_path / "s.nc").complete

@@ -227,6 +227,42 @@ def test_what_only_floats_take_is_computed_by_itself():
     assert a.values[0].tobytes() == b.values[0].tobytes()
 
 
+def controlled():
+    """An arm that is brought up by a PID without limits, through a lag; what it weighs and the gains are parameters."""
+    m = fb.Mechanism("arm", planar=True, gravity=(0, -9.81), parameters={"load": 1.0, "kp": 60.0, "T": 0.02, "x0": 0.1})
+    m.add(fb.Body("arm", mass="1 + load", inertia="0.02 + 0.09*load", position=(0, -0.3)))
+    m.add(fb.Revolute("hinge", "ground", "arm", at=(0, 0)))
+    m.add(
+        fb.PID("pid", setpoint="1.2", measured="hinge.angle", kp="kp", ki=80, kd="kp/8", filter="20 ms", initial="x0")
+    )
+    m.add(fb.Lag("valve", of="pid", time="T"), fb.Motor("motor", "hinge", torque="valve"))
+    m.add(fb.StateSpace("ring", inputs=["hinge.rate"], A=[[0, 1], [-400, -4]], B=[[0], [1]], C=[[1, 0]]))
+    return m
+
+
+@pytest.mark.parametrize("names", [("kp",), ("T", "kp"), ("load", "kp"), ("x0",)])
+def test_controllers_without_corners_are_shared(names):
+    q = question(controlled(), names, ["end(arm.y)", "hinge.rate", "max(motor.torque)", "end(pid.integral)", "ring.x1"])
+    base = np.array([{"kp": 60.0, "T": 0.02, "load": 1.0, "x0": 0.1}[name] for name in names])
+    points = base * np.linspace(0.8, 1.2, 6)[:, None]
+    run = runner(q, points)
+    assert isinstance(run.__self__, Lean)
+    a, b = run(points, lambda: False), compute(q, points)
+    for x, y in zip(a.values, b.values, strict=True):
+        assert x.tobytes() == y.tobytes()
+    assert len(set(a.values[2])) == 6
+    assert run.__self__.alone_count == 0
+
+
+def test_a_gain_that_makes_no_number_is_told_run_by_run():
+    q = question(controlled(), ("T",), ["end(arm.y)"])
+    points = np.array([0.01, 0.02, 0.0, 0.03, 0.04])[:, None]
+    a, b = runner(q, points)(points, lambda: False), compute(q, points)
+    assert a.status.tolist() == b.status.tolist()
+    assert a.reasons == b.reasons
+    assert 2 in a.reasons
+
+
 def test_blocks_of_runs_are_spread_for_every_example():
     """What only floats take is computed run by run, without a word: none but what has to be a whole number may."""
     alone, tried = set(), 0

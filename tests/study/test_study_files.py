@@ -47,7 +47,9 @@ def test_an_interrupted_study_goes_on(tmp_path):
         if done > 0.4:
             raise KeyboardInterrupt
 
-    part = ask(file, progress=interrupt)
+    with pytest.raises(fb.Interrupted) as ended:
+        ask(file, progress=interrupt)
+    part = ended.value.result
     n = int(part.done.sum())
     assert 0.4 * 200 < n < 200
     assert not part.complete
@@ -115,7 +117,7 @@ def test_files_that_are_no_study(tmp_path):
     with pytest.raises(fb.ModelError, match="there is no file"):
         fb.load_study(tmp_path / "none.nc")
     oscillator().simulate(0.1, outputs=3).save(tmp_path / "r.nc")
-    with pytest.raises(fb.ModelError, match="is no study"):
+    with pytest.raises(fb.ModelError, match="is a result, no study"):
         fb.load_study(tmp_path / "r.nc")
     ask(tmp_path / "s.nc")
     data = bytearray((tmp_path / "s.nc").read_bytes())

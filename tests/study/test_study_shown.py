@@ -114,3 +114,44 @@ def test_what_does_not_vary_has_no_indices():
     s = pushed().study({"idle": (0, 1)}, ["end(block.x)"], t_end=0.1, design="saltelli", samples=8)
     assert np.isnan(s.indices().first_range).all()
     assert s.indices().total.tolist() == [[0.0]]
+
+
+def curves_of(figure: matplotlib.figure.Figure):
+    """The axis of a figure that is over time."""
+    return next(ax for ax in figure.axes if ax.get_xlabel() == "time [s]")
+
+
+def test_few_curves_are_told_apart_by_a_legend():
+    s = oscillator().study({"k": [1.0, 200.0], "mass": [1.0, 2.0]}, ["b.x"], t_end=0.01, outputs=3)
+    ax = curves_of(s.plot())
+    told = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert told == ["k = 1, mass = 1", "k = 1, mass = 2", "k = 200, mass = 1", "k = 200, mass = 2"]
+    assert len({line.get_color() for line in ax.lines}) == 4
+    for line, values in zip(ax.lines, s.values["b.x"], strict=True):
+        assert line.get_ydata().tolist() == values.tolist()
+
+
+def test_more_curves_are_coloured_by_the_parameter_that_tells_most_of_them():
+    s = oscillator().study({"mass": [1.0, 1.001], "k": [10.0**i for i in range(6)]}, ["b.x"], t_end=0.2, outputs=9)
+    figure = s.plot()
+    bar = next(ax for ax in figure.axes if ax.get_label() == "<colorbar>")
+    assert bar.get_ylabel() == "k"
+    assert bar.get_yscale() == "log"
+    lines = curves_of(figure).lines
+    assert [tuple(x.get_color()) for x in lines[:6]] == [tuple(x.get_color()) for x in lines[6:]]
+    assert len({tuple(x.get_color()) for x in lines}) == 6
+
+
+def test_axes_are_logarithmic_where_values_are_spread_so():
+    scaled = {"size": lambda run: float(run["b.x"][0]) ** 4}
+    s = oscillator().study({"x0": [0.01, 0.03, 0.1, 0.3, 1.0]}, scaled, t_end=0.01, outputs=3)
+    (ax,) = s.plot().axes
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    assert s.histogram().axes[0].get_xscale() == "log"
+    even = oscillator().study({"x0": [0.01, 0.26, 0.51, 0.76, 1.0]}, {"a": lambda run: 0.0 * run["b.x"][0] - 1.0}, t_end=0.01, outputs=3)  # fmt: skip
+    (ax,) = even.plot().axes
+    assert (ax.get_xscale(), ax.get_yscale()) == ("linear", "linear")
+    both = oscillator().study({"k": [1.0, 10.0, 100.0], "x0": [0.01, 0.1, 1.0]}, scaled, t_end=0.01, outputs=3)
+    ax = both.plot().axes[0]
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    assert both.plot().axes[1].get_yscale() == "log"  # of the colours

@@ -72,7 +72,8 @@ def test_printed(made):
             turns = (found[symbol] - float(evaluate([inlined], AT)[0])) / (2.0 * math.pi)
             assert turns == pytest.approx(round(turns), abs=1e-12)
     for part in (x.M, x.f, x.Z, x.accelerations):
-        assert max(map(len, str(part).split("\n"))) < 200 and len(str(part)) < 6100
+        text = str(part)
+        assert max(map(len, text.split("\n"))) < 200 and len(text) < 6100
     assert len(repr(x.solution)) < 100 and len(repr(eq.graph)) < 100
 
 

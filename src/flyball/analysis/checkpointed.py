@@ -15,14 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FlyballError, Interrupted, ModelError, SimulationError, warn
+from ..errors import FlyballError, Interrupted, ModelError, SimulationError
 from ..model.model import Model
 from ..results.result import Result
 from ..results.study_reading import fingerprint
+from .checkpoints.heeded import heeded
 from .checkpoints.keeper import Keeper
 from .motion.choice import AUTO as ANY
 from .motion.choice import SimulateOptions, Way, chosen, instead_of, unresolved
 from .motion.engines import AUTO
+from .motion.impulse.ending import INTERRUPTED
 from .motion.options import output_times
 from .motion.part import Part
 from .motion.start import start_time
@@ -44,10 +46,7 @@ class CheckpointOptions(SimulateOptions):
 
 def checkpointed(model: Model, o: CheckpointOptions) -> Result:
     """The motion; kept in a file on the way if that is asked for."""
-    result = simulate(model, o) if o.checkpoint is None else _kept(model, o)
-    if not result.health.success:
-        warn(result.health.message, Interrupted)
-    return result
+    return simulate(model, o) if o.checkpoint is None else _kept(model, o)
 
 
 def _kept(model: Model, o: CheckpointOptions) -> Result:
@@ -100,41 +99,54 @@ class _Motion:
         kept = self.kept
         while True:
             try:
-                found = self._part(o, why)
+                found, part = self._part(o, why)
             except SimulationError as error:
                 kept.write()
                 if isinstance(error.result, Result):
                     error.result = kept.whole(error.result)
                 raise
-            if not found[1]:
+            except Interrupted as error:
+                raise self._left(kept.whole(error.result)) from None
+            if not part.paused:
                 break
-            kept.add(found[0])
-        result = kept.whole(found[0])
-        if result.health.success:
-            kept.finish(result)
-        else:  # interrupted: what goes on does so from where the last part ended
-            kept.write()
-            result.health.message += (
-                f"; the same call goes on from t = {kept.parts[-1].final[0]:.6g} s, with {kept.path}"
-                if kept.parts
-                else f"; no part of it had ended yet, so nothing is in {kept.path}: the same call begins anew"
-            )
+            kept.add(found)
+            if part.asked:
+                result = kept.whole()
+                result.health.message = INTERRUPTED.format(result.final[0])
+                raise self._left(result)
+        result = kept.whole(found)
+        kept.finish(result)
         return result
 
-    def _part(self, o: SimulateOptions, why: str) -> tuple[Result, bool]:
-        """The next part, and whether there is one after it."""
+    def _left(self, result: Result) -> Interrupted:
+        """What is raised for the user's interrupt: what goes on does so from where the last part ended."""
+        kept = self.kept
+        kept.write()
+        result.health.message += (
+            f"; {kept.path} holds it to t = {kept.parts[-1].final[0]:.6g} s, from where the same call goes on"
+            if kept.parts
+            else f"; no part of it had ended yet, so nothing is in {kept.path}: the same call begins anew"
+        )
+        return Interrupted(result.health.message, result)
+
+    def _part(self, o: SimulateOptions, why: str) -> tuple[Result, Part]:
+        """The next part: its motion, and how it ended."""
         first, last, times = self.span
         before = self.kept.parts[-1] if self.kept.parts else None
         t = first if before is None else before.final[0]
         part = Part(first, later=before is not None)
 
         def tell(fraction: float) -> None:
-            self.tell((t + fraction * (last - t) - first) / (last - first))
+            try:
+                self.tell((t + fraction * (last - t) - first) / (last - first))
+            except KeyboardInterrupt:
+                if not part.interrupted():
+                    raise
 
         changed: Mapping[str, Any] = {"progress": tell}
         if before is not None:
             made = o.specialize if o.specialize != AUTO else bool(before.carried.get("made"))
             changed = {**changed, "start": before, "t_start": None, "specialize": made}
             times = times[times >= t] if before.carried.get("open") else times[times > t]
-        result = told(self.model, o.known(**changed), (t, last, times), why, self.auto, part)
-        return result, part.paused
+        with heeded(part):
+            return told(self.model, o.known(**changed), (t, last, times), why, self.auto, part), part

@@ -17,6 +17,8 @@ from ..errors import AnalysisError, ModelError, NotConverged
 from ..model.model import Model, listing, suggest
 from ..results.equilibria import EquilibriumSeries, Jump
 from ..results.equilibrium import UNSTABLE, Equilibrium
+from ..tables.numbers import unused
+from .assembly.start import Assembly
 from .compiled import compiled
 from .equilibrium import equilibrium as single
 from .equilibrium import resting
@@ -29,6 +31,7 @@ from .progress import shown
 from .untouched import refuse_contact
 
 HALVINGS = 16  # of a step between two values, before its branch is taken to have ended
+FEWER = 3  # the same with controllers, whose search costs more
 CONTRACTING = 0.6  # how much shorter Newton's steps have to become, each than the one before; at limit points 1/2
 NEAR = 0.02  # in the same: a branch that goes on within this has not ended but is steep there
 TINY = 1e-7  # steps, in radians or parts of the length, that rounding may keep from becoming shorter
@@ -49,7 +52,9 @@ class EquilibriaOptions(Options):
 
 def equilibria(model: Model, o: EquilibriaOptions) -> EquilibriumSeries:
     """Equilibria over values of a parameter, each following from the one before: see `Mechanism.equilibria`."""
-    refuse_contact(model, "equilibria")
+    refuse_contact(model, "equilibria", controlled=True)
+    if model.controllers and o.stable:
+        raise ModelError("stable= is for mechanisms without controllers; leave it out")
     points = checked(model, o.parameter, o.values, o.t or None, o.parameters)
     way = _Way(model, o.parameter, o.t, dict(o.parameters or {}), o.stable)
     done = EquilibriumSeries(model.name, o.parameter, points[:0], [], way.jumps)
@@ -58,7 +63,11 @@ def equilibria(model: Model, o: EquilibriaOptions) -> EquilibriumSeries:
         for k, value in enumerate(points):
             before = len(way.jumps)
             try:
-                if x is None:
+                if model.controllers:
+                    here = value if k == 0 else points[k - 1]
+                    last = done.equilibria[-1] if k else o.start
+                    done.equilibria.append(way.controlled(last, here, value, FEWER if k else 0))
+                elif x is None:
                     first = single(model, resting(*way.given(value), o.start, o.stable))
                     x = way.rest(first)
                     done.equilibria.append(first)
@@ -88,6 +97,8 @@ def checked(
     known = [*model.parameters, "t"]
     if parameter not in known:
         raise ModelError(f"{model.name!r} has no parameter {parameter!r}{suggest(parameter, known)}; {listing(known)}")
+    if parameter != "t" and unused(model, [parameter]):
+        raise ModelError(f"nothing of {model.name!r} depends on {parameter!r}: all its values would give the same")
     points = np.atleast_1d(np.asarray(values, float))
     if points.ndim != 1 or not len(points) or not np.isfinite(points).all():
         raise ModelError(f"values of {parameter!r} must be finite numbers in SI units, one at least, got {values!r}")
@@ -144,6 +155,23 @@ class _Way:
             return self.follow(self.follow(x, here, middle, halvings - 1), middle, there, halvings - 1)
         return self.jump(x, there, lambda: pushed(x, self.at(x, there)))
 
+    def controlled(self, last: Equilibrium | None, here: float, there: float, halvings: int) -> Equilibrium:
+        """The equilibrium with controllers, whose search begins at the last one; nearer steps where that is far."""
+        try:
+            found = single(self.model, resting(*self.given(there), last))
+        except NotConverged:
+            if not halvings:
+                raise
+        else:
+            if here == there or last is None or _moved(last.assembly, found.assembly) <= LONGEST:
+                return found
+            if not halvings:
+                self.jumps.append(Jump(float(there), last, found))
+                return found
+        middle = here + 0.5 * (there - here)
+        last = self.controlled(last, here, middle, halvings - 1)
+        return self.controlled(last, middle, there, halvings - 1)
+
     def settled(self, x: Rest, value: float) -> Rest:
         """The place itself, or where it leads where it must be stable and is not."""
         if self.stable and stability(x).kind == UNSTABLE:
@@ -163,9 +191,13 @@ class _Way:
 
 def _apart(x: Rest, y: Rest) -> float:
     """How far the bodies are from one place to another, in parts of the length or by the entries of their rotations."""
-    v = np.zeros(len(x.scale))
-    a, b = (r.c.moving(r.t, r.q, v) for r in (x, y))
-    length = x.c.values.length
+    return _moved(*(Assembly(r.c, r.t, r.q, np.zeros(len(r.scale))) for r in (x, y)))
+
+
+def _moved(x: Assembly, y: Assembly) -> float:
+    """The same from one assembly to another."""
+    a, b = (r.compiled.moving(r.t, r.q, np.zeros_like(r.v)) for r in (x, y))
+    length = x.compiled.values.length
     return max(max(np.abs(a[k].p - b[k].p).max() / length, np.abs(a[k].R - b[k].R).max()) for k in a)
 
 

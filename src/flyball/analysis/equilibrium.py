@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import ModelError, SingularityError
 from ..model.model import Model
 from ..model.touching import holds_at_times
-from ..results.equilibrium import STABLE, UNSTABLE, Equilibrium
+from ..results.equilibrium import EIGENVALUES, MULTIPLIERS, STABLE, UNSTABLE, Equilibrium
 from .assemble import assemble
 from .assembly.start import Assembly
 from .linear.controlled import found_rest
@@ -95,9 +95,10 @@ def _controlled(model: Model, o: EquilibriumOptions) -> Equilibrium:
     begin, c = _begun(a, o.start), a.compiled
     z = (begin if o.start is None else o.start.assembly).compiled.z.tolist()
     at = dict(zip((x.name for x in c.structure.controls), z, strict=False))
-    q = found_rest(model.snapshot(), c, a.t, begin.q, at)
-    out = finished(Rest.at(c, a.t, q), {}, "Newton's method")
-    out.stability = small_motions(model, LinearizeOptions(about=out, **ABOUT))[1]
+    q, way = found_rest(model.snapshot(), c, a.t, begin.q, at)
+    out = finished(Rest.at(c, a.t, q), {}, way)
+    linear, out.stability = small_motions(model, LinearizeOptions(about=out, **ABOUT))
+    out.judged_by = MULTIPLIERS if linear.period else EIGENVALUES
     return out
 
 

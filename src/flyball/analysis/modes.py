@@ -9,7 +9,8 @@ import numpy as np
 from ..model.model import Model
 from ..model.touching import holds_at_times
 from ..numerics.rank import span
-from ..results.modes import GROWS, Modes
+from ..results.growth import growing
+from ..results.modes import Modes
 from ..tables.names import velocity_names
 from .linear.curves import snapshot
 from .linear.derivatives import State
@@ -24,6 +25,7 @@ from .resting.instant import closed_instant
 
 FEW = 10
 STILL = 1e-6  # of the fastest: sparse eigenvalues below are zero; a double zero shows rounding by its square root
+UNSURE = 1e-6  # of a sparse eigenvalue, whose own uncertainty is not known: growth below is none
 ROUNDED = 1e-11  # parts of a shape, or of an eigenvalue, below this part of its largest are rounding
 TINY = 1e-7  # directions of rigid motions below this part of the largest are none
 
@@ -77,7 +79,7 @@ def _judged(found: Modes, own: Spectrum, one: np.ndarray, rest: np.ndarray, fram
     found.turning, found.seen_from = frame.turning, frame.told
     found.multiplicity, found.geometric_multiplicity = own.multiplicity[one], own.geometric[one]
     found.residual = own.residual
-    found.growing = bool((own.values[rest].real > GROWS * np.abs(own.values[rest])).any())
+    found.growing = bool(growing(own.values[rest]).any())
     return found
 
 
@@ -130,6 +132,7 @@ def _sparse(x: State, count: int, frozen: bool) -> Modes:
     w, X, residual = p.nearest(count + FEW)  # more: of pairs and rigid motions one is listed
     w = np.where(np.abs(w) <= STILL * p.fastest, 0.0, w)
     w = np.where(np.abs(w.imag) <= ROUNDED * np.abs(w), w.real, w)
+    w = np.where(growing(w) & (w.real <= UNSURE * np.abs(w)), 1j * w.imag, w)
     left, values, often = np.flatnonzero(w.imag >= 0.0), list[complex](), list[tuple[int, int]]()
     shapes = [np.zeros((len(X), 0), complex)]
     while len(left) and len(values) < count:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import AnalysisError, ModelError
+from ..errors import AnalysisError, Interrupted, ModelError
 from ..model.expressions import number
 from ..model.model import Model, listing, suggest
 from ..results.optimum import Optimum
@@ -84,10 +84,16 @@ SEARCHED = {  # by the status of L-BFGS-B
 
 def optimize(model: Model, o: OptimizeOptions) -> Optimum:
     """Find parameters that serve best: see `Mechanism.optimize`."""
-    refuse_contact(model, "optimize")
+    refuse_contact(model, "optimize", controlled=True)
     with shown(o.progress, "optimizing") as tell:
         search = Search(model, o, tell)
-        return search.fit(o.target, o.weights) if o.minimize is None else search.minimum(o.minimize)
+        try:
+            return search.fit(o.target, o.weights) if o.minimize is None else search.minimum(o.minimize)
+        except KeyboardInterrupt as stopped:
+            left = search.left()
+            if left is None:
+                raise
+            raise left from stopped
 
 
 class Search:
@@ -106,6 +112,8 @@ class Search:
         self.low, self.high = (self._bounds(o.to, k) for k in (0, 1))
         self._known: tuple[np.ndarray, Any] | None = None
         self.count = 0
+        self._best: tuple[float, np.ndarray, Any] | None = None
+        self._first = 0.0
 
     def _bounds(self, to: Sequence[str] | Bounds, k: int) -> np.ndarray:
         out = np.full(len(self.names), np.inf if k else -np.inf)
@@ -133,6 +141,22 @@ class Search:
             self._known = x.copy(), found
         return self._known[1]
 
+    def _weighed(self, x: np.ndarray, cost: float) -> None:
+        """Keep the best place."""
+        if self._best is None:
+            self._first = cost
+        if self._best is None or cost < self._best[0]:
+            self._best = cost, x.copy(), self.at(x)
+
+    def left(self) -> Interrupted | None:
+        """What is raised for the user's interrupt, with the best place by then; None if there is none."""
+        if self._best is None:
+            return None
+        cost, x, found = self._best
+        self._known = x, found
+        message = f"interrupted by the user after {self.count} analyses; the best by then is kept"
+        return Interrupted(message, self._optimum(x, cost, self._first, False, message))
+
     def fit(self, target: Any, weights: Any) -> Optimum:
         """Least squares."""
         from scipy.optimize import least_squares
@@ -152,9 +176,11 @@ class Search:
 
         def residual(x: np.ndarray) -> np.ndarray:
             try:
-                return left(self.at(x))
+                r = left(self.at(x))
             except AnalysisError:
                 return np.full(len(begin), REFUSED * size)
+            self._weighed(x, 0.5 * float(r @ r))
+            return r
 
         def jacobian(x: np.ndarray) -> np.ndarray:
             found = self.at(x)
@@ -186,10 +212,9 @@ class Search:
                 found = self.at(x)
             except AnalysisError:
                 return REFUSED * (abs(first) or 1.0), np.zeros(len(x))
-            slope = _slope(function, found.values)
-            return float(function(found.values)), np.einsum(
-                "ij,ijk->k", slope.conj(), found.derivatives
-            ).real * self.scale
+            slope, value = _slope(function, found.values), float(function(found.values))
+            self._weighed(x, value)
+            return value, np.einsum("ij,ijk->k", slope.conj(), found.derivatives).real * self.scale
 
         bounds = list(zip(self.low, self.high, strict=True))
         tolerance = self.asked.tolerance

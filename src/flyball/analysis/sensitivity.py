@@ -12,7 +12,6 @@ from ..equations.variation import variation_kernel
 from ..errors import ModelError, SingularityError
 from ..model.model import Model, listing, suggest
 from ..model.quantities import one
-from ..results.linear import follow
 from ..results.result import Result
 from ..results.sensitivity import Sensitivity
 from .assemble import assemble
@@ -23,18 +22,17 @@ from .linear.carried import carried
 from .linear.controlled import determined_copy
 from .linear.curves import over_time, slopes, snapshot
 from .linear.derivatives import Equations, State, announce, stepped_values
-from .linear.differences import Found, aside, check, derivative, whole
-from .linear.eigenvalues import changes
-from .linear.instant import instant
+from .linear.differences import Found, check, whole
 from .linear.jumps import refuse_jumps
 from .linear.kinks import refuse_kinks
+from .linear.moded import at_modes, of_modes
 from .linear.own_words import in_own_words
+from .linear.question import Question
 from .linear.rest import Rest
 from .linear.sliders import Slid, beginnings, refuse_sampled, slid
 from .linear.tangent import Direction, Linear, Tangent, friction
 from .linear.undetermined import refuse_undetermined, told_by_reactions
 from .linear.variation import Variation, Varied, followed
-from .linearize import without_inputs
 from .motion.ahead import refuse_missing
 from .motion.choice import SimulateOptions
 from .motion.layer import known
@@ -105,22 +103,6 @@ class SensitivityOptions(DerivativeOptions):
             raise ModelError("say which quantities: of=['slider.x'], for instance")
 
 
-@dataclass
-class Question:
-    """What is asked: of which quantities, by which parameters, where."""
-
-    model: Model
-    of: tuple[str, ...]
-    to: tuple[str, ...]
-    t: float
-    parameters: dict[str, float]
-    times: np.ndarray
-    about: str | None
-    rtol: float
-    atol: float
-    coordinates: str
-
-
 def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
     """Derivatives of quantities with respect to parameters: see `Mechanism.sensitivity`."""
     if model.controllers:
@@ -161,11 +143,11 @@ def _asked(model: Model, o: SensitivityOptions) -> Sensitivity:
 
 def _controlled(model: Model, o: SensitivityOptions) -> Sensitivity:
     """Of a mechanism with controllers: of one that has bodies in their place."""
-    if o.analysis not in ("motion", "equilibrium") or model.events:
+    if o.analysis not in ("motion", "equilibrium", "modes") or model.events:
         refuse_controllers(
             model, f"sensitivity with analysis={o.analysis!r}" + (", with events," if model.events else "")
         )
-    if o.analysis == "equilibrium":
+    if o.analysis != "motion":
         return _asked(model, o)
     refuse_sampled(model, "sensitivity")
     for name in o.of:
@@ -348,53 +330,10 @@ def _at_rest(a: Question) -> Found:
     return found
 
 
-def _modes(a: Question) -> Sensitivity:
-    state = _states(a)
-    begin = state(a.parameters)
-    f, _, base = without_inputs(begin)
-    _refuse_kinks(a, Equations(begin), ())
-
-    def found(parameters: Mapping[str, float]) -> np.ndarray:
-        return without_inputs(state(parameters), like=f)[2].A
-
-    dA = np.array([derivative(a.model, a.parameters, name, found) for name in a.to])
-    w, dw = changes(
-        base.A, dA.reshape(len(a.to), *base.A.shape), lambda k: aside(a.model, a.parameters, a.to[k], found)
-    )
-    of = tuple(f"eigenvalue {k}" for k in range(len(w)))
-    return Sensitivity("modes", of, a.to, ("1/s",) * len(of), {}, np.array([a.t]), w[None], dw[None])
-
-
-def _states(a: Question) -> Callable[[Mapping[str, float]], State]:
-    """The state that eigenvalues are of, for any parameters: where it is drawn, or the equilibrium near the first."""
-    begin: list[Any] = []
-
-    def state(parameters: Mapping[str, float]) -> State:
-        about = None
-        if a.about == "equilibrium":
-            about = equilibrium(a.model, resting(a.t, parameters, begin[0] if begin else None))
-            begin.append(about)
-        return instant(a.model, about, t=a.t, parameters=parameters, coordinates="absolute")[0]
-
-    return state
-
-
-def _at_modes(a: Question) -> Found:
-    state = _states(a)
-    A = without_inputs(state(a.parameters))[2].A
-    first, _ = changes(A, np.zeros((0, *A.shape)))
-
-    def found(parameters: Mapping[str, float]) -> np.ndarray:
-        w = np.linalg.eigvals(without_inputs(state(parameters))[2].A).astype(complex)
-        return follow(np.array([first, w]))[1]
-
-    return found
-
-
 # what finds the derivatives, and what makes a function of the parameters for differences
 ANALYSES: dict[str, tuple[Callable[[Question], Sensitivity], Callable[[Question], Found]]] = {
     "instant": (_instant, _at_instant),
     "motion": (_motion, _at_motion),
     "equilibrium": (_equilibrium, _at_rest),
-    "modes": (_modes, _at_modes),
+    "modes": (of_modes, at_modes),
 }

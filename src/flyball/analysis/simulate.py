@@ -11,7 +11,7 @@ from ..constraints.modes import BRANCH, FRICTION
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import ROWS, breaking, kept
-from ..errors import FlyballError, ModelError, SimulationError, StartWarning, warn
+from ..errors import FlyballError, Interrupted, ModelError, SimulationError, StartWarning, warn
 from ..laws.breaks import NO_BREAKS
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
@@ -40,6 +40,7 @@ from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
 from .motion.part import Part, whole
+from .motion.samples import refuse_too_often
 from .motion.start import Start, begin, start_time
 from .motion.stiff import EXPLICIT, Pace
 from .motion.touches import with_places
@@ -74,14 +75,23 @@ Span = tuple[float, float, np.ndarray]
 
 
 def told(model: Model, o: SimulateOptions, span: Span, why: str, auto: bool, part: Part | None = None) -> Result:
-    """The motion, or a part of it, which says by what it was computed, and why; ``auto``: methods may change."""
+    """The motion, or a part of it, which says by what it was computed, and why; ``auto``: methods may change.
+
+    Raises
+    ------
+    Interrupted
+        If the user ends it.
+    """
+    part = part or whole()
     try:
-        result = _computed(model, o, span, auto, part or whole())
+        result = _computed(model, o, span, auto, part)
     except SimulationError as error:
         if isinstance(error.result, Result):
             _tell(error.result, why)
         raise
     _tell(result, why)
+    if not result.health.success and not part.paused:
+        raise Interrupted(result.health.message, result)
     return result
 
 
@@ -149,6 +159,8 @@ def moved(
         partition.choose(begun.base.compiled.structure.model, begun)
     c, engine = begun.assembly.compiled, begun.engine or Engine(begun.assembly.compiled, False)
     begun.part.begin(c.structure)
+    if task == INTEGRATE:
+        refuse_too_often(c, (begun.base.t, float(t_end)), o.max_steps)
     known = breaks(c, begun.base.t, float(t_end)) if task == INTEGRATE else NO_BREAKS
     sampled = sampled_laws(c, known)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o, sampled)

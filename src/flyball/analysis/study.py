@@ -17,12 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import AnalysisError, FlyballError, Interrupted, ModelError, StartWarning, warn
+from ..errors import AnalysisError, FlyballError, Interrupted, ModelError, StartWarning
 from ..model.model import Model
 from ..model.words import listing, suggest
 from ..results.study import WAITING, Study
 from ..results.study_file import save_study
 from ..results.study_reading import fingerprint, stored
+from ..tables.numbers import unused
 from .motion.choice import IMPULSE, SimulateOptions
 from .motion.engines import AUTO, worth_making
 from .motion.implicit.suited import IMPLICIT
@@ -37,7 +38,6 @@ from .runs.instants import Answers, Instant, Rest, Swings
 from .runs.pool import computed, cores
 from .runs.reading import ends_only, readings
 from .runs.single import Kinematics, Motion, Own, Single
-from .runs.soft import unused
 from .simulate import simulate
 
 EVERY = 20.0  # seconds between two states of the file
@@ -155,7 +155,7 @@ def study(model: Model, o: StudyOptions) -> Study:
         save_study(found, o.file)
     if not found.complete:
         missing = int((found.status == WAITING).sum())
-        warn(f"the study was {found.message}; {missing} of {len(found)} runs are missing", Interrupted)
+        raise Interrupted(f"the study was {found.message}; {missing} of {len(found)} runs are missing", found)
     return found
 
 

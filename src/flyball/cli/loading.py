@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import ModelError
+from .flags import once
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
@@ -23,10 +24,13 @@ def set_parameters(mechanism: Mechanism, changes: Sequence[str]) -> None:
     """Give parameters other values, and check again all that depends on them."""
     from ..model.model import listing, suggest
 
+    given: dict[str, str] = {}
     for text in changes:
         name, equals, value = (x.strip() for x in text.partition("="))
         if not equals or not value:
             raise ModelError(f"--set {text!r}: write name=value, for instance --set mass=2 or --set speed='120 rpm'")
+        once(given, name, "--set", text)
+        given[name] = value
         known = list(mechanism.parameters)
         if name not in known:
             problem = f"{mechanism.name!r} has no parameter {name!r}{suggest(name, known)}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from ..errors import SimulationError
+from ..errors import Interrupted, SimulationError
 from ..methods.motion import Motions
 from .asking import Asked, command
 from .common import FAILED, INTERRUPTED, Out, fail, make_folder, print_json, table
@@ -44,6 +44,8 @@ def run(
             if stopped.result is None:
                 raise
             result, error = cast("Result", stopped.result), stopped
+        except Interrupted as ended:
+            result = ended.result
         pages = {"report.html": not no_animation if report is None else report, "animation.html": not no_animation}
         folder = out if out is not None else Path(f"{asked.source.stem}-result")
         wanted = [name for name, asked_for in pages.items() if asked_for]

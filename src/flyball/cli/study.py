@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import ModelError
+from ..errors import Interrupted, ModelError
 from ..methods.design import Design
 from .asking import Asked, command
 from .common import FAILED, INTERRUPTED, Plot, table
@@ -62,7 +62,10 @@ def study(
     histogram: Annotated[Path | None, typer.Option(help="Write how often values occur to a picture.")] = None,
 ) -> None:
     """Print how the quantities spread; with --file the study can be interrupted, and the same command goes on."""
-    found = asked.answer()
+    try:
+        found = asked.answer()
+    except Interrupted as ended:
+        found = ended.result
     if "file" in asked.given:
         asked.files.append(str(asked.given["file"]))
     asked.write(csv, found.to_csv)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from ..errors import ModelError
 from ..model.controller import Controller, ControlState
 from ..model.element import Law, Number, Unit, element, positive
+from ..model.units import same_kind
 
 BACK, CLAMPING = "back-calculation", "clamping"
 
@@ -69,6 +71,8 @@ class PID(Controller):
     initial: Annotated[Number, Unit(None)] = 0.0
     initial_measured: Annotated[Number, Unit(None)] = 0.0
 
+    compared: ClassVar[tuple[str, ...]] = ("setpoint", "measured")
+
     @property
     def windup(self) -> str:
         """What is done against windup: back-calculation where there are limits and an integral, if nothing is said."""
@@ -104,6 +108,8 @@ class PID(Controller):
             raise ModelError(
                 f"{self.title}: without kp and kd nothing tells how fast the integral follows; give tracking"
             )
+        if isinstance(self.lower, str) and isinstance(self.upper, str):
+            same_kind(self.lower, self.upper, f"{self.title}: lower")
         if isinstance(self.lower, float) and isinstance(self.upper, float) and not self.lower < self.upper:
             raise ModelError(f"{self.title}: lower is {self.lower:g}, upper {self.upper:g}; lower must be less")
 
@@ -111,6 +117,12 @@ class PID(Controller):
         """Limits that follow expressions may cross."""
         plain = isinstance(self.lower, float) and isinstance(self.upper, float)
         return None if plain or self.lower is None or self.upper is None else ("lower", "upper")
+
+    def unlimited(self) -> PID:
+        """Without limits nothing winds up."""
+        if not self._limited:
+            return self
+        return replace(self, lower=None, upper=None, anti_windup=None, tracking=None)
 
     def given(self) -> dict[str, Any]:
         """Inputs, gains, limits."""
@@ -120,6 +132,10 @@ class PID(Controller):
             "weight_p": self.setpoint_weight,
             "weight_d": self.derivative_weight,
         }
+
+    def called(self, given: str) -> str:
+        """Weights by the names of their fields."""
+        return {"weight_p": "setpoint_weight", "weight_d": "derivative_weight"}.get(given, given)
 
     def signals(self) -> dict[str, str]:
         """The output within limits, the output without them, the error and the parts."""

@@ -9,8 +9,9 @@ from pydantic import BeforeValidator
 
 from ..errors import ModelError
 from ..model.controller import OUTPUT, Controller, ControlState, numbered
-from ..model.element import Laws, Numbers, Unit, element, plain, si_numbers
-from .systems import matrices
+from ..model.element import Laws, Numbers, Unit, element, plain
+from ..model.expressions import number
+from .systems import matrices, output_names
 
 
 def _listed(value: Any) -> Any:
@@ -36,8 +37,8 @@ Matrix = Annotated[tuple[Numbers, ...], BeforeValidator(_matrix)]
 class StateSpace(Controller):
     """A linear system x' = A x + B u, y = C x + D u; sampled, with a period, x_(k+1) = A x_k + B u_k.
 
-    Outputs are ``K.output``, or ``K.output1``, ``K.output2``, ... where there are several; laws name a single one by
-    the system's name. States are ``K.x1``, ``K.x2``, ...; of one only ``K.x``.
+    Outputs are ``K.output``, or ``K.output1``, ``K.output2``, ... where there are several; laws name a single one,
+    whatever it is called, by the system's name too. States are ``K.x1``, ``K.x2``, ...; of one only ``K.x``.
 
     Parameters
     ----------
@@ -77,7 +78,8 @@ class StateSpace(Controller):
             Or anything that has A, B, C, D, or num and den, and dt.
         inputs : list of expressions
         fields
-            As of `StateSpace`: outputs, initial; period, of a discrete system that does not say its own.
+            As of `StateSpace`: outputs, in place of the system's own names, in which what is no letter, digit or _
+            becomes _; initial; period, of a discrete system that does not say its own.
 
         Raises
         ------
@@ -95,12 +97,17 @@ class StateSpace(Controller):
                 f"{cls.__name__} {name!r}: the system's own period is {given['period']:g} s, and period={asked!r} is "
                 f"given; leave period out, or sample the system anew"
             )
-        return cls(name, inputs=inputs, **(fields | given))
+        return cls(name, inputs=inputs, **({"outputs": output_names(system)} | fields | given))
 
     @property
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of states, inputs, outputs."""
         return len(self.A), len(self.inputs), len(self.D) or len(self.C)
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """As given, else output, or output1, output2, ..."""
+        return self.outputs or numbered(OUTPUT, self.sizes[2])
 
     def check(self, n: SimpleNamespace) -> None:
         """Refuse matrices whose sizes do not fit."""
@@ -125,9 +132,9 @@ class StateSpace(Controller):
                     f"must be {rows} x {columns}"
                 )
             for i, row in enumerate(M):
-                si_numbers(
-                    [x for x in row if not isinstance(x, str)], {}, None, f"row {i + 1} of {name} of {self.title}"
-                )
+                for j, x in enumerate(row):
+                    if not isinstance(x, str):
+                        number(x, {}, None, f"{self.called(f'{name}_{i}_{j}')} of {self.title}")
         if self.outputs and len(self.outputs) != outputs:
             raise ModelError(f"{self.title}: it has {outputs} outputs, and {len(self.outputs)} names for them")
         if self.initial and len(self.initial) != states:
@@ -140,6 +147,13 @@ class StateSpace(Controller):
             for i, row in enumerate(getattr(self, name)):
                 out |= {f"{name}_{i}_{j}": x for j, x in enumerate(row) if isinstance(x, str)}
         return out
+
+    def called(self, given: str) -> str:
+        """Which entry of a matrix, which input."""
+        name, *at = given.split("_")
+        if name in "ABCD" and at:
+            return f"row {int(at[0]) + 1}, column {int(at[1]) + 1} of {name}"
+        return f"input {int(at[0]) + 1}" if name == "u" else given
 
     def _row(self, name: str, i: int, of: tuple[str, ...]) -> list[str]:
         """Terms of one row of a matrix times a vector."""
@@ -160,9 +174,8 @@ class StateSpace(Controller):
         """The outputs, and the inputs."""
         _, inputs, outputs = self.sizes
         u = tuple(f"u_{j}" for j in range(inputs))
-        names = self.outputs or numbered(OUTPUT, outputs)
         y = (" + ".join([*self._row("C", i, self._x), *self._row("D", i, u)]) or "0" for i in range(outputs))
-        return dict(zip(names, y, strict=True)) | dict(zip(numbered("input", inputs), u, strict=True))
+        return dict(zip(self.output_names, y, strict=True)) | dict(zip(numbered("input", inputs), u, strict=True))
 
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
         """The states x."""

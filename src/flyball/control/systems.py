@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ import numpy.typing as npt
 from ..errors import ModelError
 
 Rows = list[list[float]]
+UNNAMED = re.compile(r"y\[\d+\]")
+"""Outputs as python-control calls them by itself."""
 
 
 def realised(num: npt.ArrayLike, den: npt.ArrayLike, whose: str) -> tuple[Rows, Rows, Rows, Rows]:
@@ -64,6 +67,14 @@ def matrices(system: Any, name: str) -> dict[str, Any]:
     if dt is not None and dt is not True and dt > 0.0:
         out["period"] = float(dt)
     return out
+
+
+def output_names(system: Any) -> tuple[str, ...]:
+    """What a system of the python-control library calls its outputs, as plain words; none if nobody named them."""
+    labels = [str(x) for x in getattr(system, "output_labels", None) or ()]
+    if all(UNNAMED.fullmatch(x) for x in labels):
+        return ()
+    return tuple(re.sub(r"^(?=\d)|\W", "_", x) for x in labels)
 
 
 def _single(coefficients: Any, whose: str) -> np.ndarray:

@@ -55,6 +55,11 @@ class Transfer(Controller):
         lists = {"num": (0.0,) * (len(self.den) - len(self.num)) + self.num, "den": self.den}
         return {"of": self.of} | {f"{k}_{i}": x for k, xs in lists.items() for i, x in enumerate(xs)}
 
+    def called(self, given: str) -> str:
+        """Which coefficient."""
+        name, _, k = given.partition("_")
+        return f"coefficient {int(k) - (len(self.den) - len(self.num)) * (name == 'num') + 1} of {name}" if k else given
+
     def signals(self) -> dict[str, str]:
         """Output and input."""
         terms = [f"num_{k}*{x}" for k, x in enumerate(("highest", *self._x)) if self.given()[f"num_{k}"] != 0.0]

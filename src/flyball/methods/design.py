@@ -162,6 +162,8 @@ class Design(Model):
             If a quantity, parameter or option does not exist, or a bound is not met at the start.
         AnalysisError
             If the mechanism cannot be analysed at the start.
+        Interrupted
+            If the user interrupts it; its ``result`` is the best by then.
         """
         from ..analysis.optimize import OptimizeOptions, optimize
 
@@ -290,11 +292,8 @@ class Design(Model):
             something that the mechanism has, or the file is of another study.
         AnalysisError
             If the executor fails.
-
-        Warns
-        -----
         Interrupted
-            If the user interrupts it: what was computed is returned, and ``complete`` is false.
+            If the user interrupts it; its ``result`` is the study with what was computed.
         """
         from ..analysis.study import StudyOptions, study
 

@@ -125,11 +125,8 @@ class Motions(Model):
             If the start cannot be made consistent.
         SimulationError
             If the integration cannot go on; its ``result`` holds the motion up to then.
-
-        Warns
-        -----
         Interrupted
-            If the user interrupts it: the part up to then is returned, and ``health.success`` is false.
+            If the user interrupts it; its ``result`` holds the motion up to then.
         """
         from ..analysis.checkpointed import CheckpointOptions, checkpointed
 

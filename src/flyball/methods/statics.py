@@ -100,7 +100,7 @@ class Statics(Model):
         start : Equilibrium, optional
             Guess for the first value, in place of the drawn positions.
         stable : bool
-            Leave a branch where it becomes unstable; else it is followed on.
+            Leave a branch where it becomes unstable; else it is followed on. Not with controllers.
         progress : bool or callable
             A bar on a terminal and in a notebook from two seconds on; a callable gets the fraction done.
 

@@ -17,7 +17,7 @@ from ..errors import ModelError
 from .element import Element, Number, Unit, positive
 
 OUTPUT = "output"
-"""The signal that the bare name of a controller stands for, if it has one of that name."""
+"""What a single output is called if nobody names it."""
 
 
 class ControlState(NamedTuple):
@@ -50,11 +50,23 @@ class Controller(Element, ABC):
     offset: Annotated[Number, Unit("s")] = 0.0
 
     category: ClassVar[str] = "controllers"
+    compared: ClassVar[tuple[str, ...]] = ()
+    """Signals that pictures show beside one another: what is to be followed, and what follows."""
 
     @property
     def sampled(self) -> bool:
         """Whether it acts at instants: offset, offset + period, offset + 2 period, ..."""
         return self.period is not None
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Those of its signals that it is there for."""
+        return (OUTPUT,)
+
+    @property
+    def bare(self) -> str:
+        """The signal that the bare name stands for: its output; none where there are several."""
+        return self.output_names[0] if len(self.output_names) == 1 else ""
 
     @property
     def holds(self) -> bool:
@@ -75,9 +87,17 @@ class Controller(Element, ABC):
         """Two of what it is given of which the first must not exceed the second; it has no output where it does."""
         return None
 
+    def unlimited(self) -> Controller:
+        """The same without limits of its output; itself where it has none."""
+        return self
+
     @abstractmethod
     def given(self) -> dict[str, Any]:
         """Laws of the user's by the names that formulas know them by: inputs, gains, limits."""
+
+    def called(self, given: str) -> str:
+        """What messages call something that it is given."""
+        return given
 
     @abstractmethod
     def signals(self) -> dict[str, str]:

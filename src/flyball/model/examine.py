@@ -6,10 +6,12 @@ What only a result can compute is known by name already when a part is described
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import permutations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import ModelError, UnitError
 from .body import GROUND, Body, Frame
+from .controller import Controller
 from .coupling import Coupling
 from .element import Element, LawOf, Unit, fields_with
 from .expressions import law_expression, number
@@ -17,6 +19,7 @@ from .force import CoordinateForce, TwoPointForce
 from .joint import Joint
 from .quantities import ENERGY, components, quantities
 from .sensor import Sensor
+from .units import split_quantity
 from .words import listing, suggest
 
 if TYPE_CHECKING:
@@ -91,7 +94,9 @@ def but_is(model: Model, name: str, wanted: str) -> str:
 
 
 def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
-    """Refuse units that do not fit the coordinate that an element acts along or couples."""
+    """Refuse units that do not fit the coordinate that an element acts along or couples, or what it compares."""
+    if isinstance(e, Controller):
+        _check_compared(model, e)
     if isinstance(e, CoordinateForce) and e.along():
         turning = model.unit(e.along()[0], e) == "rad"
         for name, pair in e.dimensions.items():
@@ -111,6 +116,16 @@ def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
         value = getattr(e, name)
         for x in value if isinstance(value, tuple) else (value,):
             _one_of(x, kinds, env, f"{name} of {e.title}")
+
+
+def _check_compared(model: Model, e: Controller) -> None:
+    """Refuse a set point of another kind than the curve that is to follow it; what is no plain curve says no unit."""
+    given = {k: x for k in e.compared if isinstance(x := getattr(e, k), str)}
+    for (name, told), (_, curve) in permutations(given.items(), 2):
+        owner, _, what = curve.partition(".")
+        table = quantities(model, owner) if model.find(owner) is not None else {}
+        if what in table and table[what].unit and split_quantity(told) is not None:
+            number(told, {}, table[what].unit, f"{name} of {e.title}")
 
 
 def _one_of(value: Any, kinds: tuple[str, ...], env: Mapping[str, float], where: str) -> None:

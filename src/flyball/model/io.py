@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
-from ..errors import ModelError
+from ..errors import ModelError, cannot_write
 from .body import Body, Driver, Frame, Initial
 from .bulk import Bodies
 from .contact import Contact
@@ -81,7 +81,7 @@ def save(model: Model, path: str | os.PathLike) -> None:
     try:
         Path(path).write_bytes(data)
     except OSError as error:
-        raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror}") from None
+        raise cannot_write(path, error) from None
 
 
 def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import ExpressionError, ModelError
-from .controller import OUTPUT, Controller, refuse_equal
+from .controller import Controller, refuse_equal
 from .element import LawOf, resolve
 from .expressions import Expression
 from .function import called
@@ -70,7 +70,7 @@ def signal(model: Model, e: Controller, name: str) -> Expression:
 
 def given(model: Model, e: Controller, name: str) -> Expression:
     """What a controller is given, as a law."""
-    return Expression(name, _wiring(model).template(e, name), None, f"{name} of {e.title}")
+    return Expression(name, _wiring(model).template(e, name), None, f"{e.called(name)} of {e.title}")
 
 
 def wired(model: Model) -> list[Wired]:
@@ -82,6 +82,10 @@ def wired(model: Model) -> list[Wired]:
     ModelError
         If signals of sampled controllers depend on each other in a ring.
     """
+    return model.kept.get("wired", None, 1, lambda: _wired(model)) if model.frozen else _wired(model)
+
+
+def _wired(model: Model) -> list[Wired]:
     wiring = _wiring(model)
     every = controllers(model).values()
 
@@ -125,7 +129,7 @@ def check(model: Model, e: Controller) -> None:
     refuse_equal(e, own)
     for name, law in e.given().items():
         if law is not None:
-            model.law(law, GIVEN, f"{name} of {e.title}")
+            model.law(law, GIVEN, f"{e.called(name)} of {e.title}")
     wiring = _wiring(model)
     for name in e.signals():
         wiring.signal(e, name)
@@ -154,7 +158,7 @@ class _Wiring:
         self.states = {name: e.states(resolve(e, model.environment())) for name, e in self.all.items()}
         self.own = {name: (*e.signals(), *(x.name for x in self.states[name])) for name, e in self.all.items()}
         self.names = {f"{name}.{k}" for name, own in self.own.items() for k in own}
-        self.names |= {name for name, own in self.own.items() if OUTPUT in own}
+        self.names |= {name for name, e in self.all.items() if e.bare}
 
     def signal(self, e: Controller, name: str) -> Node:
         """A signal as an expression; solved for where it depends on itself, or refused."""
@@ -184,7 +188,7 @@ class _Wiring:
         def found(node: Node) -> Node | None:
             name = node.value
             if name in given:
-                return self.law(given[name], f"{name} of {e.title}")
+                return self.law(given[name], f"{e.called(name)} of {e.title}")
             return self.signal(e, name) if name in own else None
 
         return self.limited(_at(_replaced(tree, found), 0), e.title)
@@ -204,7 +208,7 @@ class _Wiring:
             e = self.all.get(owner)
             if e is None:
                 return None
-            name = what if dot else OUTPUT
+            name = what if dot else e.bare
             return self.signal(e, name) if name in self.own[owner] else None
 
         return self.limited(_replaced(tree, found), "a law")

@@ -50,7 +50,7 @@ class EquilibriumSeries:
 
     @property
     def least(self) -> np.ndarray:
-        """Least stiffness at each value, as part of what acts."""
+        """Least stiffness at each value, as part of what acts; with controllers while their states are held."""
         return np.array([e.least for e in self.equilibria])
 
     def __len__(self) -> int:
@@ -78,7 +78,9 @@ class EquilibriumSeries:
         names = self.telling()
         head = " ".join(f"{n:>16}" for n in names)
         sizes = {n: max((abs(e[n]) for e in self.equilibria), default=0.0) for n in names}
-        out = [(self.parameter, f"{'stability':<9} {'least stiffness':>16} {head}")]
+        held = any(e.judged_by for e in self.equilibria)
+        what = "held stiffness" if held else "least stiffness"
+        out = [(self.parameter, f"{'stability':<9} {what:>16} {head}")]
         for value, e in zip(self.values, self.equilibria, strict=True):
             parts = " ".join(f"{number(e[n], sizes[n], 8):>16}" for n in names)
             out.append((f"{value:.6g}", f"{e.stability:<9} {e.least:16.4g} {parts}"))

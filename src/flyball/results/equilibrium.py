@@ -15,6 +15,7 @@ from .touch import Touch
 if TYPE_CHECKING:
     from .result import Result
 
+EIGENVALUES, MULTIPLIERS = "eigenvalues of the closed loop", "multipliers of the closed loop, sample by sample"
 STABLE, MARGINAL, UNSTABLE, UNJUDGED = "stable", "marginal", "unstable", "not judged"
 SHOWN = 12  # contacts in a text
 
@@ -29,13 +30,17 @@ class Equilibrium:
     ----------
     stability : str
         ``"stable"``, ``"marginal"`` (a direction without stiffness) or ``"unstable"``, by the constrained stiffness,
-        in which reactions turn with the bodies; where forces have no potential, by the eigenvalues too. With contact it
-        is judged while closed contacts stay closed and stick: ``"marginal"`` where one is about to part or to slide,
-        and ``"not judged"`` where ``notes`` say why.
+        in which reactions turn with the bodies; where forces have no potential, or drive motions on, by the
+        eigenvalues too; with controllers by those of the closed loop alone. With contact it is judged while closed
+        contacts stay closed and stick: ``"marginal"`` where one is about to part or to slide, and ``"not judged"``
+        where ``notes`` say why.
+    judged_by : str
+        What says so, with controllers.
     freedoms : tuple of str
         Coordinates that the stiffness belongs to.
     stiffness : ndarray (f, f)
-        Of those.
+        Of those; with controllers while their states, and what sampled ones hold, stay as they are. It then says
+        nothing of stability.
     weakest : dict
         Direction of least stiffness: coordinate -> part.
     least : float
@@ -73,6 +78,7 @@ class Equilibrium:
     preload: dict[str, float] = field(default_factory=dict)
     speeds: dict[str, float] = field(default_factory=dict)
     kinks: tuple[str, ...] = ()
+    judged_by: str = ""
     touching: tuple[Touch, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -86,11 +92,13 @@ class Equilibrium:
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
         what = "steady motion" if self.speeds else "equilibrium"
-        out = [(what, f"{self.stability}, found by {self.method}"), ("time", f"{self.t:g} s")]
+        by = f" by the {self.judged_by}" if self.judged_by else ""
+        out = [(what, f"{self.stability}{by}, found by {self.method}"), ("time", f"{self.t:g} s")]
         out += [("position", text) for text in self._positions()]
         if self.weakest:
             parts = ", ".join(f"{k} {v:+.2g}" for k, v in self.weakest.items())
-            out.append(("least stiffness", f"{self.least:.3g} of what acts, along {parts}"))
+            what = "least stiffness" + (" with controllers' states held" if self.judged_by else "")
+            out.append((what, f"{self.least:.3g} of what acts, along {parts}"))
         out += [("kink", text) for text in self.kinks]
         out += [("contact", str(k)) for k in self.touching[:SHOWN]]
         if len(self.touching) > SHOWN:
@@ -116,6 +124,7 @@ class Equilibrium:
         kept = ("t", "stability", "least", "unbalanced", "method", "weakest", "preload", "speeds", "parameters")
         out = {k: getattr(self, k) for k in kept}
         out["least"] = self.least if math.isfinite(self.least) else None  # nothing is free: JSON knows no infinity
+        out |= {"judged_by": self.judged_by} if self.judged_by else {}
         out |= {"freedoms": list(self.freedoms), "stiffness": self.stiffness.tolist(), "kinks": list(self.kinks)}
         out |= {"touching": [asdict(k) for k in self.touching], "notes": list(self.notes)}
         curves = self.result.channels().items()

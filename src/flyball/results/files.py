@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import cannot_write
 from ..model.quantities import ENERGY
 from .labels import TIME, coordinates, labelled
+from .numbers import with_unit
 from .stored_contacts import packed
 from .stored_events import packed as events_packed
 from .stored_stretches import packed as stretches_packed
@@ -83,7 +84,7 @@ def to_dataframe(result: Result) -> pandas.DataFrame:
 def to_csv(result: Result, path: str | os.PathLike) -> None:
     """All curves as a table with a header such as ``slider.x [m]``; numbers are written exactly."""
     channels = result.channels()
-    header = [f"{TIME} [s]", *(f"{k} [{unit}]" for k, (unit, _) in channels.items())]
+    header = [f"{TIME} [s]", *(with_unit(k, unit) for k, (unit, _) in channels.items())]
     columns = [result.t.tolist(), *(np.asarray(v).tolist() for _, v in channels.values())]
 
     def write(part: Path) -> None:
@@ -113,7 +114,7 @@ def replaced(path: str | os.PathLike, write: Callable[[Path], None]) -> None:
         write(part)
         part.replace(path)
     except OSError as error:
-        raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror or error}") from None
+        raise cannot_write(path, error) from None
     finally:
         part.unlink(missing_ok=True)
 
@@ -189,8 +190,9 @@ def checksum(stored: Mapping[str, Any]) -> str:
     digest = hashlib.sha256(str(FORMAT).encode())
     for name in sorted(stored):
         value = stored[name]
-        shape, data = "text", str(value).encode()
-        if not isinstance(value, str):
+        if isinstance(value, str):
+            shape, data = "text", value.encode()
+        else:
             numbers = np.ascontiguousarray(value, "<f8")
             shape, data = str(numbers.shape), numbers.tobytes()
         digest.update(f"{name} {shape} {len(data)}\n".encode() + data)

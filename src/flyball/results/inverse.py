@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, cannot_write
 from ..math.vec import cross, sub
 from ..model.coupling import Coupling
 from ..model.joint import Joint
 from ..model.model import listing, suggest
-from .numbers import number, span
+from .numbers import number, span, with_unit
 
 if TYPE_CHECKING:
     from .result import Result
@@ -274,10 +274,10 @@ class InverseDynamics:
         try:
             with open(path, "w", encoding="utf-8", newline="") as file:
                 out = csv.writer(file)
-                out.writerow(["time [s]", *(f"{k} [{unit}]" for k, (unit, _) in curves.items())])
+                out.writerow(["time [s]", *(with_unit(k, unit) for k, (unit, _) in curves.items())])
                 out.writerows([["" if x != x else repr(x) for x in row] for row in rows.tolist()])
         except OSError as error:
-            raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror}") from None
+            raise cannot_write(path, error) from None
 
     def plot(self, path: str | os.PathLike | None = None) -> Any:
         """Efforts and reactions over time; returns the Matplotlib figure, or writes it to ``path``."""

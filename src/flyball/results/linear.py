@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import ModelError, optional
 from ..model.model import listing, suggest
 from .descriptor import Descriptor
+from .numbers import with_unit
 
 if TYPE_CHECKING:
     from .result import Result
@@ -265,7 +266,7 @@ class LinearModel:
             units = getattr(self, f"{what}_units")
             for k, (name, unit) in enumerate(zip(getattr(self, f"{what}s"), units, strict=True)):
                 now = f", {self.output_values[k]:.6g} at the state itself" if what == "output" else ""
-                out.append((what, f"{name} [{unit}]{now}"))
+                out.append((what, with_unit(name, unit) + now))
         if self.seen_from:
             out.append(("seen from", self.seen_from))
         out += [("note", text) for text in self.notes]

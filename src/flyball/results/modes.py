@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .growth import growing
+
 if TYPE_CHECKING:
     from .result import Result
 
 ROUNDING = 1e-9  # damping ratios below this are 0
-GROWS = 1e-6  # damping ratios above minus this are not growth
 
 
 @dataclass
@@ -87,8 +88,7 @@ class Modes:
     def kinds(self) -> tuple[str, ...]:
         """``"oscillation"``, ``"decay"``, ``"unstable"`` or ``"rigid"`` for every mode."""
         out = []
-        for w, still in zip(self.eigenvalues, self._still, strict=True):
-            grows = w.real > GROWS * abs(w)
+        for w, still, grows in zip(self.eigenvalues, self._still, growing(self.eigenvalues), strict=True):
             out.append("rigid" if still else "unstable" if grows else "decay" if w.imag == 0.0 else "oscillation")
         return tuple(out)
 

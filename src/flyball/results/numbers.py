@@ -36,6 +36,11 @@ def span(values: np.ndarray, digits: int = 4, size: float | None = None) -> str:
     return low if low == high else f"{low} to {high}"
 
 
+def with_unit(name: str, unit: str) -> str:
+    """``A.angle [rad]``; the name alone of what has no unit, the unit alone where the name stands elsewhere."""
+    return f"{name} [{unit}]".strip() if unit else name
+
+
 def plain(values: np.ndarray) -> list:
     """Numbers as plain data: a complex one as its real and imaginary part."""
     return values.tolist() if np.isrealobj(values) else [[float(z.real), float(z.imag)] for z in values]

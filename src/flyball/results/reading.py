@@ -77,6 +77,8 @@ def _stored(path: Path) -> tuple[dict[str, Any], int]:
         with h5py.File(path, "r") as whole:
             dict(whole.attrs)  # h5netcdf leaves a file half open that fails here
             file = h5netcdf.File(whole, "r")
+            if GROUP in file.groups and "study" in file.groups[GROUP].attrs:
+                raise ModelError(f"{path} is a study, no result: read it with flyball.load_study")
             if GROUP not in file.groups:
                 raise ModelError(f"{path} is no result of flyball (it holds no group {GROUP!r}); {REMEDY}")
             group = file.groups[GROUP]

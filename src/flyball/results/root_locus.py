@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-UNDAMPED = 1e-8  # part of an eigenvalue below which growth is none
+from .growth import beyond_axis
 
 
 class Crossing(NamedTuple):
@@ -62,7 +62,7 @@ class RootLocus:
     @property
     def unstable(self) -> np.ndarray:
         """How many eigenvalues have a positive real part, (m,)."""
-        return (self.eigenvalues.real > UNDAMPED * np.abs(self.eigenvalues)).sum(axis=1)
+        return (beyond_axis(self.eigenvalues) > 0).sum(axis=1)
 
     def lines(self) -> list[tuple[str, str]]:
         """A table for people."""

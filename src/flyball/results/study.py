@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import AnalysisError, ModelError
+from ..errors import AnalysisError, ModelError, cannot_write
 from ..model.words import listing, suggest
 from .indices import Indices
 from .numbers import plain, span
@@ -282,7 +282,10 @@ class Study:
 
     def to_csv(self, path: str | os.PathLike) -> None:
         """The table of `to_dataframe`; numbers are written exactly."""
-        self.to_dataframe().to_csv(path)
+        try:
+            self.to_dataframe().to_csv(path)
+        except OSError as error:
+            raise cannot_write(path, error) from None
 
     def save(self, path: str | os.PathLike) -> None:
         """Write it as one NetCDF file; ``flyball.load_study`` reads it back."""
@@ -291,8 +294,9 @@ class Study:
     def plot(self, *of: str, path: str | os.PathLike | None = None) -> Any:
         """Quantities over one parameter, as a surface over two, or scattered over each of more.
 
-        Of curves what half and nine tenths of the runs stay within. Returns the Matplotlib figure, or writes it to
-        ``path``.
+        Curves of few runs are told by a legend, of up to 40 by the colour of the parameter that tells most of them; of
+        more, what half and nine tenths of the runs stay within. Axes are logarithmic where values are spread so.
+        Returns the Matplotlib figure, or writes it to ``path``.
         """
         from ..view.study import study
 

@@ -82,6 +82,8 @@ def _read(path: Path) -> Study:
         group = file.groups.get(GROUP)
         kind = group.attrs.get("study") if group is not None else None
         if kind is None:
+            if group is not None and "format" in group.attrs:
+                raise ModelError(f"{path} is a result, no study: read it with flyball.load_result")
             raise ModelError(f"{path} is no study; {REMEDY}")
         if int(kind) > FORMAT:
             raise ModelError(f"{path} was written by a later version of flyball than this")

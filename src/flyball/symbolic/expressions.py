@@ -191,7 +191,7 @@ class Expressions:
     def _refused(self) -> str:
         return f"{self!r}: {TOO_LONG.format(self.operations)}"
 
-    @property
+    @cached_property
     def _parted(self) -> str:
         """Entry by entry, what recurs by a name."""
         labels = [", ".join(x) for x in itertools.product(*self._names())]

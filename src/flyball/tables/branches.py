@@ -51,6 +51,10 @@ def laws(model: Model) -> Iterator[tuple[Element, Expression, tuple[str, ...]]]:
 
 def bent_laws(model: Model) -> list[Element]:
     """Elements whose laws have corners where the state decides."""
+    return model.kept.get("bent laws", None, 1, lambda: _bent_laws(model)) if model.frozen else _bent_laws(model)
+
+
+def _bent_laws(model: Model) -> list[Element]:
     sensors = {x.name for x in model.sensors}
     out = []
     for e, law, inputs in laws(model):

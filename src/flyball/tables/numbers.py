@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -176,3 +176,13 @@ def _state_of(path: str) -> tuple[int, int] | None:
     except OSError:
         return None
     return stat.st_mtime_ns, stat.st_size
+
+
+def unused(model: Model, names: Sequence[str]) -> list[str]:
+    """Those of some parameters that nothing of the model has, by itself or through other parameters."""
+    todo = {*words(model.gravity), *(w for e in model.elements() for w in words(e))} & model.parameters.keys()
+    used: set[str] = set()
+    while todo:
+        used |= todo
+        todo = ({w for name in todo for w in words(model.parameters[name])} & model.parameters.keys()) - used
+    return [name for name in names if name not in used]

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.body import GROUND, Body, Frame
+from ..model.controller import Controller
 from ..model.geometry import matrix_to_quaternion, vector
 from ..model.model import suggest
 from .along import spring_along
@@ -281,14 +282,16 @@ def _channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]:
 
 def _parts(result: Result) -> list:
     m = result.model
-    return [*m.sensors, *m.drivers, *m.forces, *m.joints, *m.bodies]
+    return [*m.sensors, *m.controllers, *m.drivers, *m.forces, *m.joints, *m.bodies]
 
 
 def _main(name: str, result: Result) -> bool:
-    """Whether a curve says where something is, or what a driver or force does: no derivative, no reaction."""
+    """Whether a curve says where something is, or what a driver, force or controller does: no rate, no reaction."""
     owner, _, what = name.partition(".")
     if owner == "energy" or result.model[owner].category in ("drivers", "forces", "sensors"):
         return True
+    if isinstance(e := result.model[owner], Controller):
+        return what in (*e.compared, *e.output_names)
     return what in ("x", "y", "z", "angle") or what in (getattr(result.model[owner], "coordinates", None) or ())
 
 
@@ -302,16 +305,20 @@ def _telling(names: list[str], result: Result) -> list[str]:
 def shown(result: Result, names: Collection[str]) -> tuple[str, ...]:
     """The curves on show when a page opens.
 
-    What is measured; what a driver needs; a joint's coordinate of each kind (else a position); energies.
+    What is measured; what a controller is to follow, what follows, and what it says; what a driver needs; a joint's
+    coordinate of each kind (else a position); energies.
     """
     m = result.model
     measured = [f"{s.name}.value" for s in m.sensors][:2]
+    compared = {str(getattr(c, k)) for c in m.controllers[:1] for k in c.compared}  # shown beside one another
     kinds: dict[str, str] = {}
     for j in m.joints:
         for k, c in j.coordinates.items():
-            if f"{j.name}.{k}" in names:
+            if f"{j.name}.{k}" in set(names) - compared:
                 kinds.setdefault(c.unit, f"{j.name}.{k}")
+    told = [f"{c.name}.{k}" for c in m.controllers[:1] for k in c.compared]
+    told += [f"{c.name}.{c.output_names[0]}" for c in m.controllers][:2]
     efforts = [f"{d.name}.effort" for d in m.drivers if f"{d.name}.effort" in names][:1]
-    first = [*measured, *efforts, *kinds.values()] or [f"{b.name}.{k}" for b in m.bodies for k in ("x", "z")][:1]
+    first = [*measured, *told, *efforts, *kinds.values()] or [f"{b.name}.{k}" for b in m.bodies for k in ("x", "z")][:1]
     energies = ("energy.kinetic", "energy.potential", "energy.total")
     return (*(k for k in first if k in names), *(k for k in energies if k in names))

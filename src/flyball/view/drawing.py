@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, cannot_write
+from ..results.numbers import with_unit
 from .figures import hidden
 from .marks import draw_marks
 from .recording import Mark, Panel
-from .writing import cannot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,6 +57,11 @@ SHIPPED = "DejaVu Sans"  # with Matplotlib; not every font has raised figures
 SUFFIXES = (".png", ".svg", ".pdf")
 PRETTY = {"N*m": "N m", "m/s^2": "m/s²", "rad/s^2": "rad/s²", "1": "-"}
 BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.04), "borderaxespad": 0.4}
+
+
+def titled(name: str, unit: str) -> str:
+    """What stands at an axis: the name of a quantity and its unit."""
+    return with_unit(name, PRETTY.get(unit, unit))
 
 
 @contextmanager
@@ -112,7 +117,7 @@ def handed_out(drawing: Drawing, path: str | os.PathLike | None) -> Drawing | No
             drawing.align_ylabels()
             drawing.savefig(path, metadata=dated[path.suffix.lower()])
     except OSError as error:
-        raise cannot(path, error) from None
+        raise cannot_write(path, error) from None
     return None
 
 
@@ -180,7 +185,7 @@ def _over_time(ax: Axes, t: np.ndarray, panel: Panel) -> None:
         single = "o" if len(t) == 1 else None
         ax.plot(t, c.values, label=c.name, linestyle=style, marker=single)
     _zoomed_out(ax, values)
-    ax.set_ylabel(f"{panel.label} [{PRETTY.get(panel.unit, panel.unit)}]".strip())
+    ax.set_ylabel(titled(panel.label, panel.unit))
     if panel.note:
         ax.set_title(panel.note)
     if len(t) > 1:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..results.equilibrium import UNSTABLE
-from .drawing import BESIDE, PALETTE, PRETTY, handed_out, headed, new_figure, styled
+from .drawing import BESIDE, PALETTE, handed_out, headed, new_figure, styled, titled
 from .figures import LABELS
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def series(found: EquilibriumSeries, *names: str, path: str | os.PathLike | None
         for ax, (unit, group) in zip(axes, units.items(), strict=False):
             for k, name in enumerate(group):
                 _curve(ax, found, name, PALETTE[k % len(PALETTE)])
-            ax.set_ylabel(f"{LABELS.get(unit, '')} [{PRETTY.get(unit, unit)}]".strip())
+            ax.set_ylabel(titled(LABELS.get(unit, ""), unit))
         _explained(axes[0], found)
         for ax in axes:
             if ax.get_legend_handles_labels()[1]:

@@ -33,14 +33,14 @@ LABELS = {
 
 
 def figures(result: Result) -> list[Figure]:
-    """Energies with their balance, joint coordinates, positions, reactions, what drivers and forces do, sensors.
+    """Energies with their balance, coordinates, positions, reactions, what drivers and forces do, sensors, controllers.
 
     Those that have nothing to show are left out; of many parts evenly chosen ones are shown.
     """
     if not len(result.t):
         return []
     makers: Sequence[Callable[[Result], Figure | None]]
-    makers = (energies, coordinates, positions, contacts, reactions, actuation, sensors)
+    makers = (energies, coordinates, positions, contacts, reactions, actuation, sensors, controllers)
     return [figure for make in makers if (figure := make(result)) is not None]
 
 
@@ -126,6 +126,22 @@ def sensors(result: Result) -> Figure | None:
             curves.append(Channel(name, unit, np.asarray(values)))
     parts = [p for panel in panels(curves) for p in spread(panel)]
     return Figure("sensors", "Sensors", tuple(parts)) if parts else None
+
+
+def controllers(result: Result) -> Figure | None:
+    """What controllers say; before it what they are to follow, and what follows it."""
+    every = result.model.controllers
+    chosen, parts = some(every), []
+
+    def curves(e: Any, names: Sequence[str]) -> list[Channel]:
+        return [Channel(f"{e.name}.{k}", *result[e.name].quantity(k)) for k in names]
+
+    for e in chosen:
+        parts += [p for panel in panels(curves(e, e.compared)) for p in spread(panel)]
+    said = [c for e in chosen for c in curves(e, e.output_names)]
+    parts += [p for panel in panels(said) for p in spread(panel)]
+    note = few(len(chosen), len(every), "controllers")
+    return Figure("controllers", "Controllers", tuple(parts), note) if parts else None
 
 
 def panels(curves: Sequence[Channel], most: int = MOST) -> list[Panel]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .drawing import BESIDE, DASHES, PALETTE, PRETTY, handed_out, headed, new_figure, styled
+from .drawing import BESIDE, DASHES, PALETTE, PRETTY, handed_out, headed, new_figure, styled, titled
 from .figures import hidden
 from .frequencies import frequencies, phase
 
@@ -69,12 +69,12 @@ def bode(
         upper, lower = drawing.subplots(2, 1, sharex=True)
         for ax, curves in ((upper, size), (lower, angle)):
             for n, (values, under) in enumerate(zip(curves, hidden(curves), strict=True)):
-                label = f"{pair[n][1]} [{units[n]}]"
+                label = titled(pair[n][1], units[n])
                 ax.plot(w, values, label=label, linestyle=DASHES[max(under, n // len(PALETTE)) % len(DASHES)])
         _over_frequency(upper, lower, w, angle)
         if several:
             upper.legend(**BESIDE)
-        upper.set_ylabel("magnitude [dB]" if several else f"magnitude [dB of {units[0]}]")
+        upper.set_ylabel("magnitude [dB]" if several or not units[0] else f"magnitude [dB of {units[0]}]")
         drawing.align_ylabels((upper, lower))
         what = "all outputs" if several else pair[0][1]
         headed(drawing, f"{model.name}: {what} by {model.inputs[i]}")
@@ -111,7 +111,7 @@ def _over_frequency(upper: Axes, lower: Axes, w: np.ndarray, angles: Sequence[np
 def _ratio(output: str, input: str) -> str:
     """Unit of an output over that of an input."""
     above, below = PRETTY.get(output, output), PRETTY.get(input, input)
-    if below in ("-", ""):
+    if not above or below in ("-", ""):
         return above
     return f"{above.replace('-', '1')}/{f'({below})' if set(below) & set('/ ') else below}"
 

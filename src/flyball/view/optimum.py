@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .drawing import BESIDE, PALETTE, PRETTY, handed_out, headed, new_figure, styled
+from .drawing import BESIDE, PALETTE, handed_out, headed, new_figure, styled, titled
 
 if TYPE_CHECKING:
     from ..results.optimum import Optimum
@@ -41,7 +41,7 @@ def optimum(found: Optimum, path: str | os.PathLike | None = None) -> Any:
 
 def _quantity(ax: Any, found: Optimum, values: dict[str, np.ndarray], k: int) -> None:
     ax.set_title(found.of[k])
-    ax.set_ylabel(f"[{PRETTY.get(found.units[k], found.units[k])}]")
+    ax.set_ylabel(titled("", found.units[k]))
     for i, (name, v) in enumerate(values.items()):
         if len(found.t) > 1:
             ax.plot(found.t, v, label=name, **{k: x for k, x in LOOKS[name].items() if k != "marker"})

@@ -15,14 +15,14 @@ from .recording import Figure, Picture, PointPaths
 if TYPE_CHECKING:
     from ..results.result import Result
 
-ORDER = ("energy", "coordinates", "positions", "paths", "contacts", "reactions", "actuation", "sensors")
+ORDER = ("energy", "coordinates", "positions", "paths", "contacts", "reactions", "actuation", "sensors", "controllers")
 
 
 def standard_pictures(result: Result) -> list[Picture]:
     """The pictures that tell most of a motion, of those that have something to show.
 
     ``energy``, ``coordinates`` (of joints), ``positions`` (of spatial bodies over time), ``paths`` (of points, seen
-    in the plane or from three sides), ``contacts``, ``reactions``, ``actuation`` and ``sensors``.
+    in the plane or from three sides), ``contacts``, ``reactions``, ``actuation``, ``sensors`` and ``controllers``.
     """
     whole = edged(result)
     found: dict[str, Figure | PointPaths] = {f.name: f for f in figures(whole)}

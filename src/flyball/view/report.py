@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from html import escape
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 
 WARNINGS = 6  # that are told at the top
+HEAD, NOTE = 0.3, 0.1  # heights of a figure's heading and of a note below a panel, over that of a panel
 
 
 def report(result: Result, **options: Any) -> str:
@@ -56,7 +58,7 @@ def report(result: Result, **options: Any) -> str:
         f"<p>{escape(_headline(result))}</p>\n{_verdict(result)}\n<dl class='cards'>{_cards(result)}</dl>\n"
         f'<nav aria-label="Contents">{links}</nav></div>\n<section id="animation" class="frame">\n'
     )
-    plots = "".join(_plot(f) for f in chosen)
+    plots = _columns(chosen)
     after = (
         f'</section>\n<section class="charts">\n{plots}</section>\n{"".join(map(_table, parts))}'
         f"{_file(result)}\n<footer class='by'>{escape(_made_by())}</footer>\n</div>\n"
@@ -140,10 +142,23 @@ def _time(h: Health) -> str:
     return f"{h.seconds - h.compiling:.2f} s of computing{compiled}"
 
 
-def _plot(figure: Figure) -> str:
+def _columns(chosen: Sequence[Figure]) -> str:
+    """Two columns of figures that end as nearly together as can be; each figure knows its place for a single column."""
+    heights = [HEAD + sum(1.0 + bool(p.note) * NOTE for p in f.panels) for f in chosen]
+
+    def apart(right: tuple[bool, ...]) -> float:
+        return abs(sum(-h if aside else h for h, aside in zip(heights, right, strict=True)))
+
+    sides = product((False,), *[(False, True)] * (len(chosen) - 1)) if chosen else ()
+    best = min(sides, key=apart, default=())
+    columns = ("".join(_plot(f, k) for k, f in enumerate(chosen) if best[k] is aside) for aside in (False, True))
+    return "".join(f'<div class="column">{plots}</div>' for plots in columns)
+
+
+def _plot(figure: Figure, place: int) -> str:
     note = f"<p>{escape(figure.note)}</p>" if figure.note else ""
     return (
-        f'<article id="plot-{figure.name}"><h2>{escape(figure.title)}</h2>{note}'
+        f'<article id="plot-{figure.name}" style="order: {place}"><h2>{escape(figure.title)}</h2>{note}'
         f'<div data-figure="{escape(figure.name)}"></div></article>\n'
     )
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .drawing import BESIDE, PALETTE, PRETTY, handed_out, new_figure, styled
+from .drawing import BESIDE, PALETTE, handed_out, new_figure, styled, titled
 
 if TYPE_CHECKING:
     from ..results.sensitivity import Sensitivity
@@ -28,9 +28,8 @@ def sensitivity(s: Sensitivity, path: str | os.PathLike | None = None) -> Any:
 
 
 def _panel(axis: Any, s: Sensitivity, k: int, percent: np.ndarray) -> None:
-    unit = PRETTY.get(s.units[k], s.units[k])
     axis.set_title(f"change of {s.of[k]} by one percent more of a parameter")
-    axis.set_ylabel(f"[{unit}]")
+    axis.set_ylabel(titled("", s.units[k]))
     found = s.derivatives[:, k, :] * percent
     if len(s.t) > 1:
         for i, name in enumerate(s.to):

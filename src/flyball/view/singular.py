@@ -11,7 +11,7 @@ from ..errors import ModelError
 from ..model.body import GROUND
 from ..model.words import listing, suggest
 from ..results.kinds import BIFURCATION, LOCK_UP, PASSAGE, SELF_MOTION
-from .drawing import PALETTE, PRETTY, handed_out, headed, new_figure, styled
+from .drawing import PALETTE, handed_out, headed, new_figure, styled, titled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -129,8 +129,8 @@ def _over_driver(ax: Axes, result: Singularities, name: str) -> None:
         y = result.values[name][int(np.argmin(np.abs(result.s - p.at)))]
         ax.plot(p.a, y, mark, color=color, markersize=6)
         ax.annotate(f"{k + 1}", (p.a, y), textcoords="offset points", xytext=(5, 5), fontsize=8)
-    ax.set_xlabel(f"{result.coordinate} [{result.unit}]")
-    ax.set_ylabel(f"{name} [{PRETTY.get(unit, unit)}]")
+    ax.set_xlabel(titled(result.coordinate, result.unit))
+    ax.set_ylabel(titled(name, unit))
 
 
 def _distance(ax: Axes, result: Singularities) -> None:

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
-from .drawing import BESIDE, PALETTE, PRETTY, handed_out, headed, new_figure, styled
+from .drawing import BESIDE, PALETTE, handed_out, headed, new_figure, styled, titled
+from .logs import logarithmic, scale, shades
 from .smoothing import surface_of_means
+from .study_curves import over_time
 
 if TYPE_CHECKING:
     from ..results.indices import Indices
     from ..results.study import Study
 
-MOST_CURVES = 40  # that are drawn one by one
-BANDS = ((5.0, 95.0, 0.15), (25.0, 75.0, 0.3))  # percent, and how dark what lies between them is
+MARKED = 40  # points on a line that are marked
+VAST = 100.0  # the largest over the least of quantities that may need a logarithmic axis
 LEVELS = 24
 Path = str | os.PathLike | None
 
@@ -37,7 +39,8 @@ def study(found: Study, of: Sequence[str], path: Path = None) -> Any:
                 continue
             ax = drawing.add_subplot(grid[i, :])
             if name in curves:
-                _over_time(ax, found, name)
+                over_time(drawing, ax, found, name)
+                ax.set_ylabel(_label(found, name))
             elif d == 1:
                 _over_one(ax, found, name)
             else:
@@ -67,7 +70,8 @@ def histogram(found: Study, of: Sequence[str], path: Path = None) -> Any:
             y = found.values[name]
             y = y[np.isfinite(y)]
             if len(y):
-                ax.hist(y, bins="auto" if np.ptp(y) > 0.0 else 1, color=PALETTE[0], edgecolor="white", linewidth=0.5)
+                scale(ax, "x", y, VAST)
+                ax.hist(y, bins=_bins(y), color=PALETTE[0], edgecolor="white", linewidth=0.5)
                 for q, style in ((5.0, ":"), (50.0, "-"), (95.0, ":")):
                     ax.axvline(np.percentile(y, q), color=PALETTE[1], linestyle=style, linewidth=1.2)
             ax.set_xlabel(_label(found, name))
@@ -125,34 +129,26 @@ def _numbers(found: Study, of: Sequence[str]) -> list[str]:
     return names
 
 
+def _bins(y: np.ndarray) -> Any:
+    """Edges of a histogram, by logarithms where its axis is."""
+    if logarithmic(y, VAST):
+        return np.exp(np.histogram_bin_edges(np.log(y), "auto"))
+    return "auto" if np.ptp(y) > 0.0 else 1
+
+
 def _title(found: Study) -> str:
     return f"{found.name}: {int(found.done.sum())} of {len(found)} runs"
 
 
 def _label(found: Study, name: str) -> str:
-    unit = found.unit(name)
-    return f"{name} [{PRETTY.get(unit, unit)}]" if unit else name
-
-
-def _over_time(ax: Any, found: Study, name: str) -> None:
-    """A few curves as they are; of many the median, and between what most lie."""
-    y = found.values[name][found.done]
-    if len(y) <= MOST_CURVES:
-        for curve in y:
-            ax.plot(found.t, curve, color=PALETTE[0], alpha=0.5, linewidth=0.9)
-    else:
-        for low, high, dark in BANDS:
-            a, b = np.nanpercentile(y, (low, high), axis=0)
-            ax.fill_between(found.t, a, b, color=PALETTE[0], alpha=dark, linewidth=0, label=f"{low:g} to {high:g} %")
-        ax.plot(found.t, np.nanmedian(y, axis=0), color=PALETTE[0], label="median")
-        ax.legend(**BESIDE)
-    ax.set_xlabel("time [s]")
-    ax.set_ylabel(_label(found, name))
+    return titled(name, found.unit(name))
 
 
 def _over_one(ax: Any, found: Study, name: str) -> None:
     order = np.argsort(found.points[:, 0], kind="stable")
-    ax.plot(found.points[order, 0], found.values[name][order], marker="o" if len(found) <= MOST_CURVES else None)
+    ax.plot(found.points[order, 0], found.values[name][order], marker="o" if len(found) <= MARKED else None)
+    scale(ax, "x", found.points[:, 0])
+    scale(ax, "y", found.values[name], VAST)
     ax.set_xlabel(found.parameters[0])
     ax.set_ylabel(_label(found, name))
 
@@ -160,8 +156,10 @@ def _over_one(ax: Any, found: Study, name: str) -> None:
 def _scattered(row: Any, found: Study, name: str) -> None:
     for k, (ax, parameter) in enumerate(zip(row, found.parameters, strict=True)):
         ax.plot(found.points[:, k], found.values[name], ".", markersize=3 if len(found) > 200 else 5, alpha=0.6)
+        scale(ax, "x", found.points[:, k])
         ax.set_xlabel(parameter)
         if k == 0:
+            scale(ax, "y", found.values[name], VAST)
             ax.set_ylabel(_label(found, name))
         else:
             ax.sharey(row[0])
@@ -173,17 +171,28 @@ def _over_samples(ax: Any, x: np.ndarray, y: np.ndarray, z: np.ndarray, scattere
 
     if len(z) < 3:
         return ax.scatter(x, y, c=z)
+    shown = (x, y)
+    x, y = (np.log(v) if logarithmic(v) else v for v in shown)
     try:
         triangles = Delaunay(np.column_stack([(v - v.mean()) / (np.ptp(v) or 1.0) for v in (x, y)])).simplices
     except (QhullError, ValueError):
-        return ax.scatter(x, y, c=z)
+        return ax.scatter(*shown, c=z)
     if scattered:
         a, b, mean = surface_of_means(x, y, z)
-        drawn = ax.contourf(a, b, np.ma.masked_invalid(mean), LEVELS)
+        a, b = (np.exp(v) if logarithmic(old) else v for v, old in zip((a, b), shown, strict=True))
+        drawn = ax.contourf(a, b, np.ma.masked_invalid(mean), **_levels(mean))
     else:
-        drawn = ax.tricontourf(x, y, triangles, z, LEVELS)
-    ax.plot(x, y, ".", color="#222222", markersize=1.5, alpha=0.5)
+        drawn = ax.tricontourf(*shown, triangles, z, **_levels(z))
+    ax.plot(*shown, ".", color="#222222", markersize=1.5, alpha=0.5)
     return drawn
+
+
+def _levels(z: np.ndarray) -> dict[str, Any]:
+    """Where colours change, by logarithms of what is spread in these."""
+    if not logarithmic(z, VAST):
+        return {"levels": LEVELS}
+    low, high = float(np.nanmin(z)), float(np.nanmax(z))
+    return {"levels": np.geomspace(low, high, LEVELS + 1), "norm": shades(z, VAST)}
 
 
 def _surface(drawing: Any, ax: Any, found: Study, name: str, x: str, y: str) -> None:
@@ -196,12 +205,16 @@ def _surface(drawing: Any, ax: Any, found: Study, name: str, x: str, y: str) -> 
         mean = np.where(there > 0, np.nansum(values, axis=others) / np.maximum(there, 1), np.nan)
         mean = mean if i > j else mean.T
         a, b = np.argsort(found.axes[i]), np.argsort(found.axes[j])
-        drawn = ax.contourf(found.axes[i][a], found.axes[j][b], np.ma.masked_invalid(mean[np.ix_(b, a)]), LEVELS)
+        drawn = ax.contourf(
+            found.axes[i][a], found.axes[j][b], np.ma.masked_invalid(mean[np.ix_(b, a)]), **_levels(mean)
+        )
     else:
         known = np.isfinite(found.values[name])
         px, py, z = found.points[known, i], found.points[known, j], found.values[name][known]
         varied = any(np.ptp(x) > 0.0 for k, x in enumerate(found.points[known].T) if k not in (i, j))
         drawn = _over_samples(ax, px, py, z, varied)
     drawing.colorbar(drawn, ax=ax, label=_label(found, name))
+    scale(ax, "x", found.points[:, i])
+    scale(ax, "y", found.points[:, j])
     ax.set_xlabel(x)
     ax.set_ylabel(y)

@@ -120,9 +120,9 @@ class Keeper:
             self._beside += rows
         self._written, self._last = len(self.parts), time.monotonic()
 
-    def whole(self, last: Result) -> Result:
+    def whole(self, *last: Result) -> Result:
         """All with what was computed last."""
-        return self._joined([*self.parts, last])
+        return self._joined([*self.parts, *last])
 
     def finish(self, result: Result) -> None:
         """Write the whole motion, as other programs read it too, and nothing beside it."""

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import ModelError, SingularityError
+from ...errors import AnalysisError, ModelError, NotConverged, SingularityError
 from ...model.model import Model
 from ...model.touching import holds_at_times
 from ..assembly.start import Assembly
 from ..compiled import Compiled
-from .balance import acting, rounding
+from .curves import snapshot
 from .derivatives import State
 from .free import free
 from .natural import natural_scales
 from .own_words import in_own_words, refusal, told
 from .rest import Rest
-from .search import newton_to
+from .search import led, newton_to
 from .sliders import Scale, Slid, slid, states, there
 
-ROUNDED = np.finfo(float).eps  # of a large change of a state: less is none
 PASSES = 4  # searches, each in the natural sizes of where the one before ended
 FLAT = 1e-8  # singular values below this part of the largest are none
+NEWTON, LED = "Newton's method", "following the forces and the controllers"
 ALIKE = 30.0  # times that natural sizes may differ from those that were searched in
 
 
@@ -46,8 +47,11 @@ def resting_copy(
     return other, Rest.at(b.c, b.t, b.q)
 
 
-def found_rest(model: Model, c: Compiled, t: float, q: np.ndarray, at: dict[str, float]) -> np.ndarray:
-    """Positions at rest near some; the states there are left in ``c``.
+def found_rest(model: Model, c: Compiled, t: float, q: np.ndarray, at: dict[str, float]) -> tuple[np.ndarray, str]:
+    """Positions at rest near some, and what found them; the states there are left in ``c``.
+
+    A controller whose output is at a limit tells Newton's method nothing. Then limits are left out until it is where
+    they do not matter, and where they do the forces and the controllers lead.
 
     Parameters
     ----------
@@ -63,23 +67,83 @@ def found_rest(model: Model, c: Compiled, t: float, q: np.ndarray, at: dict[str,
     NotConverged
         With what is left.
     """
-    scales, still = None, False
+    begin = _Place(c, t, q, at)
+    try:
+        return _rests(model, begin, newton_to).q, NEWTON
+    except AnalysisError as error:
+        why = error
+    wide = without_limits(model)
+    if wide is not None:
+        try:
+            return _rests(model, _rests(wide, begin, newton_to), newton_to).q, f"{NEWTON}, at first without limits"
+        except AnalysisError:
+            pass
+    try:
+        return _rests(model, _rests(model, begin, led), newton_to).q, LED
+    except AnalysisError:
+        raise why from None
+
+
+def without_limits(model: Model) -> Model | None:
+    """A copy whose controllers have no limits; None if they have none anyway."""
+    freed = [(e, e.unlimited()) for e in model.controllers]
+    if all(a is b for a, b in freed):
+        return None
+    other = model.copy()
+    for a, b in freed:
+        if a is not b:
+            other.replace(b)
+    return other
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a search begins or ends: positions, and states of controllers."""
+
+    c: Compiled
+    t: float
+    q: np.ndarray
+    at: dict[str, float]
+
+    def state(self) -> State:
+        """Of the model, the states written."""
+        self.c.z[: len(self.at)] = [*self.at.values()]
+        return State.resting(self.c, self.t, self.q)
+
+    def moved(self, other: Slid, x: Rest) -> _Place:
+        """Where a place of a copy with bodies for states is in the model."""
+        q, _ = self.c.take(x.c, x.t, x.q, np.zeros(x.c.structure.nv))
+        return _Place(self.c, self.t, q, dict(zip(self.at, states(other, self.at, x), strict=True)))
+
+
+def _rests(model: Model, place: _Place, search: Callable[[Rest], tuple[Rest | None, Rest]]) -> _Place:
+    """Where a search ends, in the natural sizes of that place."""
+    scales = None
     for _ in range(PASSES):
-        c.z[: len(at)] = [*at.values()]
-        x = State.resting(c, t, q)
-        before, scales = scales, natural_scales(model, at, x, places=True)
-        if before is not None and (still or _alike(before, scales)):
+        x = place.state()
+        before, scales = scales, natural_scales(model, place.at, x, places=True)
+        if before is not None and _alike(before, scales):
             break
-        other, begin = resting_copy(model, at, x, scales)
+        other, begin = resting_copy(model, place.at, x, scales)
         with in_own_words(other):
-            found, last = newton_to(begin)
+            found, last = search(begin)
         if found is None:
-            raise refusal(last, other)
-        q, _ = c.take(found.c, found.t, found.q, np.zeros(found.c.structure.nv))
-        now = dict(zip(at, states(other, at, found), strict=True))
-        at = {name: z if abs(z) > ROUNDED * scales[name].size else 0.0 for name, z in now.items()}
-        still = bool((acting(found.equations) <= rounding(found.equations)).all())  # sizes by rounding would be none
-    return q
+            raise _at_limits(refusal(last, other), model, place.moved(other, last))
+        place = place.moved(other, found)
+    return place
+
+
+def _at_limits(error: NotConverged, model: Model, place: _Place) -> NotConverged:
+    """The error, with whose output is at a limit where a search ended."""
+    shot = snapshot(place.state())
+    held = [
+        e.title
+        for e in model.controllers
+        if e.unlimited() is not e and shot.curve(f"{e.name}.output")[1][0] != shot.curve(f"{e.name}.unlimited")[1][0]
+    ]
+    if held:
+        error.args = (f"{error.args[0]}. There the output of {' and of '.join(held)} is at a limit", *error.args[1:])
+    return error
 
 
 def determined_copy(model: Model, at_rest: Assembly, outputs: Sequence[str]) -> tuple[Slid, Rest]:

@@ -14,8 +14,9 @@ import numpy as np
 
 from ...model.model import Model
 from ...tables.names import velocity_names
+from ...tables.system import TEMPO
 from ..motion.crossed import refuse_crossed
-from .balance import acting
+from .balance import acting, rounding
 from .derivatives import Equations, State
 from .sliders import Scale, Slid, of_slides, of_states, slid, there
 
@@ -62,9 +63,9 @@ class _Sizes:
         self.names, self.z, self.length = list(other.slides.values()), z, c.values.length
         self.rate = np.abs(e.state.vdot[at])  # of a newton on 1 kg
         among = abs(K[own][:, own]).multiply(size[own]).multiply(size[own][:, None])
-        self.energy = max(float((size * acting(e))[own].max(initial=0.0)), float(among.max() if among.nnz else 0.0))
-        self.energy = self.energy or 1.0
         inertia = float((size**2 * M)[own].max(initial=0.0))
+        pace = float(c.values.system.glob[TEMPO].real)
+        self.energy = _energy(e, float(among.max() if among.nnz else 0.0), size * own) or inertia * pace**2 or 1.0
         self.speed = np.sqrt(self.energy / inertia) if inertia > 0.0 else 1.0  # [1/s]
         self.forces = _largest(abs(K[own][:, at]).multiply(size[own][:, None]), 0)  # by each state
         self.moved = _largest(abs(K[at][:, own]).multiply(size[own]), 1)  # rates by large steps of the mechanism
@@ -115,6 +116,15 @@ class _Sizes:
         lack = np.where(itself > 0.0, self.rate / np.where(itself > 0.0, itself, 1.0), 0.0)
         size = np.abs(self.z) + lack
         return np.where(size > 0.0, size, np.nan)
+
+
+def _energy(e: Equations, stiff: float, size: np.ndarray) -> float:
+    """What acts or resists [J], 0 if what there is of it is rounding; ``stiff`` is what resists a large step."""
+    acts = acting(e)
+    loads = float((size * acts).max(initial=0.0))
+    if loads > stiff:
+        loads = float((size * np.where(acts > rounding(e), acts, 0.0)).max(initial=0.0))
+    return max(loads, stiff)
 
 
 def _largest(A, axis: int) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...equations.tree import retract
 from ...errors import AnalysisError
+from ...tables.names import velocity_names
 from ..compiled import Compiled
 from .balance import acting, settled, unbalanced
 from .derivatives import Equations, State
@@ -93,6 +94,15 @@ class Rest:
         """The largest energy that acts or that stiffness makes of a step of one."""
         most = np.abs(self.scale * acting(self.equations)).max(initial=0.0)
         return float(max(most, np.abs(self.K.data).max(initial=0.0), 1e-300))
+
+    @cached_property
+    def turns(self) -> np.ndarray:
+        """Which velocities turn, (nv,) bool."""
+        return np.array([n.unit == "rad" for n in velocity_names(self.c.structure)], bool)
+
+    def missing(self) -> float:
+        """What is left of the forces, of what acts, and the largest gap of the constraints."""
+        return float(np.abs(self.r).max(initial=0.0) / self.size + np.abs(self.g).max(initial=0.0))
 
     def settled(self, part: float) -> bool:
         """Whether every equation is balanced, but for a part of what acts in it."""

@@ -85,7 +85,8 @@ def without_rounding(
         most = np.hstack([along @ terms.forces[:, :n] * scale, (along @ turned)[:, None]])
         moves = np.r_[np.ones(a, bool), large == 0.0]
         uncancelled = most / inertia[:, None] ** 2 / scale[a:, None]
-        fastest = _fastest(A[moves[a:]][:, moves], uncancelled[moves[a:]][:, np.r_[moves, True]], a)
+        pushed = float((A[moves[a:]][:, ~moves] / scale[~moves] * large[large > 0.0]).max(initial=0.0))
+        fastest = _fastest(A[moves[a:]][:, moves], uncancelled[moves[a:]][:, np.r_[moves, True]], a, pushed)
         unit[a:] = np.where(large > 0.0, large, fastest * unit[a:])
     rows = (terms.forces[:, :n] * unit).max(axis=1, initial=0.0) if n else np.zeros(nv)
     first = EXACT * (terms.rates[:, :n] * unit).max(axis=1, initial=0.0)
@@ -98,15 +99,18 @@ def without_rounding(
     return Doubt(by, size)
 
 
-def _fastest(A: np.ndarray, uncancelled: np.ndarray, a: int) -> float:
-    """Rate [1/s] of the fastest motion, from accelerations and what cancels in them, (fv, n), in natural units."""
+def _fastest(A: np.ndarray, uncancelled: np.ndarray, a: int, pushed: float) -> float:
+    """Rate [1/s] of the fastest motion, from accelerations and what cancels in them, (fv, n), in natural units.
+
+    ``pushed`` are accelerations by what has a size of its own: where nothing else acts all other is rounding.
+    """
 
     def rate(by_position: np.ndarray, by_velocity: np.ndarray) -> float:
         return max(float(np.sqrt(by_position.max(initial=0.0))), float(by_velocity.max(initial=0.0)))
 
     n = A.shape[1]
     static = np.hstack([uncancelled[:, :a], uncancelled[:, n:]])
-    return max(rate(A[:, :a], A[:, a:]), SLOW * rate(static, uncancelled[:, a:n])) or 1.0
+    return max(rate(A[:, :a], A[:, a:]), SLOW * rate(static, uncancelled[:, a:n]), np.sqrt(pushed)) or 1.0
 
 
 def _spread(rows: np.ndarray, M: np.ndarray, e: Equations, scale: np.ndarray) -> np.ndarray:

@@ -12,11 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ...results.growth import beyond_axis
 from .free import Free
 from .reduced import Frame, Reduced
 from .spectrum import spectrum
-
-UNDAMPED = 1e-8  # real parts below this part of an eigenvalue are none
 
 
 @dataclass
@@ -51,15 +50,15 @@ class Sample:
         ``""`` stands for the lower one of a pair.
         """
         w = self.w
-        real = np.where(np.abs(w.real) > UNDAMPED * np.abs(w), w.real, 0.0)
-        alone = np.where(real > 0.0, "+real", "-real")
-        pair = np.where(real > 0.0, "+pair", np.where(real < 0.0, "-pair", "axis"))
+        real = beyond_axis(w)
+        alone = np.where(real > 0, "+real", "-real")
+        pair = np.where(real > 0, "+pair", np.where(real < 0, "-pair", "axis"))
         return np.where(w == 0.0, "zero", np.where(w.imag == 0.0, alone, np.where(w.imag > 0.0, pair, "")))
 
     @cached_property
     def sides(self) -> np.ndarray:
         """Which half plane each eigenvalue lies in, (n,): 1, -1, or 0 for the axis."""
-        return np.where(np.abs(self.w.real) > UNDAMPED * np.abs(self.w), np.sign(self.w.real), 0.0).astype(int)
+        return beyond_axis(self.w)
 
     @cached_property
     def counts(self) -> dict[str, int]:

@@ -22,6 +22,7 @@ NEWTON, DESCENT = 40, 400  # steps
 ENDLESS = 15.0  # way in radians, or in the mechanism's lengths, after which nothing will hold it any more
 ARRIVED = 1e-7  # Newton's last step: the next one would be its square
 LONGEST = 0.3  # a step in radians, or parts of the mechanism's length
+NEARLY = 1e-3  # of what is missing: less is left where everything on the way is nearly linear
 PUSH = 1e-2  # in the same
 BALANCED = 1e-9  # forces left, of those that act
 CLOSED = 1e-10  # of the mechanism's length
@@ -46,10 +47,19 @@ def newton_to(x: Rest) -> tuple[Rest | None, Rest]:
         longest = np.abs(step).max(initial=0.0)
         if not np.isfinite(longest):
             break
-        x = x.moved(step * min(1.0, LONGEST / max(longest, 1e-300)), lam)
+        x = _far(x, step, lam) or x.moved(step * min(1.0, LONGEST / max(longest, 1e-300)), lam)
         if longest < ARRIVED and (best := arrived(x)):
             return best, x
     return None, x
+
+
+def _far(x: Rest, step: np.ndarray, lam: np.ndarray) -> Rest | None:
+    """Where a longer step than is taken blindly leads, if little turns on the way and nearly nothing is left there."""
+    size = np.abs(step)
+    if not size.max(initial=0.0) > LONGEST or (size > LONGEST)[x.turns].any():
+        return None
+    there = x.moved(step, lam)
+    return there if there.missing() < NEARLY * x.missing() else None
 
 
 def arrived(x: Rest) -> Rest | None:
@@ -118,6 +128,32 @@ def descent(x: Rest) -> Rest | None:
         before, left = left, np.abs(x.r).max(initial=0.0)
         damping *= float(np.clip(left / max(before, 1e-300), 0.3, 1.5)) * 0.7
     return None
+
+
+def led(x: Rest) -> tuple[Rest | None, Rest]:
+    """The same for what has no potential, as forces of controllers: (place or None, where it ended).
+
+    Implicit steps of a motion without inertia that lengthen as what is missing becomes less (switched evolution
+    relaxation); there is no hill to tell whether one leads down.
+    """
+    x = x.closed()
+    damping, left = HARD, x.missing()
+    for _ in range(DESCENT):
+        if damping < SOFT or x.settled(BALANCED):
+            return x, x
+        step, lam = x.step(damping)
+        longest = np.abs(step).max(initial=0.0)
+        if not np.isfinite(longest):
+            break
+        if longest > LONGEST:
+            damping *= 4.0
+            if damping > STUCK:
+                break
+            continue
+        x = x.moved(step, lam).closed()
+        before, left = left, x.missing()
+        damping *= float(np.clip(left / max(before, 1e-300), 0.3, 1.5)) * 0.7
+    return None, x
 
 
 def failure(x: Rest) -> NotConverged:

@@ -23,7 +23,7 @@ from ...forces.coordinate_spring import pushing
 from ...joints.fixed import welded
 from ...joints.prismatic import slide
 from ...model.body import Body
-from ...model.controller import OUTPUT, Controller
+from ...model.controller import Controller
 from ...model.element import LawOf, fields_with, resolve
 from ...model.expressions import Expression, is_number_text
 from ...model.model import Model
@@ -272,7 +272,7 @@ class _Sliding:
             return self._output(e.of, k)
         assert isinstance(e, Controller)
         owner, dot, what = name.partition(".")
-        what = what if dot else OUTPUT
+        what = what if dot else e.bare
         if what not in wiring_of(self.old, e):
             raise ModelError(f"{owner!r} has no signal {what!r}; it has {', '.join(wiring_of(self.old, e))}")
         return self._curve(f"output_{k}_", self.text(signal(self.old, e, what)))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...results.equilibrium import MARGINAL, STABLE, UNSTABLE
+from ...results.growth import growth
 from .derivatives import Equations
 from .free import Free, free
 from .kinks import kinks, refuse_kinks
@@ -15,6 +16,8 @@ from .rest import Rest
 from .sides import from_all_sides
 from .spectrum import Spectrum, spectrum
 from .stiffness import NEUTRAL, stiffness
+
+DRIVEN = 1e-12  # of the largest damping: what is negative beyond is no rounding
 
 
 @dataclass
@@ -75,7 +78,16 @@ def _judged(x: Rest) -> Stability:
     if not s.potential:  # flutter shows in the motion
         refuse_kinks(e, still, f.Zv)
         kind = _by_motion(e, f)
+    elif kind == STABLE and _drives(e, f) and _by_motion(e, f) == UNSTABLE:
+        kind = UNSTABLE
     return Stability(kind, f, s.matrix, s.along[:, k], float(s.parts[k]))
+
+
+def _drives(e: Equations, f: Free) -> bool:
+    """Whether forces that follow velocities give energy to some motion: a negative damper."""
+    D = f.Zv.T @ e.by_velocity[e.at["r"]] @ f.Zv
+    d = np.linalg.eigvalsh(0.5 * (D + D.T))
+    return bool(len(d) and d[0] < -DRIVEN * np.abs(d).max())
 
 
 def by_eigenvalues(own: Spectrum, *, discrete: bool = False) -> str:
@@ -87,13 +99,7 @@ def by_eigenvalues(own: Spectrum, *, discrete: bool = False) -> str:
     discrete : bool
         Whether they are multipliers from one instant to the next, which must not exceed 1 in size.
     """
-    w, blur = own.values, own.blur
-    if discrete:
-        grows = np.abs(w) - 1.0
-        grows[np.abs(grows) <= blur] = 0.0
-    else:
-        grows = w.real  # without what is rounding
-    most = float(grows.max(initial=-1.0))
+    most = growth(own.values, own.blur, discrete=discrete)
     return UNSTABLE if most > 0.0 else MARGINAL if most == 0.0 else STABLE
 
 

@@ -27,6 +27,7 @@ from .options import Integration
 from .part import KEPT
 from .reasons import reason, remarks
 from .residual import acceleration_violation
+from .samples import never
 from .start import Start, begun
 
 
@@ -62,7 +63,7 @@ def outcome(
             f"{model.name!r}: {broken or here.failed}. The motion up to t = {t:.6g} s is kept in the error's result"
         )
     elif status != ex.DONE:
-        message, cause = reason(a, start.base, clock)
+        message, cause = reason(a, start.base, clock, method=str(o.method))
     health = _health(start, clock, o)
     ended = here.failed is None and not interrupted and not here.start.part.paused
     health.message, health.success = message, ended and status == ex.DONE
@@ -121,6 +122,7 @@ def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
             *map(not_allowed, changed_velocities(start.base.departures)),
             *remarks(start.assembly, clock),
             *nothing_touches(start.base.compiled.structure.model),
+            *never(start.assembly.compiled, clock),
         ),
         departures=start.base.departures,
         coordinates=start.coordinates,

@@ -18,6 +18,7 @@ KEPT = "not at its end: kept at t = {:.6g} s"
 LASTS = 4e9  # that a part should last, as estimated [ns]
 STAGES = 12  # evaluations that a step takes, about
 LEAST = 50  # steps of a part
+OLD = 10.0  # seconds after which an interrupt ends a part where it is: by then it was to have ended
 LATEST = 40.0  # seconds after which a part ends in any case
 WEIGHT = 10.0  # explicit steps that a step of an implicit method takes as long as
 DECISION = 1e6  # what an event costs [ns]
@@ -40,13 +41,15 @@ class Part:
     ----------
     paused : bool
         Whether it has ended before the motion did.
+    asked : bool
+        Whether the user had it end where it is.
     open : bool
         Whether something is still to happen at the time at which it ended: the output of that time is not there.
     """
 
     def __init__(self, first: float | None = None, later: bool = False, lasts: float | None = None) -> None:
         self.first, self.later, self.paused = first, later, False
-        self.open = False
+        self.open = self.asked = False
         self._lasts = LASTS if lasts is None else lasts
         self._whole = self._left = math.inf
         self._event, self._since = 0.0, time.monotonic()
@@ -79,9 +82,16 @@ class Part:
         """What happens at an instant was decided."""
         self._left -= self._event
 
+    def interrupted(self) -> bool:
+        """The user interrupts it: whether it ends in order, soon, because it is too old to be computed once more."""
+        if self.asked or not self._lasts < math.inf or time.monotonic() - self._since <= OLD:
+            return False
+        self.asked = True
+        return True
+
     def due(self) -> bool:
         """Whether it is to end."""
-        return self._left <= 0.0 or (self._lasts < math.inf and time.monotonic() - self._since > LATEST)
+        return self.asked or self._left <= 0.0 or (self._lasts < math.inf and time.monotonic() - self._since > LATEST)
 
     def over(self, clock: ex.Clock | None = None) -> bool:
         """Whether it ends here: not after a step that was refused."""

@@ -41,8 +41,10 @@ from ..assembly.start import Assembly
 from ..compiled import Compiled
 from ..freedom.contradiction import story
 from .crossed import crossed
+from .growth import boundless, escaping, too_long
 from .jams import Unresolved, jam
 from .residual import missed
+from .samples import too_often
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
@@ -54,7 +56,9 @@ LATELY = 1e-3  # part of the time span within which rounding found to decide is 
 SHARP = 10.0  # a law that changes this many times more than its own slope says has jumped
 
 
-def reason(a: Assembly, base: Assembly, clock: ex.Clock, kept: bool = True) -> tuple[str, Exception | None]:
+def reason(
+    a: Assembly, base: Assembly, clock: ex.Clock, kept: bool = True, method: str = ""
+) -> tuple[str, Exception | None]:
     """What stopped the integration, and the exception that a user's function raised, if one did.
 
     Parameters
@@ -67,6 +71,8 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock, kept: bool = True) -> t
         State of the integration.
     kept : bool
         Whether there is a result up to then.
+    method : str
+        By which it was integrated.
     """
     name = a.compiled.structure.model.name
     t = float(clock.real[ex.T])
@@ -77,10 +83,11 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock, kept: bool = True) -> t
     found = fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
     if found is not None:
         return f"{name!r}: just after t = {t:.6g} s, {found.message}{after}", found.exception
-    text = of_drivers(a, clock) or _not_finite(a, clock)
+    text = of_drivers(a, clock) or _not_finite(a, clock, method)
     if not text and (text := _jammed(a, clock)):
         return f"{name!r}: {text}{after}", Unresolved(text, t=t)
-    text = text or _broken(a, clock) or _locked(a, base, clock) or _rivals(a, clock) or _stuck(a, clock)
+    text = text or boundless(a, clock, _component) or _broken(a, clock) or escaping(a, clock, _component)
+    text = text or _locked(a, base, clock) or _rivals(a, clock) or _stuck(a, clock)
     return f"{name!r}: {text}{after}", None
 
 
@@ -213,11 +220,15 @@ def _jump(before: tuple, after: tuple, step: float, wrapped: bool) -> str:
     return ""
 
 
-def _not_finite(a: Assembly, clock: ex.Clock) -> str:
+def _not_finite(a: Assembly, clock: ex.Clock, method: str) -> str:
     if clock.count[ex.STATUS] != ex.NOT_FINITE and a.compiled.work.info[STATUS] != motion.NOT_FINITE:
         return ""
     t = float(clock.real[ex.T])
     span = float(clock.real[ex.LARGEST])
+    if text := too_long(a, clock, method):
+        return f"at t = {t:.6g} s the motion is not finite any more: {text}"
+    if text := boundless(a, clock, _component):
+        return text
     force = next((x for d in (0.0, *AHEAD) if (x := broken_force(a.compiled, t + d * span))), "")
     if force:
         return f"the equations of motion are not finite just after t = {t:.6g} s: {force}"
@@ -333,6 +344,8 @@ def _too_many(a: Assembly, clock: ex.Clock) -> str:
             f"max_steps = {clock.count[ex.LIMIT]} steps of {clock.real[ex.STEP]:g} s were taken by "
             f"t = {clock.real[ex.T]:.6g} s; give more (max_steps=)"
         )
+    if text := too_often(a.compiled, clock, a.t):
+        return text
     slowest = _component(a, _pacemaker(clock))
     return (
         f"max_steps = {clock.count[ex.LIMIT]} steps were taken by t = {clock.real[ex.T]:.6g} s; they are "

@@ -81,7 +81,7 @@ def _shared(question: Question, point: np.ndarray, points: np.ndarray) -> Shared
     s, S = c.structure, c.values.system
     if s.switches or s.guards or s.functions or s.loads or S.glob[SEMIDEFINITE] or leaves_no_freedom(begun):
         return None
-    if s.controls or laws_of_time(c):
+    if s.sampled or laws_of_time(c):
         return None
     asked, o = o, o.sized(begun.base.compiled.values.length)
     if (filling := _filling(question, asked, begun, points)) is None:

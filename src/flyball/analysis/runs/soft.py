@@ -1,4 +1,4 @@
-"""Parameters that only forces and their laws see: structure, start and most tables are the same at all values."""
+"""Parameters that only forces, controllers and their laws see: structure, start and most tables are always the same."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ...model.controller import Controller
 from ...model.element import Element, resolve
 from ...model.expressions import Expression, law_expression, number
 from ...model.force import Force
@@ -42,18 +43,8 @@ def derived(model: Model, names: Sequence[str]) -> list[tuple[str, Expression]]:
     return order
 
 
-def unused(model: Model, names: Sequence[str]) -> list[str]:
-    """Those of some parameters that nothing of the model has, by itself or through other parameters."""
-    todo = {*words(model.gravity), *(w for e in model.elements() for w in words(e))} & model.parameters.keys()
-    used: set[str] = set()
-    while todo:
-        used |= todo
-        todo = ({w for name in todo for w in words(model.parameters[name])} & model.parameters.keys()) - used
-    return [name for name in names if name not in used]
-
-
 def soft(model: Model, names: Sequence[str]) -> list[Element] | None:
-    """The forces whose numbers change with these parameters; None if something else does."""
+    """The forces and controllers whose numbers change with these parameters; None if something else does."""
     reached = {*names, *(k for k, _ in derived(model, names))}
     if reached.intersection(words(model.gravity)):
         return None
@@ -63,6 +54,9 @@ def soft(model: Model, names: Sequence[str]) -> list[Element] | None:
 
 def _only_acts(e: Element, reached: set[str]) -> bool:
     """Whether what changes of an element are numbers of its formula: neither frames nor rows have any of them."""
+    if isinstance(e, Controller):
+        laws = e.given()
+        return not reached.intersection(words(tuple(x for name, x in vars(e).items() if name not in laws)))
     if not isinstance(e, Force) or hasattr(e, "total"):
         return False
     return not reached.intersection(words(tuple(getattr(e, name, None) for name in PLACES)))

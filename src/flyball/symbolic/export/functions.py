@@ -16,6 +16,7 @@ from ...graph.values import reached
 from ...math.vec import add, cross, load3, load9, mm, mv
 from ...model.body import Frame
 from ...model.words import listing
+from ...results.numbers import with_unit
 from .solution import Solution, solution
 
 if TYPE_CHECKING:
@@ -258,7 +259,7 @@ def outputs(x: Functions) -> Made:
     met = {n.index for n in reached(nodes) if n.op == SYMBOL}
     if any(n.index in met for symbols in (x.equations.formulated.vdot, x.traced.lam, x.traced.loads) for n in symbols):
         nodes = replaced(nodes, x.solved)
-    units = ", ".join(f"{n} [{e.unit}]" if e.unit else n for n, e in zip(x.outputs, found, strict=True))
+    units = ", ".join(with_unit(n, e.unit) for n, e in zip(x.outputs, found, strict=True))
     y = np.empty(len(nodes), object)
     y[:] = nodes
     return {"y": y}, "t q v u p", "Outputs.", {"y": units}

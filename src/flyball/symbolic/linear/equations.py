@@ -13,6 +13,7 @@ from ...errors import AnalysisError, ModelError
 from ...graph.node import Node
 from ...graph.values import evaluate, symbols
 from ...model.words import listing, suggest
+from ...results.numbers import with_unit
 from ..expressions import Expressions
 from ..home import Home
 from .derivatives import Perturbed
@@ -224,7 +225,7 @@ class LinearEquations(Home):
             ("input", x.inputs, x.input_units),
             ("output", x.outputs, x.output_units),
         ):
-            out += [(what, f"{name} [{unit}]") for name, unit in zip(names, units, strict=True)]
+            out += [(what, with_unit(name, unit)) for name, unit in zip(names, units, strict=True)]
         out += [("equilibrium", f"{k} = {self._short(e)}") for k, e in self.balanced_by.items()]
         out += [("equilibrium", f"0 = {self._short(e)}") for e in self.conditions]
         return out + [("found", f"{name} is a number, so that loops close") for name in self.found]

@@ -14,6 +14,7 @@ from ...errors import ModelError, optional
 from ...graph.node import Node
 from ...graph.values import evaluate
 from ...model.words import listing, suggest
+from ...results.numbers import with_unit
 from .validity import Validity
 
 
@@ -165,7 +166,7 @@ class TransferFunction:
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
-        out = [("from", f"{self.input} [{self.input_unit}]"), ("to", f"{self.output} [{self.output_unit}]")]
+        out = [("from", with_unit(self.input, self.input_unit)), ("to", with_unit(self.output, self.output_unit))]
         if all(c == 0 for c in self.num):
             return [*out, ("transfer function", "0: to first order the output does not answer to this input")]
         out += [("numerator", written(self._terms(self.num))), ("denominator", written(self._terms(self.den)))]

@@ -38,11 +38,12 @@ def refuse_idle(o: Any) -> None:
     """
     if o.method in EVEN and o.step is None:
         raise ModelError(f"method={o.method!r} takes steps of fixed width: give one, for instance step='1 ms'")
-    if o.stabilization not in ("projection", "none") or (o.method == VARIATIONAL and o.stabilization == "none"):
+    alone = o.method != VARIATIONAL  # whether it can keep positions alone
+    if o.stabilization not in (("projection", "none") if alone else ("projection",)):
+        other = ", or give 'none', and it keeps positions alone (index 3)" if alone else ""
         raise ModelError(
             f"stabilization={o.stabilization!r} does nothing with method={o.method!r}, which keeps positions and "
-            f"velocities on the constraints itself; leave it out, or give 'none', and it keeps positions alone "
-            f"(index 3)"
+            f"velocities on the constraints itself; leave it out{other}"
         )
     if o.specialize is True:
         raise ModelError(

@@ -1,9 +1,9 @@
-"""Three processes on a copy of the package, shared by the tests of the cache and of the house.
+"""Two processes on a copy of the package to which a joint is added (one new file, one export) and a force (one new file).
 
-The first compiles. For the second nothing has changed. Before the third a formula is edited, a joint is added (one
-new file, one export) and a force (one new file).
+The first compiles all of it, the second finds it. After an edit of a formula nothing of that is served.
 """
 
+import numpy as np
 import pytest
 
 from flyball import forces
@@ -35,6 +35,7 @@ found |= {"drift": r.energy.drift, "work": r.energy.work["air"].tolist(), "kinds
 found |= {"page": len(r.html()), "names": [n in dir(fb) for n in ("Sheet", "Drag")]}
 """
 
+FALLEN = "found |= {'fallen': cache_counts()['kernels']}\n"
 PRINT = "print(json.dumps(cache_counts() | found))\n"
 
 JOINT = '''"""A point that stays in a plane."""
@@ -96,15 +97,74 @@ class Drag(BodyForce):
 '''
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """The copy, and what its three processes say."""
+    """The copy, and what its two processes say: compiling takes twenty seconds."""
     copy = Copy(tmp_path_factory.mktemp("copied"))
-    first = copy.run(FALL + PRINT)
-    second = copy.run(FALL + PRINT)
-    # a callee in another file than the kernel's: gravity pulls the other way
-    copy.edit("equations/loads.py", "sub(gravity, load3", "sub(neg(gravity), load3")
     copy.add("joints/sheet.py", JOINT)
     copy.append("joints/__init__.py", "from .sheet import Sheet as Sheet\n")
     copy.add("forces/drag.py", FORCE.replace("{kind}", str(1 + max(force.kind for force in forces.ALL))))
-    return copy, first, second, copy.run(FALL + SLIDE + PRINT)
+    return copy, copy.run(FALL + FALLEN + SLIDE + PRINT), copy.run(FALL + FALLEN + SLIDE + PRINT)
+
+
+def test_the_copy_is_what_ran(runs):
+    copy, *each = runs
+    assert {r["where"] for r in each} == {str(copy.package / "__init__.py")}
+
+
+def test_a_second_process_compiles_nothing(runs):
+    _, first, second = runs
+    assert first["misses"] == len(first["kernels"]) > 0
+    assert (second["misses"], second["hits"]) == (0, len(second["kernels"]))
+    assert second["kernels"] == first["kernels"]
+    assert first["y"] == second["y"] == pytest.approx(-5.0, abs=1e-9)
+    assert first["position"] == second["position"]
+
+
+def test_the_right_hand_side_is_compiled_once(runs):
+    """One engine holds it, whatever is simulated: planar, spatial, with and without constraints."""
+    _, first, _ = runs
+    assert first["fallen"] == ["engine", "through"]
+
+
+def test_adding_a_joint_and_a_force_touches_nothing_else(runs):
+    """One new file and one export; one new file."""
+    copy, *_ = runs
+    assert copy.changed() == {
+        "joints/sheet.py",
+        "joints/__init__.py",
+        "forces/drag.py",
+    }
+
+
+def test_the_added_joint_and_force_work(runs):
+    """A puck on a slope against the air: m dv/dt = m g - c v within the plane, the table carries the rest."""
+    *_, r = runs
+    assert r["names"] == [True, True]
+    assert r["same file"]
+    assert r["freedoms"] == 5
+    assert "Drag" not in r["kinds"]
+    assert r["kinds"] == ["air", "pull"]
+    assert r["drift"] < 1e-8
+    assert r["page"] > 10_000
+    t, m, c = np.array(r["t"]), 2.0, 0.8
+    n = np.array([0, 0.6, 0.8])
+    pull = np.array([0, 0, -20.0])
+    down = pull - n * (pull @ n)
+    decay = 1 - np.exp(-c / m * t)
+    steady = down / c
+    exact = [1, 0, 0] + np.outer(t, steady) + np.outer(decay * m / c, np.array([3, 0, 0]) - steady)
+    assert np.array(r["position"]) == pytest.approx(exact, abs=1e-8)
+    assert np.array(r["force"]) == pytest.approx(np.tile(-n * (pull @ n), (11, 1)), abs=1e-8)
+    assert np.all(np.diff(r["work"]) < 0)
+
+
+def test_the_engine_of_edited_sources_is_not_in_the_cache(runs):
+    """A callee in another file than the kernel's: gravity pulls the other way. `test_cache` runs a small kernel so."""
+    copy, *_ = runs
+    ask = "from flyball.equations.engine import engine\nprint(json.dumps({'cold': engine.cold}))\n"
+    assert not copy.run(ask)["cold"]
+    copy.edit("equations/loads.py", "sub(gravity, load3", "sub(neg(gravity), load3")
+    assert copy.run(ask)["cold"]
+    copy.edit("equations/loads.py", "sub(neg(gravity), load3", "sub(gravity, load3")
+    assert not copy.run(ask)["cold"]

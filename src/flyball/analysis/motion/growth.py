@@ -1,0 +1,148 @@
+"""Motions that grow beyond all bounds: of themselves, within a finite time, or as a fixed step is too long."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ...equations.engine import MOTION, evaluate
+from ...numerics.integrators import clock as ex
+from ...numerics.integrators.tableaux import TABLEAUX, Tableau, tableau
+from ...tables.system import VALUE
+from ..assembly.start import Assembly
+
+BOUNDLESS = 1e30  # times what it began with, or a unit, that nothing comes to that is meant
+ASTRAY = 1e3  # the same, of a motion that a fixed step may have led astray
+ESCAPING = 1e-4  # part of itself by which a state changes within a step that is as narrow as times can be told apart
+MOST = 400  # coordinates, velocities and states whose eigenvalues are looked for
+SMALL = 1e-7  # differences, as part of the state
+FARTHEST, FINELY = 15.0, 3000  # h |lambda| up to which steps may be stable, and how finely that is looked at
+GROWS = 1e-3  # part by which a step may make a mode grow that is still called stable
+FOREIGN = 0.1  # a mode grows by itself whose real part is more than this part of its size
+
+Named = Callable[[Assembly, int], str]
+
+
+def too_long(a: Assembly, clock: ex.Clock, method: str) -> str:
+    """That a fixed step is too long, and which would do; nothing if that is not the matter."""
+    step = float(clock.real[ex.STEP])
+    if not step > 0.0 or method not in TABLEAUX:
+        return ""
+    grown = np.r_[_grown(a, clock.y[ex.NOW]), _grown(a, clock.y[ex.NEW])]
+    if not len(grown) or not grown.max() > ASTRAY:
+        return ""
+    longest, rate = longest_stable(a, tableau(method))
+    if not step > longest:
+        return ""
+    return (
+        f"a step of {step:g} s is too long for {method}: what changes fastest where it begins does so at {rate:.3g} "
+        f"1/s, which this method follows stably in steps of up to {longest:.2g} s. Give such a step, or leave step "
+        f"out, and its width is chosen; or take method='radau'"
+    )
+
+
+def boundless(a: Assembly, clock: ex.Clock, named: Named) -> str:
+    """What has grown beyond all bounds, if something has."""
+    y, grown = clock.y[ex.NOW], _grown(a, clock.y[ex.NOW])
+    if not len(grown) or not grown.max() > BOUNDLESS:
+        return ""
+    i = int(np.argmax(grown))
+    return (
+        f"the motion grows without bound: by t = {clock.real[ex.T]:.6g} s {_told(a, i, float(y[i]), named)}. "
+        f"Look for what drives it: a gain, a damping or a stiffness of the wrong sign, a controller that is unstable"
+    )
+
+
+def escaping(a: Assembly, clock: ex.Clock, named: Named) -> str:
+    """The state of a controller that runs off to infinity, or faster and faster, within a finite time, if one does.
+
+    Where there are no rows, nothing can lock, and coordinates and velocities are looked at, too.
+    """
+    s, t = a.compiled.structure, float(clock.real[ex.T])
+    y, rate, n = clock.y[ex.NOW], clock.K[0], _length(a)
+    first = s.nq + s.nv if s.rows else 0
+    with np.errstate(all="ignore"):
+        part = np.nan_to_num(np.abs(rate[first:n]) * clock.real[ex.H] / np.abs(y[first:n]))
+    if not len(part) or not part.max() > ESCAPING:
+        return ""
+    i = first + int(np.argmax(part))
+    return (
+        f"at t = {t:.6g} s {_told(a, i, float(y[i]), named)} and changes by {rate[i]:.3g} in a second, faster and "
+        f"faster: it has no value from there on. Look at the law of its rate"
+    )
+
+
+def longest_stable(a: Assembly, R: Tableau) -> tuple[float, float]:
+    """The longest step [s] in which a method follows stably all that does not grow by itself, where a motion begins.
+
+    And the rate [1/s] that decides; infinite and 0 if nothing does, or there is too much to look at.
+
+    By the stability function of the method (Hairer and Wanner 1996, section IV.2) at the eigenvalues of the derivatives
+    of (q, v, x)' by these, x being states of controllers; modes of what holds at times are those of now.
+    """
+    n = _length(a)
+    J = _jacobian(a, n) if 0 < n <= MOST else np.zeros((1, 1))
+    if not np.isfinite(J).all():
+        return np.inf, 0.0
+    modes = np.linalg.eigvals(J)
+    size = np.abs(modes)
+    modes = modes[(size > SMALL * size.max(initial=0.0)) & (modes.real <= FOREIGN * size)]
+    z = np.linspace(0.0, FARTHEST, FINELY)
+    powers = _stability(R)
+    longest, rate = np.inf, 0.0
+    for w in modes:
+        grows = np.abs(np.polynomial.polynomial.polyval(z * w / abs(w), powers)) > 1.0 + GROWS
+        edge = float(z[np.argmax(grows)]) if grows.any() else FARTHEST
+        if edge / abs(w) < longest:
+            longest, rate = edge / abs(w), float(abs(w))
+    return longest, rate
+
+
+def _stability(R: Tableau) -> np.ndarray:
+    """Coefficients of the stability function: 1 + z b.(1 + z A 1 + z^2 A^2 1 + ...)."""
+    s = int(R.order_i[1])
+    A, b, x, out = R.A[:s, :s], R.A[s, :s], np.ones(s), [1.0]
+    for _ in range(s):
+        out.append(float(b @ x))
+        x = A @ x
+    return np.array(out)
+
+
+def _jacobian(a: Assembly, n: int) -> np.ndarray:
+    """Derivatives of the first ``n`` rates by what they are the rates of, by differences; the run's scratch is left."""
+    c, y = a.compiled, a.y
+    other = c.again()
+    other.work.switch[:], other.work.option[:] = c.work.switch, c.work.option
+    other.work.sensed[VALUE] = c.work.sensed[VALUE]
+
+    def rates(x: np.ndarray) -> np.ndarray:
+        status, dy = evaluate(other.values.system, other.work, a.t, x, MOTION)
+        return dy[:n].copy() if status == 0 else np.full(n, np.nan)
+
+    here, out = rates(y.copy()), np.zeros((n, n))
+    for k in range(n):
+        x = y.copy()
+        x[k] += SMALL * max(abs(x[k]), 1.0)
+        out[:, k] = (rates(x) - here) / (x[k] - y[k])
+    return out
+
+
+def _grown(a: Assembly, y: np.ndarray) -> np.ndarray:
+    """Coordinates, velocities and states over what they began with, or a unit; 0 for what is no number."""
+    n = _length(a)
+    return np.nan_to_num(np.abs(y[:n]), nan=0.0) / np.maximum(np.abs(a.y[:n]), 1.0)
+
+
+def _length(a: Assembly) -> int:
+    """How many coordinates, velocities and states of continuous controllers there are."""
+    s = a.compiled.structure
+    return s.nq + s.nv + len(s.controls) - len(s.sampled)
+
+
+def _told(a: Assembly, i: int, value: float, named: Named) -> str:
+    """A component and what it is."""
+    s = a.compiled.structure
+    if i >= s.nq + s.nv:
+        return f"{named(a, i)} is {value:.3g}"
+    return f"{'a coordinate' if i < s.nq else 'a velocity'} of {named(a, i)} is {value:.3g}"
