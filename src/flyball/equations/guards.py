@@ -169,14 +169,16 @@ def grains(S, W, t, trial, so_far, out):
             out[g] = NOISE * strongest
         elif kind == G_LAW or kind == G_CORNER:
             at = of if kind == G_LAW else S.switch_i[of, SWITCH_LAW]
-            out[g] = law_grain(S, W, t, at, trial, (so_far, strongest))
+            most_of = (so_far, 1.0, strongest) if kind == G_LAW else (fastest, 0.0, strongest)
+            out[g] = law_grain(S, W, t, at, trial, most_of)
 
 
 @formula
 def law_grain(S, W, t, at, trial, most_of):
-    """By how much a law changes with the last places of what it is asked with; ``most_of``: largest rate, and force.
+    """By how much a law changes with the last places of what it is asked with.
 
-    Of each by itself: what is zero by symmetry does not change as all of them do.
+    Of each by itself: what is zero by symmetry does not change as all of them do. ``most_of``: the largest rate, 1 where
+    rates count as no less than the mechanism's own, the largest force.
     """
     nm, first, last = measured(S), loads_end(S, W), column_of(S, W, 0)
     f = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), W.sensed)
@@ -189,9 +191,10 @@ def law_grain(S, W, t, at, trial, most_of):
             continue
         x, dx = W.sensed[VALUE, m], 0.0
         if m < 2 * nm:
-            dx = GRAIN * max(magnitude(x), S.glob[UNIT + m] if m < nm else max(most_of[0], pace(S, m - nm)))
+            least = S.glob[UNIT + m] if m < nm else max(most_of[0], most_of[1] * pace(S, m - nm))
+            dx = GRAIN * max(magnitude(x), least)
         elif m >= first and m < last:
-            dx = NOISE * most_of[1]
+            dx = NOISE * most_of[2]
         trial[VALUE, m] = x + dx
         g = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), trial)
         if not g - g == 0.0:

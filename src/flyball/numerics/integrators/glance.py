@@ -9,7 +9,7 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from .clock import BETWEEN, PART, T
 from .concave import BLURRED, FAR, ODD, borne_out
-from .grains import hush
+from .grains import blur
 from .loop import WITHIN
 from .watching import END, LEAST, LOOKS, LOST, MISS, MOST, PLAIN, SOUGHT, START, TERMS, THERE, TRUE, TRULY
 
@@ -78,7 +78,7 @@ def compare(look, S, W, t, h, span):
     for i in range(ng):
         low, high, miss = W.g[LEAST, i], W.g[MOST, i], W.g[MISS, i]
         if miss == 0.0 or miss <= ODD * (high - low) + BLURRED * max(abs(low), abs(high)) + min(
-            hush(W, i, 0.0), hush(W, i, 1.0)
+            blur(W, i, 0.0), blur(W, i, 1.0)
         ):
             continue
         if miss < FAR * low or miss < -FAR * high:

@@ -11,7 +11,7 @@ from ...compiler.jit import formula
 from .clock import LARGEST, T
 from .concave import BLURRED, NOISE, ODD, bent
 from .glance import glance
-from .grains import RESOLVED, gone, hush, rounding
+from .grains import RESOLVED, blur, corner, gone, hush, rounding
 from .watching import (
     AWAY,
     CHECKS,
@@ -165,7 +165,7 @@ def restless(W, i):
     low, high = extent(W, i)
     if not finite(low, high):  # not watched, or not everywhere
         return finite(W.g[NODE, i], 0.0) or finite(W.g[NODE + NODES - 1, i], 0.0)
-    if max(abs(low), abs(high)) < NOTHING + quiet(W, i):
+    if max(abs(low), abs(high)) < NOTHING + (0.0 if corner(W, i) else quiet(W, i)):
         return False
     most = QUIET * (high - low)
     if low > most and W.g[SIDE, i] >= 0.0:
@@ -180,7 +180,7 @@ def restless(W, i):
 @formula
 def quiet(W, i):
     """What is rounding of guard i anywhere in the panel."""
-    return min(hush(W, i, W.real[PANEL]), hush(W, i, W.real[PANEL] + W.real[WIDTH]))
+    return min(blur(W, i, W.real[PANEL]), blur(W, i, W.real[PANEL] + W.real[WIDTH]))
 
 
 @formula
@@ -289,7 +289,7 @@ def begin_sides(callbacks, S, W, R, c, h):
     if W.count[FRESH] == 0 and not doubtful(W):
         for i in range(ng):
             W.g[SIDE, i] = W.side[i]
-            W.g[MARK, i] = hush(W, i, 0.0) if W.side[i] == 0.0 and W.kept[i] == 0 else -1.0
+            W.g[MARK, i] = blur(W, i, 0.0) if W.side[i] == 0.0 and W.kept[i] == 0 else -1.0
         return -1, 0.0, 0.0, 0.0
     if not begins_near(callbacks, S, W, R, c, h):
         return -1, 0.0, 0.0, 0.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from .clock import LARGEST, TRIED, ULP, T
 from .glance import true_guard
-from .grains import hush
+from .grains import blur, hush
 from .loop import TRY
 from .panels import fires
 from .watching import AGAIN, BEYOND, BRACKET, END, MARK, START
@@ -44,7 +44,7 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
         return status, -1.0
     if a <= 0.0 and W.kept[i] == 0 and abs(fa) <= W.g[MARK, i]:
         fa = 0.0  # on no side: it is rounding
-    elif a <= 0.0 and s * W.side[i] == 1.0 and s * fa <= 0.0 and -s * fa <= hush(W, i, 0.0):
+    elif a <= 0.0 and s * W.side[i] == 1.0 and s * fa <= 0.0 and -s * fa < hush(W, i, 0.0):
         status, fb = true_guard(callbacks, S, W, R, c, h, last, i)  # the step before ended beside it
         return status, (CLOSE if s * fb < -hush(W, i, last) else -1.0)
     if not s * fa > 0.0:  # it is on that side nowhere before: only for a while, perhaps, or not at all
@@ -215,7 +215,7 @@ def end_on(callbacks, S, W, R, c, h, slope, i, s, between):
             h = halved(h, low, high, stride, bound, high < most, s * f > 0.0)
             stride *= 8.0
     f = W.g[END, i]
-    there = abs(f) <= max(SOMEWHERE * near * abs(slope), hush(W, i, 1.0))
+    there = abs(f) <= max(SOMEWHERE * near * abs(slope), blur(W, i, 1.0))
     found = there or (not s * f > 0.0 and (not least > 0.0 or bound or done))
     return status, found
 

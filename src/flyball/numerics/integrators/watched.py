@@ -126,7 +126,7 @@ def known_sides(W, c, h):
                 nothing = max(nothing, NOISE * abs(f))
         elif W.kept[i] == 0 and f - f == 0.0 and abs(f) > nothing:
             W.side[i] = side_of(f)
-        elif W.kept[i] == 0 and abs(f) <= hush(W, i, 1.0):  # it may be about to pass: it has not yet
+        elif W.kept[i] == 0 and abs(f) < hush(W, i, 1.0):  # it may be about to pass: it has not yet
             W.side[i] = s if s != 0.0 else UNKNOWN
         W.g[MARK, i] = nothing
 
