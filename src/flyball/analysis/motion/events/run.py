@@ -323,7 +323,7 @@ class Run:
         self.pauses.happened()
         clock.count[ex.STARTED] = 0
         at, over = here.t, self.guarded and not here.stopped and self.legs.over()
-        before = {g: x for g, x in expressions(here).items() if g not in fired} if over else {}
+        was = {g: x for g, x in expressions(here).items() if g not in fired} if over else {}
         self.legs.passed()
         if here.c.system is not system:  # another value of a parameter: laws have other corners
             self.legs.whole()
@@ -337,7 +337,7 @@ class Run:
             clock.real[ex.H] = min(clock.real[ex.H], clock.real[ex.WIDE] or clock.real[ex.H])
             here.fresh = False
         if over and here.t > at:  # laws may jump at the same instant
-            self.jumped(before)
+            self.jumped(was)
 
     def jumped(self, before: Mapping[int, float]) -> None:
         """Forces may have jumped: what held may not hold any more, or what was at a stop be pressed on it.
