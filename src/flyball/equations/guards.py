@@ -177,8 +177,8 @@ def grains(S, W, t, trial, so_far, out):
 def law_grain(S, W, t, at, trial, most_of):
     """By how much a law changes with the last places of what it is asked with.
 
-    Of each by itself: what is zero by symmetry does not change as all of them do. ``most_of``: the largest rate, 1 where
-    rates count as no less than the mechanism's own, the largest force.
+    Of each by itself: what is zero by symmetry does not change as all of them do. ``most_of``: the largest rate, 1
+    where rates count as no less than the mechanism's own, the largest force.
     """
     nm, first, last = measured(S), loads_end(S, W), column_of(S, W, 0)
     f = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), W.sensed)
