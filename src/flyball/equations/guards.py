@@ -149,10 +149,10 @@ def distance(S, m, x, rate):
 
 
 @formula
-def grains(S, W, t, trial, out):
+def grains(S, W, t, trial, so_far, out):
     """What is rounding of every guard at the state last evaluated, into ``out`` (ng,).
 
-    ``trial`` is scratch of the shape of ``W.sensed``.
+    ``trial`` is scratch of the shape of ``W.sensed``, ``so_far`` the fastest rate: what was rounded of that is kept.
     """
     fastest, strongest = quickest(S, W), 0.0
     for k in range(S.row_i.shape[0]):
@@ -169,28 +169,50 @@ def grains(S, W, t, trial, out):
             out[g] = NOISE * strongest
         elif kind == G_LAW or kind == G_CORNER:
             at = of if kind == G_LAW else S.switch_i[of, SWITCH_LAW]
-            out[g] = law_grain(S, W, t, at, trial, (fastest, strongest))
+            most_of = (so_far, 1.0, strongest) if kind == G_LAW else (fastest, 0.0, strongest)
+            out[g] = law_grain(S, W, t, at, trial, most_of)
 
 
 @formula
 def law_grain(S, W, t, at, trial, most_of):
-    """By how much a law changes with the last places of what it is asked with; ``most_of``: largest rate, and force."""
+    """By how much a law changes with the last places of what it is asked with.
+
+    Of each by itself: what is zero by symmetry does not change as all of them do. ``most_of``: the largest rate, 1
+    where rates count as no less than the mechanism's own, the largest force.
+    """
     nm, first, last = measured(S), loads_end(S, W), column_of(S, W, 0)
     f = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), W.sensed)
-    most = GRAIN * magnitude(f)
-    for n in range(3):  # all up; of two, and of four, one half up and the other down
-        for m in range(trial.shape[1]):
-            x = W.sensed[VALUE, m]
-            way = 1.0 if n == 0 or (m // n) % 2 == 0 else -1.0
-            if m < 2 * nm:
-                x += way * GRAIN * max(magnitude(x), S.glob[UNIT + m] if m < nm else most_of[0])
-            elif m >= first and m < last:
-                x += way * NOISE * most_of[1]
-            trial[VALUE, m] = x
+    for m in range(trial.shape[1]):
+        trial[VALUE, m] = W.sensed[VALUE, m]
+    total = GRAIN * magnitude(f)
+    for i in range(at + 2, at + 2 + 2 * S.code[at], 2):
+        m = S.code[i + 1]
+        if S.code[i] != SENSOR or named_before(S, at, i):
+            continue
+        x, dx = W.sensed[VALUE, m], 0.0
+        if m < 2 * nm:
+            least = S.glob[UNIT + m] if m < nm else max(most_of[0], most_of[1] * pace(S, m - nm))
+            dx = GRAIN * max(magnitude(x), least)
+        elif m >= first and m < last:
+            dx = NOISE * most_of[2]
+        trial[VALUE, m] = x + dx
         g = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), trial)
-        if g - g == 0.0:
-            most = max(most, magnitude(g - f))
-    return most
+        if not g - g == 0.0:
+            trial[VALUE, m] = x - dx
+            g = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), trial)
+        total += magnitude(g - f) if g - g == 0.0 else 0.0
+        trial[VALUE, m] = x
+    return total
+
+
+@formula
+def named_before(S, at, i):
+    """Whether what step i of the law at ``at`` reads is read by an earlier one."""
+    n = 0
+    for k in range(at + 2, i, 2):
+        if S.code[k] == SENSOR and S.code[k + 1] == S.code[i + 1]:
+            n += 1
+    return n > 0
 
 
 @formula

@@ -21,7 +21,7 @@ from ..numerics.integrators.expected import expect
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.integrators.watched import begun, onward
-from ..numerics.integrators.watching import ASTRAY, GRAIN_END, GRAIN_START, START, Watch, watching
+from ..numerics.integrators.watching import ASTRAY, FASTEST, GRAIN_END, GRAIN_START, START, Watch, watching
 from ..tables.system import (
     BIAS,
     G_BACK,
@@ -125,7 +125,8 @@ def note(A, K, row):
     balanced(A)
     all_guards(A, W, A[OWN].real[T], K, row)
     grain = GRAIN_START if row == START else GRAIN_END
-    grains(S, W, A[OWN].real[T], A[EXPECTED].sensed, K.g[grain])
+    K.real[FASTEST] = max(K.real[FASTEST], quickest(S, W))
+    grains(S, W, A[OWN].real[T], A[EXPECTED].sensed, K.real[FASTEST], K.g[grain])
     astray(S, W, A[OWN].real[T], A[OWN].real[SPAN], K.g[ASTRAY])
     last = K.grain.shape[0] - 1
     if S.guard_i[last, GUARD_KIND] == G_SHARED:

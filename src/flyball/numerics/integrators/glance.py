@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from ...compiler.jit import formula
 from .clock import BETWEEN, PART, T
-from .concave import BLURRED, FAR, NOISE, ODD, borne_out
+from .concave import BLURRED, FAR, ODD, borne_out
+from .grains import blur
 from .loop import WITHIN
 from .watching import END, LEAST, LOOKS, LOST, MISS, MOST, PLAIN, SOUGHT, START, TERMS, THERE, TRUE, TRULY
 
@@ -76,7 +77,9 @@ def compare(look, S, W, t, h, span):
         return
     for i in range(ng):
         low, high, miss = W.g[LEAST, i], W.g[MOST, i], W.g[MISS, i]
-        if miss == 0.0 or miss <= ODD * (high - low) + BLURRED * max(abs(low), abs(high)) + NOISE * W.grain[i]:
+        if miss == 0.0 or miss <= ODD * (high - low) + BLURRED * max(abs(low), abs(high)) + min(
+            blur(W, i, 0.0), blur(W, i, 1.0)
+        ):
             continue
         if miss < FAR * low or miss < -FAR * high:
             continue

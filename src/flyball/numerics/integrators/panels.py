@@ -8,9 +8,10 @@ whether that is so, else the panel is halved. `glance.glance` writes the guards 
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from .clock import LARGEST, ULP, T
+from .clock import LARGEST, T
 from .concave import BLURRED, NOISE, ODD, bent
 from .glance import glance
+from .grains import RESOLVED, blur, corner, gone, hush, rounding
 from .watching import (
     AWAY,
     CHECKS,
@@ -19,7 +20,6 @@ from .watching import (
     END,
     FIRED,
     FRESH,
-    GRAIN_START,
     LEAST,
     LOOKS,
     MARK,
@@ -51,7 +51,6 @@ AT_FIRST = 2.0**-40  # part of a step over which slopes at its start are found
 CLOSEST, FARTHEST = 44, 5  # powers of a half: places near the start where a guard that begins at zero is looked at
 NEAR = 1e-6  # part of its size in a step by which a guard that has just fired is not more than about zero
 ROUNDING = 1e-12  # part of its size in a step by which any other guard is not more than zero
-RESOLVED = 16.0 * ULP  # part of the largest time that is none
 
 
 @formula
@@ -116,7 +115,7 @@ def resolved(W):
         if not finite(low, high):
             continue
         odd = CLOSELY if hidden(W, i) else ODD
-        allowed = odd * (high - low) + BLURRED * max(abs(low), abs(high)) + NOISE * W.grain[i]
+        allowed = odd * (high - low) + BLURRED * max(abs(low), abs(high)) + quiet(W, i)
         for j in range(CHECKS):
             f = W.g[NODE + NODES + j, i]
             for k in range(NODES):
@@ -166,7 +165,7 @@ def restless(W, i):
     low, high = extent(W, i)
     if not finite(low, high):  # not watched, or not everywhere
         return finite(W.g[NODE, i], 0.0) or finite(W.g[NODE + NODES - 1, i], 0.0)
-    if max(abs(low), abs(high)) < NOTHING + W.kept[i] * NOISE * W.grain[i]:
+    if max(abs(low), abs(high)) < NOTHING + (0.0 if corner(W, i) else quiet(W, i)):
         return False
     most = QUIET * (high - low)
     if low > most and W.g[SIDE, i] >= 0.0:
@@ -176,6 +175,12 @@ def restless(W, i):
         W.g[SIDE, i] = -1.0
         return False
     return True
+
+
+@formula
+def quiet(W, i):
+    """What is rounding of guard i anywhere in the panel."""
+    return min(blur(W, i, W.real[PANEL]), blur(W, i, W.real[PANEL] + W.real[WIDTH]))
 
 
 @formula
@@ -209,10 +214,11 @@ def passing(W, i):
         if s * d < 0.0 and s * d1 >= 0.0:  # it goes towards zero, and away again
             z = x + (y - x) * d / (d - d1)
             fz, _ = value(W, z)
-            if (s * fz <= 0.0 and fires(W.way[i], s)) or (s * fz <= graze and s * f1 > 0.0):
+            left = gone(W, i, s, fz, within(W, z)) and fires(W.way[i], s)
+            if left or (s * fz <= graze and s * f1 > 0.0):
                 W.g[SIDE, i] = s
-                return x, z if s * fz <= 0.0 and fires(W.way[i], s) else y
-        if s * f1 <= 0.0 and s != 0.0 and (f1 != 0.0 or fires(W.way[i], s)):
+                return x, z if left else y
+        if s != 0.0 and gone(W, i, s, f1, within(W, y)) and (f1 != 0.0 or fires(W.way[i], s)):
             if fires(W.way[i], s):
                 W.g[SIDE, i] = s
                 return x, y
@@ -232,7 +238,7 @@ def jumping(W, i):
         f = W.g[NODE + j, i]
         if f != f:
             s = 0.0
-        elif s * f <= 0.0 and s != 0.0 and (f != 0.0 or fires(W.way[i], s)):
+        elif s != 0.0 and gone(W, i, s, f, within(W, W.nodes[j])) and (f != 0.0 or fires(W.way[i], s)):
             if fires(W.way[i], s):
                 W.g[SIDE, i] = s
                 return W.nodes[j - 1], W.nodes[j]
@@ -241,6 +247,12 @@ def jumping(W, i):
             s = side_of(f)
     W.g[SIDE, i] = s
     return 0.0, -1.0
+
+
+@formula
+def within(W, y):
+    """What place in the step a place in the panel is."""
+    return W.real[PANEL] + W.real[WIDTH] * y
 
 
 @formula
@@ -277,7 +289,7 @@ def begin_sides(callbacks, S, W, R, c, h):
     if W.count[FRESH] == 0 and not doubtful(W):
         for i in range(ng):
             W.g[SIDE, i] = W.side[i]
-            W.g[MARK, i] = NOISE * W.g[GRAIN_START, i] if W.side[i] == 0.0 and W.kept[i] == 0 else -1.0
+            W.g[MARK, i] = blur(W, i, 0.0) if W.side[i] == 0.0 and W.kept[i] == 0 else -1.0
         return -1, 0.0, 0.0, 0.0
     if not begins_near(callbacks, S, W, R, c, h):
         return -1, 0.0, 0.0, 0.0
@@ -326,19 +338,13 @@ def begins_near(callbacks, S, W, R, c, h):
         nothing = 0.0
         if W.kept[i] == 0 and finite(low, high):
             slope = min(high - low, abs(W.g[THERE, i] - W.g[START, i]) / first) / h
-            nothing = max(rounding(W, c, i, slope, GRAIN_START), NOISE * W.g[FIRED, i] if just else 0.0)
+            nothing = max(rounding(W, c, i, slope, 0.0), NOISE * W.g[FIRED, i] if just else 0.0)
         if finite(low, high) and (below or now <= max((NEAR if just else ROUNDING) * size, nothing)):
             W.g[SIDE, i] = 0.0
             mark = deeper(W, i) * now if just or below else ROUNDING * size
             W.g[MARK, i] = max(mark, W.kept[i] * NOISE * W.grain[i], nothing)
             near = True
     return near
-
-
-@formula
-def rounding(W, c, i, slope, row):
-    """What is no more than rounding of a guard, of what it depends on, or of time, by which it changes so fast."""
-    return NOISE * W.g[row, i] + RESOLVED * max(abs(c.real[T]), c.real[LARGEST]) * abs(slope)
 
 
 @formula
@@ -355,7 +361,7 @@ def begun(W):
         if s == 0.0:
             if abs(f) > W.g[MARK, i]:
                 W.g[SIDE, i] = side_of(f)
-        elif s * f < 0.0:
+        elif s * f < -hush(W, i, 0.0):
             if fires(W.way[i], s):
                 return i
             W.g[SIDE, i] = side_of(f)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from ...compiler.jit import formula
 from .clock import LARGEST, TRIED, ULP, T
-from .concave import NOISE
 from .glance import true_guard
+from .grains import blur, hush
 from .loop import TRY
 from .panels import fires
-from .watching import AGAIN, BEYOND, BRACKET, END, GRAIN_END, MARK, START
+from .watching import AGAIN, BEYOND, BRACKET, END, MARK, START
 
 GOLDEN = 0.381966011250105
 ROUNDS = 60  # evaluations in which a bracket is closed, or an extremum found
@@ -44,6 +44,9 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
         return status, -1.0
     if a <= 0.0 and W.kept[i] == 0 and abs(fa) <= W.g[MARK, i]:
         fa = 0.0  # on no side: it is rounding
+    elif a <= 0.0 and s * W.side[i] == 1.0 and s * fa <= 0.0 and -s * fa < hush(W, i, 0.0):
+        status, fb = true_guard(callbacks, S, W, R, c, h, last, i)  # the step before ended beside it
+        return status, (CLOSE if s * fb < -hush(W, i, last) else -1.0)
     if not s * fa > 0.0:  # it is on that side nowhere before: only for a while, perhaps, or not at all
         b = last
         status, a, fa = lowest(callbacks, S, W, R, c, h, i, max(0.0, first - (last - first)), last, -s)
@@ -54,12 +57,14 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
         return status, -1.0
     if s * fb > 0.0:  # it may come back in between
         status, m, fm = lowest(callbacks, S, W, R, c, h, i, a, b, s)
-        if status != 0 or s * fm > 0.0:
+        if status != 0 or s * fm > (0.0 if W.kept[i] == 1 else -hush(W, i, m)):
             return status, -1.0
         if fires(W.way[i], s):
             b, fb = m, fm
         else:
             a, fa = m, fm
+    elif W.kept[i] == 0 and s * fb >= -hush(W, i, b) and not (fb == 0.0 and s * fa > hush(W, i, a)):
+        return 0, -1.0  # it gets to zero, and no farther
     begun = W.kept[i] == 0 and abs(W.g[START, i]) <= W.g[MARK, i]  # about zero, on no side
     if a > 0.0 and (begun or W.g[START, i] * fa < 0.0):
         W.real[BEYOND] = a
@@ -210,7 +215,7 @@ def end_on(callbacks, S, W, R, c, h, slope, i, s, between):
             h = halved(h, low, high, stride, bound, high < most, s * f > 0.0)
             stride *= 8.0
     f = W.g[END, i]
-    there = abs(f) <= max(SOMEWHERE * near * abs(slope), NOISE * W.g[GRAIN_END, i])
+    there = abs(f) <= max(SOMEWHERE * near * abs(slope), blur(W, i, 1.0))
     found = there or (not s * f > 0.0 and (not least > 0.0 or bound or done))
     return status, found
 

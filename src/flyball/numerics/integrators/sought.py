@@ -10,7 +10,8 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from .clock import EXTENDED, NEW, SPAN, T_END, TRIED, ULP, T
 from .glance import compare, exactly, glance, true_guard
-from .panels import band, begin_sides, fires, rounding, side_of, survey
+from .grains import hush, rounding, side_at_start
+from .panels import band, begin_sides, fires, side_of, survey
 from .pinned import crossing, end_on, retake
 from .watching import (
     ASTRAY,
@@ -21,12 +22,12 @@ from .watching import (
     DONE_TO,
     END,
     FRESH,
-    GRAIN_END,
     LOST,
     MARK,
     PLAIN,
     SAME,
     SIDE,
+    SLOPE,
     START,
     THERE,
     TRUE,
@@ -36,7 +37,10 @@ AT_ONCE = 1e-11  # part of the step within which events are at the same instant
 SKIPPED = 2.0**-20  # part of the step that is gone on by at least, where there was no event after all
 LITTLE = 1e-2  # part of the distance between places between which a guard passes zero over which its slope is found
 SOON = 1e-7  # part of the step before which no slope is found
-LAST = 1e-4  # part of the step over which slopes at its end are found
+LAST, LONGER = (
+    1e-4,
+    100.0,
+)  # part of the step over which slopes at its end are found; times as much where it is rounding
 OTHERS = 20  # guards that may turn out to be earlier
 HALVES = 44  # times that it is halved where a guard has been left unseen
 SHORTER = 6  # times that a step is made shorter since what begins at zero does not go as expected
@@ -146,10 +150,10 @@ def trespass(callbacks, S, W, R, c, h):
     """
     best, at, side, away = -1, 2.0, 0.0, 0
     for i in range(W.way.shape[0]):
-        f, s = W.g[END, i], side_of(W.g[START, i])
+        f, s = W.g[END, i], side_at_start(W, i)
         if W.fired[i] == 1 or not W.g[START, i] == W.g[START, i]:
             continue
-        if W.g[MARK, i] < 0.0 and s * f < 0.0 and fires(W.way[i], s):
+        if W.g[MARK, i] < 0.0 and s * f < -hush(W, i, 1.0) and fires(W.way[i], s):
             W.count[AWAY] = 0
             status, x = crossing(callbacks, S, W, R, c, h, i, 0.0, 1.0, s)
         elif (W.kept[i] == 1 and f < -band(W, i)) or f < -W.g[ASTRAY, i]:
@@ -196,13 +200,13 @@ def resume(callbacks, S, W, R, c, h, a, x):
         f, s = W.g[THERE, i], W.g[SIDE, i]
         if W.fired[i] == 1 or (W.kept[i] == 1 and f <= 0.0 and W.g[MARK, i] >= 0.0):
             continue
-        if s * f < 0.0 and fires(W.way[i], s):
+        if s * f < -hush(W, i, x) and fires(W.way[i], s):
             status, z = crossing(callbacks, S, W, R, c, h, i, a, x, s)
             if status != 0:
                 return LOST_SIGHT, -1, 0.0, 0.0
             if 0.0 < z < at:
                 best, at, side = i, z, s
-        elif f != 0.0 and f == f:
+        elif f == f and abs(f) > hush(W, i, x):
             W.g[SIDE, i] = side_of(f)
     return 0, best, at, side
 
@@ -223,14 +227,36 @@ def expected_slope(callbacks, S, W, R, c, h, x, i):
 
 
 @formula
+def slopes(callbacks, S, W, R, c, h):
+    """Slopes of guards at the end of the step into W.g[SLOPE]; 0 of what has none that is more than rounding.
+
+    Where it changes by no more than that so close to the end, it is asked farther off.
+    """
+    back, asked = LAST, True
+    for i in range(W.way.shape[0]):
+        W.g[SLOPE, i] = 0.0
+    while asked and back <= 1.0:
+        glance(callbacks, S, W, R, c, h, 1.0 - back, THERE)
+        asked = False
+        for i in range(W.way.shape[0]):
+            if W.g[SLOPE, i] != 0.0:
+                continue
+            change = W.g[END, i] - (W.g[THERE, i] if back < 1.0 else W.g[START, i])
+            if W.kept[i] == 1 or not abs(change) <= 2.0 * hush(W, i, 1.0):
+                W.g[SLOPE, i] = change / (back * h)
+            elif change != 0.0:
+                asked = True
+        back *= LONGER
+
+
+@formula
 def at_once(callbacks, S, W, R, c, h, first):
     """Note in W.fired all other guards that leave their sides with the first, at the end of the step."""
-    glance(callbacks, S, W, R, c, h, 1.0 - LAST, THERE)
+    slopes(callbacks, S, W, R, c, h)
     for i in range(W.way.shape[0]):
         if i == first:
             continue
-        f = W.g[END, i]
-        slope = (f - W.g[THERE, i]) / (LAST * h)
+        f, slope = W.g[END, i], W.g[SLOPE, i]
         came = -1.0 if slope > 0.0 else 1.0  # the side that it comes from
         if fires(W.way[i], came) and abs(f) <= W.real[SAME] * abs(slope) and slope != 0.0:
             W.fired[i] = 1
@@ -243,13 +269,12 @@ def at_the_end(callbacks, S, W, R, c, h):
     What passes zero at the very end belongs to the motion that ends there.
     """
     n = 0
-    glance(callbacks, S, W, R, c, h, 1.0 - LAST, THERE)
+    slopes(callbacks, S, W, R, c, h)
     for i in range(W.way.shape[0]):
-        f, s = W.g[END, i], W.g[SIDE, i]
+        f, s, slope = W.g[END, i], W.g[SIDE, i], W.g[SLOPE, i]
         if W.kept[i] == 1 or not f - f == 0.0:
             continue
-        slope = (f - W.g[THERE, i]) / (LAST * h)
-        if fires(W.way[i], s) and s * slope < 0.0 and abs(f) <= rounding(W, c, i, slope, GRAIN_END):
+        if fires(W.way[i], s) and s * slope < 0.0 and abs(f) <= rounding(W, c, i, slope, 1.0):
             W.fired[i] = 1
             n += 1
     return n > 0

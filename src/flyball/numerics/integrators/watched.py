@@ -12,8 +12,9 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from .clock import NEXT, NOW, STATUS, TRIED, WIDE, H, T
 from .concave import NOISE
+from .grains import hush, rounding, side_at_start, strayed
 from .loop import ENDED, ENTER, OVERLOOKED, ending, full, narrow, shorten, unclear, write
-from .panels import NEAR, rounding, side_of
+from .panels import NEAR, side_of
 from .sought import CUT, first_event
 from .watching import (
     CUTS,
@@ -43,6 +44,7 @@ def begun(callbacks, S, W, c, back):
     """See where guards are as a stretch of the motion begins, or where a step was taken back to. Returns a status."""
     watch, note = callbacks[5], callbacks[6]
     W.count[FRESH] = 1
+    strayed(W, c)
     if back:
         for i in range(W.side.shape[0]):
             W.side[i] = UNKNOWN
@@ -58,6 +60,7 @@ def onward(callbacks, S, W, R, c, out, used):
     ask, own, note = callbacks[0], callbacks[1], callbacks[6]
     most = c.real[TRIED]
     note(S, W, END)
+    strayed(W, c)
     if c.seen.shape[1] > 0 and ask(own, S, W, R, c, OVERLOOKED) != 0:
         narrow(c, 0.5 * most)
         return used, False
@@ -101,7 +104,8 @@ def see(watch, note, S, W, c):
     if status == 0:
         note(S, W, START)
     for i in range(W.side.shape[0]):  # what jumped since is on no known side
-        if abs(W.side[i]) == 1.0 and not W.side[i] * W.g[START, i] >= 0.5 * abs(W.g[END, i]):
+        f = W.side[i] * W.g[START, i] + 2.0 * hush(W, i, 0.0)
+        if abs(W.side[i]) == 1.0 and not f >= 0.5 * abs(W.g[END, i]):
             W.side[i] = UNKNOWN
     return status
 
@@ -113,8 +117,8 @@ def known_sides(W, c, h):
     So what is to fire next, however soon, is not taken for what has just fired. W.g[MARK] is what is zero of each.
     """
     for i in range(W.side.shape[0]):
-        f, slope = W.g[END, i], (W.g[MOST, i] - W.g[LEAST, i]) / h
-        nothing = rounding(W, c, i, slope, GRAIN_END)
+        f, s, slope = W.g[END, i], side_at_start(W, i), (W.g[MOST, i] - W.g[LEAST, i]) / h
+        nothing = rounding(W, c, i, slope, 1.0)
         W.side[i] = UNKNOWN
         if W.fired[i] == 1:
             W.side[i], W.g[FIRED, i] = 0.0, abs(f)
@@ -122,6 +126,8 @@ def known_sides(W, c, h):
                 nothing = max(nothing, NOISE * abs(f))
         elif W.kept[i] == 0 and f - f == 0.0 and abs(f) > nothing:
             W.side[i] = side_of(f)
+        elif W.kept[i] == 0 and abs(f) < hush(W, i, 1.0):  # it may be about to pass: it has not yet
+            W.side[i] = s if s != 0.0 else UNKNOWN
         W.g[MARK, i] = nothing
 
 

@@ -12,15 +12,16 @@ FALLING, EITHER, RISING = -1, 0, 1
 # rows of Watch.g: guards at the start and end of the step; of the equations within; expected within; sides in the
 # making; what is zero of those that begin near it; what they were as they fired; what is rounding of them at the start
 # and the end; least, largest and farthest from what is expected at stages; how far below zero they may end, nan where
-# that tells nothing; then at the nodes of a panel, and where these are checked
-START, END, TRUE, THERE, SIDE, MARK, FIRED, GRAIN_START, GRAIN_END, LEAST, MOST, MISS, ASTRAY, NODE = range(14)
+# that tells nothing; their slopes at the end; then at the nodes of a panel, and where these are checked
+START, END, TRUE, THERE, SIDE, MARK, FIRED, GRAIN_START, GRAIN_END, LEAST, MOST, MISS, ASTRAY, SLOPE, NODE = range(15)
 NODES, CHECKS = 8, 2
 GUARDS = NODE + NODES + CHECKS
 CHECKED = (0.131, 0.567)  # places in a panel, far from those that are the same in a half of it
 # entries of Watch.real: panel's begin and width; time within which events are at the same instant;
 # the part of the step that was looked through; where a guard that comes back is beyond zero; how far apart places are
-# between which it passes; when the last event was
-PANEL, WIDTH, SAME, DONE_TO, BEYOND, BRACKET, LATEST, REAL = range(8)
+# between which it passes; how many grains the state may be off by (`grains`); when the last event
+# was; the fastest rate so far
+PANEL, WIDTH, SAME, DONE_TO, BEYOND, BRACKET, STRAYED, LATEST, FASTEST, REAL = range(10)
 # entries of Watch.count: calls of the right-hand side since the step began; whether the side of guards near zero is to
 # be found; steps watched; places looked at; steps taken again; events; whether what is expected within it is borne
 # out; places looked at with the equations since it was taken, and in all; whether they could not be evaluated at one;
@@ -151,7 +152,7 @@ def watching(
         basis=basis(),
         nodes=np.r_[nodes(), CHECKED],
         checks=checks(),
-        real=np.r_[np.zeros(REAL - 1), -np.inf],
+        real=np.r_[np.zeros(LATEST), -np.inf, 0.0],
         count=np.zeros(COUNT, np.int64),
         stages=kept,
         met=met,

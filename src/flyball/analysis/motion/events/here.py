@@ -57,6 +57,8 @@ class Here:
         Guard -> what is zero of it at the instant, where that is known.
     zero : dict
         Event -> what its guard was, in size, where it last fired: zero to rounding.
+    sides : dict
+        Event -> the side that its guard was last on, where the motion ends within rounding of zero.
     fresh : bool
         Whether forces or velocities jump at the instant: the next step is then no wider than those of late.
     decider : Instant, optional
@@ -107,6 +109,7 @@ class Here:
     true: list[str] = field(default_factory=list)
     nothing: Mapping[int, float] = field(default_factory=dict)
     zero: dict[str, float] = field(default_factory=dict)
+    sides: dict[str, float] = field(default_factory=dict)
 
     @property
     def c(self) -> Compiled:

@@ -71,11 +71,15 @@ class Legs:
 
     def passed(self) -> None:
         """Go on with the next one where nothing is left of this one; where that was the last, this is the end."""
-        real = self.clock.real
-        while self.goal - real[ex.T] <= SLIVER * real[ex.LARGEST]:
+        while self.over():
             if not self.next():
-                real[ex.T] = self.goal
+                self.clock.real[ex.T] = self.goal
                 break
+
+    def over(self) -> bool:
+        """Whether nothing is left of this one that could be a step."""
+        real = self.clock.real
+        return bool(self.goal - real[ex.T] <= SLIVER * real[ex.LARGEST])
 
     def aim(self) -> None:
         """Have the clock run to the end of the stretch."""

@@ -52,7 +52,7 @@ from .looked import DISTANCES, told
 from .pauses import Pauses
 from .sampling import sampling
 from .segments import Segments
-from .zeros import as_fired, as_grains, resume
+from .zeros import as_fired, as_grains, as_left, resume
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events
@@ -164,6 +164,7 @@ class Run:
             engine.end()
             if self.loop is not None and self.guarded:
                 here.watched = told(self.loop)
+                as_left(here, self.loop)
             if self.loop is not None and here.failed is None:
                 here.failed = self.loop.steps.failed
             here.method = self.pace.words()
@@ -321,18 +322,22 @@ class Run:
         self.part.decided()
         self.pauses.happened()
         clock.count[ex.STARTED] = 0
+        at, over = here.t, self.guarded and not here.stopped and self.legs.over()
+        was = {g: x for g, x in expressions(here).items() if g not in fired} if over else {}
+        self.legs.passed()
         if here.c.system is not system:  # another value of a parameter: laws have other corners
             self.legs.whole()
             self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end), self._until)
             other = self._sampling(here.t)
             if other is not None and self.sampling is not None and other.differs(self.sampling):
                 self.sampling = other
-        self.legs.passed()
         if self.loop is not None and here.c.work is not self.loop.W:
             self.loop = self._loop()
         if here.fresh:
             clock.real[ex.H] = min(clock.real[ex.H], clock.real[ex.WIDE] or clock.real[ex.H])
             here.fresh = False
+        if over and here.t > at:  # laws may jump at the same instant
+            self.jumped(was)
 
     def jumped(self, before: Mapping[int, float]) -> None:
         """Forces may have jumped: what held may not hold any more, or what was at a stop be pressed on it.

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....equations.watched import Loop
-from ....numerics.integrators.concave import NOISE
-from ....numerics.integrators.watching import END, FIRED, GRAIN_END, MARK, UNKNOWN
+from ....numerics.integrators.watching import END, FIRED, GRAIN_END, MARK, STRAYED, UNKNOWN
 from .actions import at_the_seam
 from .here import Here
 from .instant import instant_of
@@ -21,16 +20,26 @@ def as_fired(here: Here, loop: Loop) -> None:
 
 def as_grains(here: Here, loop: Loop) -> None:
     """Keep what is rounding of events' expressions where a step ended on a time at which forces jump."""
-    here.nothing = {g: NOISE * float(loop.desk.g[GRAIN_END, g]) for g in here.structure.events}
+    here.nothing = {g: float(loop.desk.real[STRAYED] * loop.desk.g[GRAIN_END, g]) for g in here.structure.events}
+
+
+def as_left(here: Here, loop: Loop) -> None:
+    """Keep the sides that events' expressions were on that are zero to rounding where the motion ends."""
+    desk, here.sides = loop.desk, {}
+    for g, e in here.structure.events.items():
+        near = abs(desk.g[END, g]) <= desk.real[STRAYED] * desk.g[GRAIN_END, g]
+        if near and abs(desk.side[g]) == 1.0:
+            here.sides[e.name] = float(desk.side[g])
 
 
 def resume(here: Here, loop: Loop) -> None:
     """Sides of events where a motion goes on: what happened at the very end of the one before has just happened.
 
-    What did not is ahead, however near. What has been taken off zero since is where it is, as within a motion.
+    What did not is ahead, however near: on the side that it was on before it was rounding. What has been taken off
+    zero since is where it is, as within a motion.
     """
     desk, told = loop.desk, at_the_seam(here)
     values = instant_of(here).guards()
     for g, e in here.structure.events.items():
-        desk.side[g] = 0.0 if e.name in told else np.sign(values[g]) or UNKNOWN
+        desk.side[g] = 0.0 if e.name in told else here.sides.get(e.name) or np.sign(values[g]) or UNKNOWN
         desk.g[END, g], desk.g[FIRED, g] = values[g], here.zero.get(e.name, 0.0)
