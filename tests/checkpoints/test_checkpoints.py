@@ -111,6 +111,15 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, monkeypatch):
     assert_same(run, m.simulate(4, checkpoint=path))
 
 
+@pytest.fixture
+def ctrl_c_interrupts():
+    """What runs in the background of a shell is begun deaf to it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c_interrupts")
 def test_an_interrupt_of_a_long_part_ends_it_in_order(tmp_path, monkeypatch):
     """Ctrl-C: what a part that should have ended long ago has computed is in the file, and not computed again."""
     path, sent = tmp_path / "run.nc", []
@@ -140,6 +149,7 @@ def test_an_interrupt_of_a_long_part_ends_it_in_order(tmp_path, monkeypatch):
     assert run["b.x"] == pytest.approx(plain["b.x"], abs=1e-3)
 
 
+@pytest.mark.usefixtures("ctrl_c_interrupts")
 def test_a_second_interrupt_ends_it_at_once(monkeypatch):
     monkeypatch.setattr(part, "OLD", 0.0)
     own = part.Part(0.0)
