@@ -36,10 +36,10 @@ from .clock import (
 )
 from .loop import BEGIN, ENDED, ENTER, OVERLOOKED, REFUSE, TRY, WITHIN, ending
 from .refusal import SAFETY, afresh, enter, refuse
-from .step import astray, attempt, defect, extend, first_step, interpolate, stretch, truly_astray
+from .step import astray, attempt, defect, extend, first_step, interpolate, stretch
 
-FAR = 2.5  # times the tolerance, or the error of a step if that is more, that the dense output may be off by
-FARTHER = 8.0  # the same where accuracy limits steps: so it is there, now and then
+FAR = 4.0  # times the error of a step, if that is more than the tolerance, that the dense output may be off by
+FARTHER = 8.0  # the same where accuracy limits steps, and of the tolerance: so it is there, now and then
 EDGE = 3.5  # h |lambda| of steps that stability may limit
 SOON = 20  # steps from one that is so refused to the next, by which the width of those to come is bounded
 EXTENDED_TO, CLEAR = 1, 2  # what c.count[EXTENDED] says: the stages of dense output are there; it is good
@@ -71,7 +71,7 @@ def within(derivative, S, W, R, c):
         return 1
     if c.count[EXTENDED] != CLEAR:
         c.count[EXTENDED] = EXTENDED_TO
-        if not clear(derivative, S, W, R, c):
+        if not clear(R, c):
             return 1
         c.count[EXTENDED] = CLEAR
     interpolate(R, c, c.real[PART], c.real[TRIED], c.y[BETWEEN])
@@ -79,7 +79,7 @@ def within(derivative, S, W, R, c):
 
 
 @formula
-def clear(derivative, S, W, R, c):
+def clear(R, c):
     """Whether the dense output is as good as steps are. If not, c.real[CLEARER] is a width at which it may be.
 
     Where stability limits steps, not accuracy, their ends are good and the dense output may be far off. A step that is
@@ -93,9 +93,7 @@ def clear(derivative, S, W, R, c):
     if gap <= 1.0:
         return True
     limited = stretch(R, c, h) > EDGE
-    most = (FAR if limited else FARTHER) * max(1.0, c.real[ERROR])
-    if gap > most:  # by the stages alone, which may tell too much: the equations are asked
-        gap = truly_astray(derivative, S, W, R, c, h)
+    most = max(1.0, FAR * c.real[ERROR]) if limited else FARTHER * max(1.0, c.real[ERROR])
     if gap <= most:
         return True
     c.real[CLEARER] = h * max(0.2, SAFETY * (gap / most) ** (-1.0 / R.order_i[0]))

@@ -26,7 +26,6 @@ from .clock import (
 
 BEYOND = 1e-3  # of a coordinate beyond the mechanism's size, what its tolerance still grows with
 LARGE = 1e300  # the error of a step that was not tried, or is no number
-EARLY, LATE = 0.35, 0.65  # parts of a step near which its dense output misses the equations most
 FIRST = 1e-7  # part of the largest step: the least that is tried first
 
 
@@ -255,22 +254,6 @@ def extend(derivative, S, W, R, c, h):
 
 
 @formula
-def misses(derivative, S, W, R, c, h, x, at, gap):
-    """What the dense output at t + x h, left in ``at``, misses of the equations, into ``gap``. Returns a status."""
-    interpolate(R, c, x, h, at)
-    if derivative(c.real[T] + x * h, at, gap, S, W) != 0:
-        return 1
-    for j in range(R.order_i[2]):
-        w = 0.0
-        for p in range(R.P.shape[1] - 1, -1, -1):
-            w = w * x + (p + 1.0) * R.P[j, p]
-        if w != 0.0:
-            for i in range(gap.shape[0]):
-                gap[i] -= w * c.K[j, i]
-    return 0
-
-
-@formula
 def defect(derivative, S, W, R, c, h, x):
     """By how much the dense output at t + x h misses the equations, times h, in units of the tolerance.
 
@@ -279,30 +262,17 @@ def defect(derivative, S, W, R, c, h, x):
     n = c.count[CONTROLLED]
     at = c.y[BETWEEN]
     gap = c.K[R.order_i[2]]
-    if misses(derivative, S, W, R, c, h, x, at, gap) != 0:
+    interpolate(R, c, x, h, at)
+    if derivative(c.real[T] + x * h, at, gap, S, W) != 0:
         return 1e300
+    for j in range(R.order_i[2]):
+        w = 0.0
+        for p in range(R.P.shape[1] - 1, -1, -1):
+            w = w * x + (p + 1.0) * R.P[j, p]
+        if w != 0.0:
+            for i in range(n):
+                gap[i] -= w * c.K[j, i]
     s = 0.0
     for i in range(n):
         s += (gap[i] / allowed(c, i, max(abs(c.y[NOW, i]), abs(at[i])))) ** 2
     return h * sqrt(s / max(n, 1))
-
-
-@formula
-def truly_astray(derivative, S, W, R, c, h):
-    """What `astray` estimates, by two evaluations at the parts EARLY and LATE of the step.
-
-    Where the solution is smooth, but not as exponentials are, `astray` may tell a hundred times too much. As the dense
-    output is right at both ends, its error is about h/7 times the most by which it misses the equations, which is near
-    these places: of suspected steps 1.0 of it in the median, 0.7 to 1.7 in 96 of 100.
-    """
-    gap = c.K[R.order_i[2]]
-    m = c.accounts.shape[0]
-    size = accountable(c)
-    most = 0.0
-    for x in (EARLY, LATE):
-        most = max(most, defect(derivative, S, W, R, c, h, x))
-        a = 0.0
-        for k in range(m):
-            a += (gap[c.accounts[k]] / size) ** 2
-        most = max(most, h * sqrt(a / max(m, 1)))
-    return most / 7.0
