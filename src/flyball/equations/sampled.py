@@ -43,6 +43,9 @@ from .tasks import INTEGRATE, MOTION
 PERIOD, OFFSET = range(2)  # columns of Samples.clock
 SAMPLED, STATE, LAW, LATER = range(4)  # columns of Samples.row: clock, state, law, whether it waits for all others
 NEAR = 1e-9  # of a period: a time that is an instant
+AFTER = (
+    8.0 * 2.0**-52
+)  # of a time: more than what an instant may be off by from the time that it stands for, by rounding
 ROWS = 64  # of output that are taken at once
 ENGINE, S_, W_, R_, CLOCK, SHEET, PLAN = range(7)
 
@@ -118,7 +121,8 @@ def sample(A):
     for late in range(2):
         for u in range(P.row.shape[0]):
             if P.row[u, LATER] == late and due(P, P.row[u, SAMPLED], t):
-                at = instant(P, P.row[u, SAMPLED])  # laws of time that jump there are those from then on
+                at = instant(P, P.row[u, SAMPLED])
+                at += AFTER * abs(at)  # laws of time that jump there are those from then on
                 P.value[u] = evaluate(S.code, S.const, P.row[u, LAW], W.stack, (at, 0.0, 0.0), W.sensed)
                 if late == 0:
                     W.sensed[VALUE, column_of(S, W, P.row[u, STATE])] = P.value[u]
