@@ -17,3 +17,13 @@ def slide(*controllers, force: str = "pid", **parameters: float) -> fb.Mechanism
 
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-12}
+
+
+def pendulum(ki: float) -> fb.Mechanism:
+    """A rod of 2 kg held at an angle r by a PID: the set point turns the weight's stiffness, 9.81 cos(r)."""
+    m = fb.Mechanism("pendulum", planar=True, gravity=(0, -9.81), parameters={"r": 0.7})
+    m.add(fb.Body("rod", mass=2.0, inertia=0.1, position=(0, -0.5)))
+    m.add(fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    m.add(fb.PID("pid", setpoint="r", measured="A.angle", kp=60, ki=ki, kd=20, filter=0.05))
+    m.add(fb.Motor("motor", "A", torque="pid"))
+    return m

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from tests.control.slide import slide
+from tests.control.slide import pendulum, slide
 
 
 @pytest.mark.parametrize("coordinates", ["joint", "absolute"])
@@ -25,12 +25,7 @@ def test_a_pi_on_a_mass_on_a_spring(coordinates):
 
 def test_where_it_rests():
     """A pendulum held at r by a PID: the integral carries the weight at every value; s^3 limits the gain again."""
-    m = fb.Mechanism("pendulum", planar=True, gravity=(0, -9.81), parameters={"r": 0.7})
-    m.add(fb.Body("rod", mass=2.0, inertia=0.1, position=(0, -0.5)))
-    m.add(fb.Revolute("A", "ground", "rod", at=(0, 0)))
-    m.add(fb.PID("pid", setpoint="r", measured="A.angle", kp=60, ki=400, kd=20, filter=0.05))
-    m.add(fb.Motor("motor", "A", torque="pid"))
-    locus = m.root_locus("r", np.linspace(0.1, 3.0, 6), equilibrium=True)
+    locus = pendulum(400).root_locus("r", np.linspace(0.1, 3.0, 6), equilibrium=True)
     for r, w in zip(locus.values, locus.eigenvalues, strict=True):
         k = 60 + 9.81 * np.cos(r)
         p = np.polyadd(np.polymul([0.05, 1], [0.6, 0, k, 400]), [20, 0, 0])

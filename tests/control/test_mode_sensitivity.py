@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 import flyball as fb
-from tests.control.slide import slide
+from tests.control.slide import pendulum, slide
 
 
 def by_polynomial(p, dp, w):
@@ -29,12 +29,7 @@ def test_gains_of_a_pi():
 
 def test_about_where_it_rests():
     """A pendulum held at r: the set point turns the weight's stiffness, w cos(r)."""
-    m = fb.Mechanism("pendulum", planar=True, gravity=(0, -9.81), parameters={"r": 0.7})
-    m.add(fb.Body("rod", mass=2.0, inertia=0.1, position=(0, -0.5)))
-    m.add(fb.Revolute("A", "ground", "rod", at=(0, 0)))
-    m.add(fb.PID("pid", setpoint="r", measured="A.angle", kp=60, ki=40, kd=20, filter=0.05))
-    m.add(fb.Motor("motor", "A", torque="pid"))
-    s = m.sensitivity(to=["r"], analysis="modes", about="equilibrium")
+    s = pendulum(40).sensitivity(to=["r"], analysis="modes", about="equilibrium")
     k, lag = 60 + 9.81 * np.cos(0.7), [0.05, 1]
     p = np.polyadd(np.polymul(lag, [0.6, 0, k, 40]), [20, 0, 0])
     dp = -9.81 * np.sin(0.7) * np.polymul(lag, [1, 0])

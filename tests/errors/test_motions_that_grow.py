@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.growth import longest_stable
 from flyball.analysis.motion.start import begin
+from flyball.analysis.motion.unbounded import longest_stable
 from flyball.numerics.integrators.tableaux import tableau
 from tests.control.slide import slide
 

@@ -14,6 +14,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from .patched import patched
+
 _SOUND: set[str] = set()  # functions, by their names in LLVM, that were translated here and return no error
 _FAILING: set[str] = set()  # those that may
 
@@ -24,34 +26,29 @@ def leanly() -> Iterator[None]:
 
     Raises
     ------
-    AttributeError
+    AttributeError, KeyError
         If Numba's internals are others.
     """
     from llvmlite.ir import IRBuilder
     from numba.core import base, callconv, cgutils, lowering
 
-    changed: list[tuple[Any, str, Any]] = [
-        (callconv.CPUCallConv, "_return_errcode_raw", _noted),
-        (lowering.Lower, "lower_normal_function", _remembered),
-        (lowering.Lower, "storevar", _stored),
-        (lowering.Lower, "alloca_lltype", _made_room),
-        (cgutils, "alloca_once", _zeroed_once),
-        (base, "user_function", _called),
-        (base.BaseContext, "get_function", _counted),
-        (base.BaseContext, "cast", _widened),
-        (IRBuilder, "insert_value", _put_together),
-        (IRBuilder, "extract_value", _taken_apart),
-        (base.BaseContext, "pair_first", _first),
-        (base.BaseContext, "pair_second", _second),
-    ]
-    before = [(owner, name, getattr(owner, name)) for owner, name, _ in changed]
-    for (owner, name, made), (*_, original) in zip(changed, before, strict=True):
-        setattr(owner, name, made(original))
-    try:
+    with patched(
+        [
+            (callconv.CPUCallConv, "_return_errcode_raw", _noted),
+            (lowering.Lower, "lower_normal_function", _remembered),
+            (lowering.Lower, "storevar", _stored),
+            (lowering.Lower, "alloca_lltype", _made_room),
+            (cgutils, "alloca_once", _zeroed_once),
+            (base, "user_function", _called),
+            (base.BaseContext, "get_function", _counted),
+            (base.BaseContext, "cast", _widened),
+            (IRBuilder, "insert_value", _put_together),
+            (IRBuilder, "extract_value", _taken_apart),
+            (base.BaseContext, "pair_first", _first),
+            (base.BaseContext, "pair_second", _second),
+        ]
+    ):
         yield
-    finally:
-        for owner, name, original in before:
-            setattr(owner, name, original)
 
 
 def _noted(original: Any) -> Any:

@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
+from .patched import patched
+
 
 @contextmanager
 def quickly() -> Iterator[None]:
@@ -19,31 +21,24 @@ def quickly() -> Iterator[None]:
 
     Raises
     ------
-    AttributeError
+    AttributeError, KeyError
         If Numba's internals are others.
     """
     from numba.core import ir, postproc
     from numba.core.targetconfig import TargetConfig
     from numba.core.typing.context import BaseContext
 
-    changed = [
-        (TargetConfig, {"values": _values, "__eq__": _equal, "__hash__": _hashed}),
-        (ir.Inst, {"_rec_list_vars": _variables_in(ir)}),
-        (BaseContext, {"resolve_function_type": _remembered(BaseContext.resolve_function_type)}),
-        (postproc.PostProcessor, {"run": _lifetimes_when_asked(postproc)}),
-    ]
-    before = [(owner, {name: owner.__dict__[name] for name in made}) for owner, made in changed]
-    _put(changed)
-    try:
+    with patched(
+        [
+            (TargetConfig, "values", lambda _: _values),
+            (TargetConfig, "__eq__", lambda _: _equal),
+            (TargetConfig, "__hash__", lambda _: _hashed),
+            (ir.Inst, "_rec_list_vars", lambda _: _variables_in(ir)),
+            (BaseContext, "resolve_function_type", _remembered),
+            (postproc.PostProcessor, "run", lambda _: _lifetimes_when_asked(postproc)),
+        ]
+    ):
         yield
-    finally:
-        _put(before)
-
-
-def _put(changes: list[tuple[Any, dict[str, Any]]]) -> None:
-    for owner, made in changes:
-        for name, value in made.items():
-            setattr(owner, name, value)
 
 
 @cache

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from .lean import struct
+from .patched import patched
 
 
 @contextmanager
@@ -19,19 +20,17 @@ def products_of_first_order() -> Iterator[None]:
     from numba.core import types
     from numba.core.base import BaseContext
 
-    original = BaseContext.get_function
+    def chosen(original: Any) -> Any:
+        def get_function(self: Any, fn: Any, sig: Any, **more: Any) -> Any:
+            known = getattr(fn, "typing_key", fn)
+            if known in (operator.mul, operator.imul) and all(isinstance(x, types.Complex) for x in sig.args):
+                return lambda builder, args, *_: _product(self, builder, sig, args)
+            return original(self, fn, sig, **more)
 
-    def chosen(self: Any, fn: Any, sig: Any, **more: Any) -> Any:
-        known = getattr(fn, "typing_key", fn)
-        if known in (operator.mul, operator.imul) and all(isinstance(x, types.Complex) for x in sig.args):
-            return lambda builder, args, *_: _product(self, builder, sig, args)
-        return original(self, fn, sig, **more)
+        return get_function
 
-    BaseContext.get_function = chosen
-    try:
+    with patched([(BaseContext, "get_function", chosen)]):
         yield
-    finally:
-        BaseContext.get_function = original
 
 
 def _product(context: Any, builder: Any, sig: Any, args: Any) -> Any:

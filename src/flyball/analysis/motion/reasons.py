@@ -44,10 +44,10 @@ from ..assembly.start import Assembly
 from ..compiled import Compiled
 from ..freedom.contradiction import story
 from .crossed import crossed
-from .growth import boundless, escaping, too_long
 from .jams import Unresolved, jam
 from .residual import missed
 from .samples import too_often
+from .unbounded import boundless, escaping, too_long
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at

@@ -37,10 +37,8 @@ AT_ONCE = 1e-11  # part of the step within which events are at the same instant
 SKIPPED = 2.0**-20  # part of the step that is gone on by at least, where there was no event after all
 LITTLE = 1e-2  # part of the distance between places between which a guard passes zero over which its slope is found
 SOON = 1e-7  # part of the step before which no slope is found
-LAST, LONGER = (
-    1e-4,
-    100.0,
-)  # part of the step over which slopes at its end are found; times as much where it is rounding
+LAST = 1e-4  # part of the step over which slopes at its end are found
+LONGER = 100.0  # times that part where a guard changes by no more than rounding over it
 OTHERS = 20  # guards that may turn out to be earlier
 HALVES = 44  # times that it is halved where a guard has been left unseen
 SHORTER = 6  # times that a step is made shorter since what begins at zero does not go as expected
