@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 Change = tuple[Any, str, Callable[[Any], Any]]
-"""A class or module, the name of something it has, its own or inherited, and what is made of that to stand in its place."""
+"""A class or module, the name of something it has, own or inherited, and what is made of that to stand there."""
 
 
 @contextmanager
