@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import gc
+import os
 
-import pytest
+for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(name, "1")  # before NumPy: threads of two test processes wait for each other, busily
 
-from tests.layers import LAYERS, take
+import pytest  # noqa: E402
+
+from tests.layers import LAYERS, take  # noqa: E402
 
 LONG = ("program/test_added_elements", "robust/test_random", "view/test_p", "checkpoints/", "identities/", "view/")
 """Files that take longest, wherever they stand: one that began last would leave one of two processes alone."""
