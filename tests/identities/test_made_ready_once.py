@@ -56,8 +56,8 @@ def same_tables(m: fb.Mechanism, chosen: random.Random) -> None:
         given = {k: (env[k] or 0.1) * (1.0 + 1e-3 * chosen.random()) for k in some}
         if chosen.random() < 0.2:
             given = {k: complex(v, 1e-30) for k, v in given.items()}
+        fresh = deepcopy(m)  # asked for these values only
         for choices in (Choices(), *([Choices(tree=tree)] if tree else [])):
-            fresh = deepcopy(m)
             try:
                 wanted = bits(values(structure(fresh, choices), given))
             except FlyballError:
