@@ -17,7 +17,7 @@ def reckon(address, tables, constants):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def one_after_another(asked, task, made, cells, new, at, x, ends, told, out):  # type: ignore[no-untyped-def]
+def one_after_another(asked, task, then, made, cells, new, at, x, ends, told, out):  # type: ignore[no-untyped-def]
     """Have a task done for each row of ``x``, until one ends as it should not.
 
     Parameters
@@ -25,6 +25,8 @@ def one_after_another(asked, task, made, cells, new, at, x, ends, told, out):  #
     asked : (6,) int64
         The door's address and those of its tuples (`bound.Bound.asked`).
     task : int
+    then : (8,) int64
+        The same of what is done after a task that ended as it should, a cell that is 0 then, and the task; 0: nothing.
     made : (3,) int64
         Address of what reckons constants of made code from the tables, of these, and where they go; 0: there is none.
     cells, new : (m,) int64
@@ -53,10 +55,14 @@ def one_after_another(asked, task, made, cells, new, at, x, ends, told, out):  #
         if made[0] != 0:
             reckon(made[0], made[1], made[2])
         found = ask(asked, task)
+        good = found == ends[0] and cells[ends[1]] == ends[2]
+        if good and then[0] != 0:
+            cells[then[6]] = 0
+            ask(then, then[7])
         out[k, 0] = found
         for i in range(told.shape[0]):
             out[k, 1 + i] = cells[told[i]]
-        if found != ends[0] or cells[ends[1]] != ends[2]:
+        if not good:
             return k
     return x.shape[0]
 

@@ -27,6 +27,7 @@ from ..motion.reasons import remarks
 from ..motion.rounding import remarkable
 from ..motion.stiff import EXPLICIT, Pace
 from ..simulate import clock_for
+from ..simulate import width as wide
 from .codes import Code
 from .spread import TABLES, Place, system_of
 from .track import Batch, Track
@@ -50,7 +51,7 @@ class Done:
     places : list
         In which group each is.
     rows : (n, times, ...) ndarray
-        Their output, without accelerations and reactions.
+        Their output, with accelerations and multipliers where these are asked for.
     steps, worst : (n,) ndarray
         How many steps each took, and how open constraints got.
     excess, atol, far : (n,) ndarray
@@ -83,17 +84,14 @@ class Desk:
         self._most = 1  # runs in a call
         self.call = Track.run
 
-    def compute(self, points: np.ndarray, stopped: Callable[[], bool], singly: bool = False) -> Iterator[Done]:
-        """The runs at some points, as they are done; those that are left out are for themselves.
-
-        ``singly``: each by a call of its own.
-        """
+    def compute(self, points: np.ndarray, stopped: Callable[[], bool]) -> Iterator[Done]:
+        """The runs at some points, as they are done; those that are left out are for themselves."""
         for batch in self._filler.batches(points):
             for code, some in self._by_code(batch):
                 if id(code) not in self._loops:
                     x = replace(self._values, system=system_of(self.of.values))
                     self._loops[id(code)] = Loop(self.of, x, code)
-                yield from self._calls(self._loops[id(code)], some, stopped, singly)
+                yield from self._calls(self._loops[id(code)], some, stopped)
 
     def _by_code(self, batch: Batch) -> Iterator[tuple[Code | None, Batch]]:
         """The runs of each made code; those for which there is none are left out."""
@@ -117,10 +115,10 @@ class Desk:
         for code, some in runs.values():
             yield code, batch.some(some)
 
-    def _calls(self, loop: Loop, batch: Batch, stopped: Callable[[], bool], singly: bool) -> Iterator[Done]:
+    def _calls(self, loop: Loop, batch: Batch, stopped: Callable[[], bool]) -> Iterator[Done]:
         own, n, at = loop.track.begin(batch), len(batch.runs), 0
         while at < n and not stopped():
-            some = slice(at, min(n, at + (1 if singly else self._most)))
+            some = slice(at, min(n, at + self._most))
             x = own[0], own[1][some]
             out = np.zeros((len(x[1]), 1 + len(loop.told)), np.int64)
             begin = time.perf_counter()
@@ -160,20 +158,20 @@ class Loop:
             c.run_on(code.made)
         self.start = start = replace(of.begun, assembly=replace(a, compiled=c))
         clock = clock_for(start, start.base.t, float(o.t_end), times, o, sampled_laws(c, NO_BREAKS))
-        self.later = open_until_asked(start, o, INTEGRATE)
-        c.work.option[LATER] = float(self.later)
+        c.work.option[LATER] = float(later := open_until_asked(start, o, INTEGRATE))
         forget(c.work.stack)
         self._pace = Pace(float(o.t_end), of.asked, partial(unsuited, of.begun))
         clock.count[ex.QUOTA] = self._pace.limited(clock, LONGEST)
-        ny, nt = len(of.begun.y), len(times)
-        width = 1 + ny + c.structure.nv + len(x.system.row_i) + len(c.structure.prescribed)
+        nt, width = len(times), wide(start.assembly)
         self.track = track = Track(c, clock, np.zeros((max(2, nt), width)), tableau(o.method), INTEGRATE)
+        if later and of.whole:
+            track.completes()
         self.ends = np.array([nt, track.cells(track.clock.count)[ex.STATUS], ex.DONE])
         real, count, W = track.clock.real, track.clock.count, c.work
         some = (real, ex.EXCESS), (real, ex.ATOL), (W.option, WORST_G), (count, ex.ACCEPTED)
         few = [track.cells(array)[[k]] for array, k in some]
-        self.shape = nt, 1 + ny
-        self.told = np.concatenate([track.cells(track.rows[:nt, : 1 + ny]), *few, track.cells(W.FK[:, :3])])
+        self.shape = nt, of.width
+        self.told = np.concatenate([track.cells(track.rows[:nt, : of.width]), *few, track.cells(W.FK[:, :3])])
 
     def goes_on(self, length: float, told: np.ndarray) -> bool:
         """Bring the run in memory to its end, by so many steps at a time; False if it goes another way."""
@@ -189,6 +187,7 @@ class Loop:
         if clock.count[ex.STATUS] != ex.DONE or len(every) != len(clock.times):
             return False
         rows[: len(every)] = every
+        self.track.complete()
         told[1:] = self.track.read(self.told)
         return True
 

@@ -13,7 +13,6 @@ from ...results.ledger import whole
 from ...results.result import Result
 from ...tables.values import Values, values
 from .compute import Answers
-from .readable import of_states
 from .reading import reduced
 from .spread import Group, Place
 from .stacked import AT_ONCE, of_rows, stacked
@@ -75,20 +74,16 @@ class Seen:
 
 
 class Judge:
-    """Reads what depends on positions and velocities alone, and judges. Of those that it suspects, the runs by
-    themselves tell what is to be said.
+    """Reads what is asked for, and judges. Of those that it suspects, the runs by themselves tell what is to be said.
 
     Attributes
     ----------
-    stacked : list of int
-        Which of the quantities that are asked for follow from positions and velocities.
     sound : dict
         Groups of runs, by their address, and whether these can be read at once.
     """
 
     def __init__(self, of: Shared) -> None:
-        self.of, q = of, of.question
-        self.stacked = [k for k, r in enumerate(q.asked) if of_states(q.model, r.name)]
+        self.of = of
         self.sound: dict[int, tuple[Group, bool]] = {}
 
     def read(self, ran: Ran, out: Answers) -> np.ndarray:
@@ -137,12 +132,12 @@ class Judge:
         q = self.of.question
         result = of_rows(q.model, x, ran.rows, self.of.begun.wound)
         result.health.options, result.health.steps = self.of.options.choices(), ran.steps  # type: ignore[assignment]
-        curves = [result.curve(q.asked[i].name)[1].reshape(len(ran.rows), -1) for i in self.stacked]
+        curves = [result.curve(r.name)[1].reshape(len(ran.rows), -1) for r in q.asked]
         told = suspected(result, len(ran.points)) | (ran.worst > OPEN * x.length)
         return Seen(curves, told, result)
 
     def _write(self, curves: list[np.ndarray], at: list[int], out: Answers) -> None:
         q = self.of.question
-        for i, curve in zip(self.stacked, curves, strict=True):
+        for r, its, curve in zip(q.asked, out.values, curves, strict=True):
             for k, y in zip(at, curve, strict=True):
-                out.values[i][k] = reduced(q.asked[i].how, q.times, np.ascontiguousarray(y), q.times)
+                its[k] = reduced(r.how, q.times, np.ascontiguousarray(y), q.times)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,24 +18,23 @@ from ...model.model import Model
 from ...model.touching import nothing_touches
 from ...numerics.integrators.tableaux import TABLEAUX
 from ...results.departure import changed_velocities, not_allowed
-from ...results.result import Result
 from ...results.study import DONE, WAITING
 from ...tables.system import SEMIDEFINITE
-from ...tables.values import Values, values
+from ...tables.values import Values
 from ..motion.choice import AUTO, SimulateOptions, chosen
 from ..motion.driven import leaves_no_freedom
 from ..motion.events.legs import laws_of_time
-from ..motion.later import solved
 from ..motion.start import Start, begin, start_time
+from ..simulate import width as wide
 from .codes import Codes
 from .compute import Answers, Question, alone
-from .desk import Desk, Done, Loop
+from .desk import Desk, Done
 from .drawn import Drawn, rests_as_drawn
 from .judged import Judge, Ran
+from .readable import of_states
 from .reading import FUNCTION
 from .soft import Filling, soft
 from .spread import Spread
-from .stacked import unjudged
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,16 @@ class Shared:
     filling: Filling | Drawn
     codes: Codes | None  # made for these mechanisms; none: all run through the tables
     asked: str  # the method
+
+    @cached_property
+    def whole(self) -> bool:
+        """Whether something is asked for that does not follow from positions and velocities alone."""
+        return not all(of_states(self.question.model, r.name) for r in self.question.asked)
+
+    @cached_property
+    def width(self) -> int:
+        """Numbers that are kept of each output time."""
+        return wide(self.begun.assembly) if self.whole else 1 + len(self.begun.y)
 
     @property
     def values(self) -> Values:
@@ -120,7 +130,6 @@ class Lean:
         self.alone_count = 0  # runs that were computed by themselves after all
         q = of.question
         self.judge = Judge(of)
-        self.alone = [k for k in range(len(q.asked)) if k not in self.judge.stacked]
         self.remarks = [
             *map(not_allowed, changed_velocities(of.begun.base.departures)), *nothing_touches(q.model)
         ]  # fmt: skip
@@ -133,9 +142,9 @@ class Lean:
         if desk is None:
             desk = self._own.desk = Desk(self.of)
         self.of.filling.also(points)
-        ran = Ran.none(points, len(q.times), 1 + len(self.of.begun.y))
+        ran = Ran.none(points, len(q.times), self.of.width)
         try:
-            for done in desk.compute(points, stopped, bool(self.alone)):
+            for done in desk.compute(points, stopped):
                 self._take(done, ran, out)
         except Exception:  # `alone` tells what it is
             pass
@@ -154,8 +163,6 @@ class Lean:
         for k, run in enumerate(done.runs.tolist()) if self.remarks or done.remarks else ():
             if found := (*self.remarks, *done.remarks.get(k, ())):
                 out.remarks[run] = "; ".join(found)
-        if self.alone:
-            self._whole(done.loop, ran.points[done.runs[0]], out, done.runs[0])
         ran.take(done)
 
     def _told(self, points: np.ndarray, some: np.ndarray, out: Answers, stopped) -> None:  # type: ignore[no-untyped-def]
@@ -165,18 +172,3 @@ class Lean:
                 out.status[k] = WAITING
             else:
                 alone(self.of.question, points[k], out, k)
-
-    def _whole(self, loop: Loop, point: np.ndarray, out: Answers, k: int) -> None:
-        """What depends on forces is read of the run by itself."""
-        q, s = self.of.question, self.of.values.structure
-        x = values(s, q.at(point).parameters)
-        rows = loop.track.rows[: len(q.times)]
-        cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
-        t, p, v, z, vdot, lam = (np.ascontiguousarray(part) for part in np.split(rows, cuts, axis=1))
-        if loop.later:
-            vdot, lam = solved(loop.start, rows)
-        result = Result(q.model, x, t[:, 0], p, v, z, vdot, lam, unjudged())
-        result.wound = self.of.begun.wound
-        asked = [q.asked[i] for i in self.alone]
-        for i, found in zip(self.alone, q.single.read(result, asked, q.times), strict=True):
-            out.values[i][k] = found

@@ -22,13 +22,20 @@ AT_ONCE = 20_000  # times that are read at once: each takes some kilobytes
 
 
 def of_rows(model: Model, x: Values, rows: np.ndarray, wound: Mapping[str, float]) -> Result:
-    """States of runs (runs, times, ...), one after the other, as a result without accelerations and reactions."""
+    """Rows of output of runs (runs, times, ...), one after the other, as a result.
+
+    With states alone it has no accelerations and reactions.
+    """
     s, flat = x.structure, rows.reshape(-1, rows.shape[2])
-    t, p, v, z = (np.ascontiguousarray(a) for a in np.split(flat, np.cumsum([1, s.nq, s.nv]), axis=1))
-    none = np.zeros((len(flat), s.nv)), np.zeros((len(flat), len(s.rows) + len(s.prescribed)))
-    result = Result(model, x, t[:, 0], p, v, z, *none, unjudged())
+    cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
+    t, p, v, z, vdot, lam = (np.ascontiguousarray(a) for a in np.split(flat, cuts, axis=1))
+    states = flat.shape[1] <= cuts[3]
+    if states:
+        vdot, lam = np.zeros((len(flat), s.nv)), np.zeros((len(flat), len(s.rows) + len(s.prescribed)))
+    result = Result(model, x, t[:, 0], p, v, z, vdot, lam, unjudged())
     result.wound = dict(wound)
-    result.records = Records(x, p, v, None, wound)
+    if states:
+        result.records = Records(x, p, v, None, wound)
     return result
 
 

@@ -11,10 +11,12 @@ import numpy as np
 from ...compiler.bound import Bound, Mould, Written
 from ...equations.engine import Sheet, engine
 from ...equations.many import one_after_another
+from ...equations.tasks import COMPLETE
 from ...numerics.integrators.clock import Clock
 from ...numerics.integrators.tableaux import Tableau
-from ...tables.system import Work
+from ...tables.system import LATER, Work
 from ..compiled import Compiled
+from ..motion.later import standing
 from .spread import TABLES, Place
 
 
@@ -121,7 +123,9 @@ class Track:
         c.system = S
         vars(c)["work"] = own.work
         self._made = np.array(made, np.int64)
-        self._bound = Bound(engine, *map(Written, (S, own.work, method, own.clock, own.sheet)))
+        self._given = [Written(x) for x in (S, own.work, method, own.clock, own.sheet)]
+        self._bound = Bound(engine, *self._given)
+        self._then = np.zeros(8, np.int64)
         self.arrays: dict[str, np.ndarray] = own.tables._asdict()
         self.arrays |= {"FK": own.work.FK, "y": own.clock.y, "real": own.clock.real, "option": own.work.option}
 
@@ -145,8 +149,21 @@ class Track:
         self, own: tuple[np.ndarray, np.ndarray], ends: np.ndarray, told: np.ndarray, out: np.ndarray
     ) -> int:  # fmt: skip
         """Runs one after the other; see `one_after_another`."""
-        return int(one_after_another(self._bound.asked, self.task, self._made, self._cells, self._new, own[0], own[1],
-                                     ends, told, out))  # fmt: skip
+        return int(one_after_another(self._bound.asked, self.task, self._then, self._made, self._cells, self._new,
+                                     own[0], own[1], ends, told, out))  # fmt: skip
+
+    def completes(self) -> None:
+        """From now on accelerations and multipliers are solved for when a run has ended (`later.solved`)."""
+        S, W, method, _, sheet = self._given
+        self._complete = Bound(engine, S, W, method, Written(standing(self.clock.y.shape[1])), sheet)
+        cell = self.cells(self.arrays["option"])[LATER]
+        self._then = np.array([*self._complete.asked, cell, COMPLETE], np.int64)
+
+    def complete(self) -> None:
+        """Do so for the run in memory."""
+        if self._then[0]:
+            self.arrays["option"][LATER] = 0.0
+            self._complete(COMPLETE)
 
     def read(self, cells: np.ndarray) -> np.ndarray:
         """What stands in some cells."""
