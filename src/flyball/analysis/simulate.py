@@ -258,13 +258,20 @@ def clock_for(
 
 def size(clock: ex.Clock, base: Assembly, c: Compiled, atol: float) -> None:
     """Write what follows from a mechanism's length and weight: tolerances, and what they are compared with."""
-    real, option, length = clock.real, c.work.option, c.values.length
-    real[ex.ATOL], real[ex.SCALE] = atol, length
-    real[ex.LEDGER] = energy_size(base, float(real[ex.SPAN]))
-    loose = atol + real[ex.RTOL] * length
+    real, option = clock.real, c.work.option
+    energy = energy_size(base, float(real[ex.SPAN]))
+    found = sizes(c.values.length, atol, real[ex.RTOL], energy)
+    (real[ex.ATOL], real[ex.SCALE], real[ex.LEDGER]), (option[TOL_G], option[TOL_V]) = found
+
+
+def sizes(length: float, atol: float, rtol: float, energy: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Entries ATOL, SCALE and LEDGER of the clock, TOL_G and TOL_V of the options."""
+    loose = atol + rtol * length
     near = loose * min(1.0, loose / (NEARER * length))
-    option[TOL_G] = min(1e-6, max(TIGHT_G * length, 1e-2 * near))
-    option[TOL_V] = min(1e-5, max(TIGHT_V, 1e-1 * near))
+    return (atol, length, energy), (
+        min(1e-6, max(TIGHT_G * length, 1e-2 * near)),
+        min(1e-5, max(TIGHT_V, 1e-1 * near)),
+    )
 
 
 def energy_size(a: Assembly, span: float) -> float:
@@ -272,11 +279,15 @@ def energy_size(a: Assembly, span: float) -> float:
     much in the time there is, besides what it has.
     """
     S, length = a.compiled.values.system, a.compiled.values.length
-    mass = S.body_x[:, MASS].sum()
-    g = np.sqrt((S.glob[:3] ** 2).sum())
-    moving = a.compiled.kinetic_energy(a.v)
+    weight = float(S.body_x[:, MASS].sum()), float(np.sqrt((S.glob[:3] ** 2).sum()))
+    return lifted(weight, length, span) + float(a.compiled.kinetic_energy(a.v))
+
+
+def lifted(weight: tuple[float, float], length: float, span: float) -> float:
+    """That of a mechanism at rest: of its mass [kg] and gravity [m/s^2], its length [m] and the time [s]."""
+    mass, g = weight
     fast = min(length / span, 1e150)  # its square is a number, however short the span
-    return float(mass * (g * length + fast * fast) + moving)
+    return mass * (g * length + fast * fast)
 
 
 def width(a: Assembly) -> int:

@@ -48,16 +48,16 @@ def scratch(s: Structure, system: System, dtype: Any) -> Moulded:
         switch = made.array("switch")
         switch[LOWER], switch[UPPER] = system.switch_x[:, SWITCH_LOWER], system.switch_x[:, SWITCH_UPPER]
     if n := system.kinds[GROUND_FRAMES]:
-        _, at_rest = s.kept.get("ground", id(system), MOST, lambda: _on_ground(system))
+        _, at_rest = s.kept.get("ground", id(system), MOST, lambda: (system, on_ground(system)))  # told by its address
         made.array("FK")[:n] = at_rest
     return made
 
 
-def _on_ground(system: System) -> tuple[System, np.ndarray]:
-    """Records of the frames on ground; with the tables that these are of, which are told by their address."""
+def on_ground(system: System) -> np.ndarray:
+    """Records of the frames on ground: they stand first in `Work.FK`, and nothing writes them again."""
     W = Records(np.zeros((system.kinds[GROUND_FRAMES], 24), system.frame_x.dtype))
     ground_frames(system, W)
-    return system, W.FK
+    return W.FK
 
 
 class Records(NamedTuple):
