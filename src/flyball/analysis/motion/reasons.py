@@ -100,7 +100,8 @@ def remarks(a: Assembly, clock: ex.Clock) -> tuple[str, ...]:
 
 
 def _overcome(a: Assembly) -> str:
-    found = fault(a.compiled.work.stack, a.compiled.structure.functions, overcome=True)
+    functions = a.compiled.structure.functions
+    found = fault(a.compiled.array("stack"), functions, overcome=True) if functions else None
     if found is None:
         return ""
     return (
@@ -122,8 +123,8 @@ def _excess(clock: ex.Clock) -> str:
 
 def _far_off(a: Assembly, clock: ex.Clock) -> str:
     length = a.compiled.values.length
-    far = float(np.abs(a.compiled.work.FK[:, :3]).max(initial=0.0))
-    digit = float(np.spacing(far))
+    far = float(np.abs(a.compiled.array("FK")[:, :3]).max(initial=0.0))
+    digit = math.ulp(far)
     if not digit > clock.real[ex.ATOL] + clock.real[ex.RTOL] * length:
         return ""
     return (
