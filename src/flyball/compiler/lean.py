@@ -35,7 +35,7 @@ def leanly() -> Iterator[None]:
     with patched(
         [
             (callconv.CPUCallConv, "_return_errcode_raw", _noted),
-            (lowering.Lower, "lower_normal_function", _remembered),
+            (lowering.BaseLower, "lower_normal_function", _remembered),
             (lowering.Lower, "storevar", _stored),
             (lowering.Lower, "alloca_lltype", _made_room),
             (cgutils, "alloca_once", _zeroed_once),
