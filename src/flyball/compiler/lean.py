@@ -26,7 +26,7 @@ def leanly() -> Iterator[None]:
 
     Raises
     ------
-    AttributeError, KeyError
+    AttributeError
         If Numba's internals are others.
     """
     from llvmlite.ir import IRBuilder

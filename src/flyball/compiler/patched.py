@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 Change = tuple[Any, str, Callable[[Any], Any]]
-"""A class or module, the name of what is its own there, and what is made of that to stand in its place."""
+"""A class or module, the name of something it has, own or inherited, and what is made of that to stand there."""
 
 
 @contextmanager
@@ -16,14 +16,18 @@ def patched(changes: Iterable[Change]) -> Iterator[None]:
 
     Raises
     ------
-    KeyError
+    AttributeError
         If something is not there: then nothing is changed.
     """
-    before = [(owner, name, vars(owner)[name], make) for owner, name, make in changes]
+    made = [(owner, name, make(getattr(owner, name))) for owner, name, make in changes]
+    own = [(owner, name, vars(owner)[name]) for owner, name, _ in made if name in vars(owner)]
+    inherited = [(owner, name) for owner, name, _ in made if name not in vars(owner)]
     try:
-        for owner, name, _, make in before:
-            setattr(owner, name, make(getattr(owner, name)))
+        for owner, name, replacement in made:
+            setattr(owner, name, replacement)
         yield
     finally:
-        for owner, name, original, _ in before:
+        for owner, name, original in own:
             setattr(owner, name, original)
+        for owner, name in inherited:
+            delattr(owner, name)

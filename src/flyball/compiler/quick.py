@@ -21,7 +21,7 @@ def quickly() -> Iterator[None]:
 
     Raises
     ------
-    AttributeError, KeyError
+    AttributeError
         If Numba's internals are others.
     """
     from numba.core import ir, postproc
