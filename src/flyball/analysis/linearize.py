@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
+from ..model.quantities import one
 from ..model.touching import holds_at_times
 from ..results.descriptor import Descriptor
 from ..results.equilibrium import Equilibrium
@@ -96,6 +97,8 @@ def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
 
 def _linear(model: Model, o: LinearizeOptions) -> LinearModel:
     """Of a mechanism in which nothing holds at times any more, but friction that slides."""
+    for name in o.outputs:
+        one(model, name)  # refuses those that do not exist; inputs are looked up where they are added
     here = model
     if o.about is None:  # the copy with inputs is assembled at once
         here, named = with_inputs(model, o.inputs)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ...errors import ModelError
 from ...model.controller import Controller
 from ...model.model import Model
-from ...model.quantities import ENERGY, one
+from ...model.quantities import ENERGY
 from ...model.sensor import Sensor
 from ...results.booked import ADDED
 
@@ -21,11 +21,10 @@ def refuse_counted(model: Model, names: Sequence[str]) -> None:
     Raises
     ------
     ModelError
-        Naming the first of them, or what does not exist.
+        Naming the first of them.
     """
     for name in names:
-        one(model, name)
-        of = name
+        of = str(name)
         while "." not in of and isinstance(e := model.find(of), Sensor):
             of = e.of
         owner, _, what = of.partition(".")
