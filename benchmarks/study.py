@@ -28,7 +28,7 @@ from flyball.analysis.runs.desk import Desk
 from flyball.analysis.runs.lean import shared
 from flyball.analysis.runs.reading import readings
 from flyball.analysis.runs.single import Motion
-from flyball.equations.engine import motion_kernel
+from flyball.analysis.runs.spread import BLOCK
 from mechanisms import example
 
 VARIED = {"stiffness": 0.1, "torque": 0.1, "d": 0.001}  # by how much, as part of the model's value
@@ -61,20 +61,20 @@ class Kernels:
     def through(self, points: np.ndarray, clock: Callable[[], float], spent: list[float]) -> None:
         """Time [s] of the calls for some points, as a clock tells it."""
         desk, total = Desk(self.shared), 0.0
-        spread = getattr(self.shared.filling, "spread", None)
-        if spread is not None:
-            spread.points, spread.given = points, 0
+        spread = self.shared.filling.spread
+        spread.points, spread.given = points, 0
 
         def timed(*arguments: object) -> int:
             nonlocal total
             start = clock()
-            used = motion_kernel(*arguments)
+            used = call(*arguments)
             total += clock() - start
             return used
 
-        desk.call = timed
-        for point in points:
-            desk.run(point)
+        call, desk.call = desk.call, timed
+        for k in range(0, len(points), BLOCK):
+            for _ in desk.compute(points[k : k + BLOCK], lambda: False):
+                pass
         spent.append(total)
 
     def each(self, repeats: int) -> float:

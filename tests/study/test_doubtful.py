@@ -74,9 +74,10 @@ def test_judged_at_once_or_one_by_one_is_the_same(monkeypatch):
     a, b = run(points, lambda: False), compute(q, points)
     assert a.doubtful == b.doubtful
     assert 0 < len(a.doubtful) < 30
-    assert [sound for _, sound in lean._judge._sound.values()] == [True]
-    for k in list(lean._judge._sound):
-        lean._judge._sound[k] = lean._judge._sound[k][0], False
+    sound = lean.judge.sound
+    assert [yes for _, yes in sound.values()] == [True]
+    for k in list(sound):
+        sound[k] = sound[k][0], False
     assert run(points, lambda: False).doubtful == a.doubtful
 
 

@@ -279,3 +279,21 @@ def test_blocks_of_runs_are_spread_for_every_example():
                 alone.add((path.stem, name))
     assert tried > 50
     assert alone == {("ratchet", "teeth")}
+
+
+@pytest.mark.parametrize("specialize", [False, True])
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+def test_places_on_ground_may_be_what_is_varied(coordinates, specialize):
+    """A pull to a place on ground is all work, so that the energy balance knows nothing of where that is."""
+    m = fb.Mechanism("pulled", planar=True, gravity=(0, -9.81), parameters={"x": 1.0, "y": -1.0})
+    m.add(fb.Body("a", mass=1, inertia=0.1, position=("x - 0.5", 0)), fb.Revolute("A", "ground", "a", at=("x - 1", 0)))
+    m.add(fb.SpringDamper("pull", "ground", "a", at=(("x", "y"), ("x", 0)), stiffness=0, force="50 + 200*(length - 1)"))
+    points = np.random.default_rng(3).uniform((0.5, -1.5), (1.5, -0.5), (6, 2))
+    for names, some in ((("y",), points[:, 1:]), (("x", "y"), points)):
+        q = question(m, names, ["a.y", "end(pull.work)"], specialize, coordinates=coordinates)
+        run = runner(q, some)
+        a, b = run(some, lambda: False), compute(q, some)
+        assert run.__self__.alone_count <= 1  # one rounds otherwise
+        for x, y in zip(a.values, b.values, strict=True):
+            assert x.tobytes() == y.tobytes()
+        assert len({x.tobytes() for x in a.values[1]}) == 6

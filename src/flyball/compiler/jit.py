@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 F = TypeVar("F", bound=Callable[..., Any])
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}  # how formulas and kernels are compiled
+INSIDE = {**OPTIONS, "no_cfunc_wrapper": True}  # what only compiled code calls
 KERNELS: list[Any] = []
 LOCK = threading.RLock()
 _pending: list[Callable[[], None]] = []
@@ -37,7 +38,7 @@ def formula(function: F) -> F:
     def register() -> None:
         from numba.extending import register_jitable
 
-        register_jitable(**OPTIONS, no_cfunc_wrapper=True)(function)
+        register_jitable(**INSIDE)(function)
 
     on_numba(register)
     return function

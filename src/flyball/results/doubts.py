@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -131,15 +130,27 @@ def _excesses(x: Ledger, rows: int) -> Iterator[tuple[int, int, Any, Any, Any]]:
     unseen = _unseen(x)
     part, moved, least = balanced(x.result), x.moved(0, rows) + unseen.max(axis=-1, initial=0.0), _rest(x)
     yield 0, rows, np.abs(x.balance).max(axis=-1, initial=0.0), moved, part * moved + least
-    for begin, end in _stretches(x.result, rows):
-        lost = np.ptp(x.balance[..., begin:end], axis=-1)
-        if np.all(
-            (lost <= least) | (lost <= part * (moved * (x.kinetic + unseen)[..., begin:end].max(axis=-1)) ** 0.5)
-        ):
-            continue
+    for begin, end in _suspects(x, rows, x.kinetic + unseen, (part, moved, least)):
         # velocities v are as far off as those of what moves most, u: by m v du
+        lost = np.ptp(x.balance[..., begin:end], axis=-1)
         there = x.moved(begin, end) + unseen[..., begin:end].max(axis=-1)
         yield begin, end, lost, there, part * (moved * there) ** 0.5 + least
+
+
+def _suspects(x: Ledger, rows: int, kinetic: np.ndarray, known: tuple[Any, Any, Any]) -> Iterator[tuple[int, int]]:
+    """Stretches in which more may be lost than is to be expected, by the kinetic energy there alone."""
+    part, moved, least = (np.asarray(a)[..., None] for a in known)
+    for edges in _stretches(x.result, rows):
+        begins, ends = edges[:-1], edges[1:] + 1
+        at = np.stack([begins, ends], axis=1).ravel()[:-1]  # each stretch, and what is between its end and the next
+        high, low, most = (
+            f.reduceat(a, at, axis=-1)[..., ::2]
+            for f, a in ((np.maximum, x.balance), (np.minimum, x.balance), (np.maximum, kinetic))
+        )
+        lost = high - low
+        fine = (lost <= least) | (lost <= part * (moved * most) ** 0.5)
+        for k in np.flatnonzero(~fine.reshape(-1, len(begins)).all(axis=0)):
+            yield int(begins[k]), int(ends[k])
 
 
 def _told(x: Ledger, when: str, lost: float, moved: float, allowed: float) -> tuple[float, str]:
@@ -150,14 +161,13 @@ def _told(x: Ledger, when: str, lost: float, moved: float, allowed: float) -> tu
     )
 
 
-def _stretches(result: Result, rows: int) -> Iterable[tuple[int, int]]:
-    """Halves, quarters and so on of the rows of a motion that was integrated: what something else dissipated before,
-    or moves after, does not speak for what happens in one.
+def _stretches(result: Result, rows: int) -> Iterator[np.ndarray]:
+    """Ends of the halves, quarters and so on of the rows of a motion that was integrated: what something else
+    dissipated before, or moves after, does not speak for what happens in one.
     """
     pieces = 2
     while result.health.options.get("rtol") is not None and pieces <= PIECES and rows >= ROWS * pieces:
-        edges = [k * (rows - 1) // pieces for k in range(pieces + 1)]
-        yield from ((a, b + 1) for a, b in itertools.pairwise(edges))
+        yield np.arange(pieces + 1) * (rows - 1) // pieces
         pieces *= 2
 
 

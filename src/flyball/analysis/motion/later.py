@@ -30,21 +30,21 @@ def open_until_asked(start: Start, o: Integration, task: int) -> bool:
     return usual and not (s.loads or s.functions or s.switches or changes)
 
 
+def standing(ny: int, t: float = 0.0) -> ex.Clock:
+    """Time and state, so many numbers, for tasks that integrate nothing."""
+    real = np.zeros(ex.REALS)
+    real[ex.T] = t
+    none = np.zeros(0, np.int64)
+    count, y, K = np.zeros(ex.COUNTS, np.int64), np.zeros((ex.STATES, ny)), np.zeros((1, ny))
+    return ex.Clock(real, count, np.zeros(0), y, K, none, np.zeros((ROWS, 0)))
+
+
 def solved(start: Start, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations (n, nv) and multipliers (n, nr) at the states of rows of output."""
     c = start.assembly.compiled
     s, W, rows = c.structure, c.work, rows.copy()
     ny = s.nq + s.nv + len(s.states)
-    none = np.zeros(0, np.int64)
-    clock = ex.Clock(
-        np.zeros(ex.REALS),
-        np.zeros(ex.COUNTS, np.int64),
-        np.zeros(0),
-        np.zeros((ex.STATES, ny)),
-        np.zeros((1, ny)),
-        none,
-        np.zeros((ROWS, 0)),
-    )
+    clock = standing(ny)
     W.option[LATER] = 0.0
     before = rows.copy()
     motion_kernel(c.system, W, tableau("rk45"), clock, rows, COMPLETE)

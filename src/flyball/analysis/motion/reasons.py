@@ -46,6 +46,7 @@ from ..freedom.contradiction import story
 from .crossed import crossed
 from .jams import Unresolved, jam
 from .residual import missed
+from .rounding import excess, far_off, rounded
 from .samples import too_often
 from .unbounded import boundless, escaping, too_long
 
@@ -54,8 +55,6 @@ AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values
 LOCKED = 1e-3  # part of the accelerations asked for that no solution of the rows leaves open
 PARTED = 1e-6  # part of a rate or second derivative by which laws of one coordinate differ that disagree
 PARTS = ("value", "rate", "second derivative")
-NOTABLE = 10.0  # times the tolerance: an error of a step from rounding that is told
-LATELY = 1e-3  # part of the time span within which rounding found to decide is why a run stopped
 SHARP = 10.0  # a law that changes this many times more than its own slope says has jumped
 
 
@@ -81,7 +80,7 @@ def reason(
     t = float(clock.real[ex.T])
     after = f". The motion up to t = {t:.6g} s is kept in the error's result" if kept else ""
     if clock.count[ex.STATUS] == ex.TOO_MANY:
-        return f"{name!r}: {_too_many(a, clock)}{_rounded(clock)}{after}", None
+        return f"{name!r}: {_too_many(a, clock)}{rounded(clock)}{after}", None
     stack = a.compiled.work.stack
     found = fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
     if found is not None:
@@ -96,49 +95,17 @@ def reason(
 
 def remarks(a: Assembly, clock: ex.Clock) -> tuple[str, ...]:
     """What went wrong on the way and was overcome, and where rounding was the limit, for the health report."""
-    return tuple(text for text in (_overcome(a), _excess(clock), _far_off(a, clock)) if text)
+    return tuple(text for text in (_overcome(a), excess(clock), far_off(a, clock)) if text)
 
 
 def _overcome(a: Assembly) -> str:
-    found = fault(a.compiled.work.stack, a.compiled.structure.functions, overcome=True)
+    functions = a.compiled.structure.functions
+    found = fault(a.compiled.array("stack"), functions, overcome=True) if functions else None
     if found is None:
         return ""
     return (
         f"in a step that was then taken again, shorter, {found.message}. The motion kept does without it; if the "
         f"function is at fault, mend it"
-    )
-
-
-def _excess(clock: ex.Clock) -> str:
-    excess = clock.real[ex.EXCESS]
-    if not excess > NOTABLE:
-        return ""
-    return (
-        f"rounding is the limit: near t = {clock.real[ex.EXCESS_AT]:.6g} s, where the mechanism is close to a singular "
-        f"position, the last digits of the state alone change a step by up to {excess:.2g} times what "
-        f"rtol = {clock.real[ex.RTOL]:g} allows. The step was accepted so; a larger rtol asks for what can be had"
-    )
-
-
-def _far_off(a: Assembly, clock: ex.Clock) -> str:
-    length = a.compiled.values.length
-    far = float(np.abs(a.compiled.work.FK[:, :3]).max(initial=0.0))
-    digit = float(np.spacing(far))
-    if not digit > clock.real[ex.ATOL] + clock.real[ex.RTOL] * length:
-        return ""
-    return (
-        f"rounding is the limit: positions {far:.3g} m from the origin are known to {digit:.1g} m, which is more than "
-        f"rtol = {clock.real[ex.RTOL]:g} of the mechanism's length of {length:.3g} m; describe it near the origin"
-    )
-
-
-def _rounded(clock: ex.Clock) -> str:
-    """The same of a run that stopped, if rounding was found to decide shortly before."""
-    if clock.real[ex.T] - clock.real[ex.BLURRED_AT] > LATELY * clock.real[ex.SPAN]:
-        return ""
-    return (
-        f". Rounding is the limit there: the last digits of the state change the error of a step by a tenth of it and "
-        f"more, as they do close to a singular position; rtol = {clock.real[ex.RTOL]:g} asks for more than can be had"
     )
 
 
@@ -345,7 +312,7 @@ def _stuck(a: Assembly, clock: ex.Clock) -> str:
             f"out, and its width is chosen"
         )
     what = f"{t}: the step width fell to {clock.real[ex.H]:.3g} s{where}" if begun else f"its start, {t}{where}"
-    if rounding := _rounded(clock):
+    if rounding := rounded(clock):
         return f"the integration cannot go on at {what}{rounding}"
     return (
         f"the integration cannot go on at {what}. The mechanism may lock there (a driver asks for more than its links "

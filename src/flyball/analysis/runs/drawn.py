@@ -5,21 +5,23 @@ Its start is then what is drawn. That a run does start so, closed and at rest, i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from ...numerics.integrators.clock import Clock
-from ...tables.system import NU, SEMIDEFINITE
-from ..assembly.positions import CLOSED, misfit
-from ..assembly.start import Assembly
+from ...equations.tasks import POSITION
+from ...numerics.integrators.clock import ATOL, LEDGER, SCALE, STATUS
+from ...numerics.integrators.tableaux import tableau
+from ...tables.system import G_VALUE, MASS, NU, SEMIDEFINITE, TOL_G, TOL_V
+from ..assembly.positions import CLOSED
 from ..compiled import Compiled
+from ..motion.later import standing
 from ..motion.options import Integration
 from ..motion.start import Start
-from ..simulate import size
-from .spread import TABLES, Place, Spread, Tables, system_of
+from ..simulate import lifted, sizes
+from .spread import TABLES, Column, Place, Spread, Tables, Together
+from .track import Batch, Part, Track
 
 
 def rests_as_drawn(begun: Start) -> bool:
@@ -40,6 +42,7 @@ class Drawn:
 
     begun: Start
     asked: Integration  # tolerances as they were asked for, whatever its length
+    span: float  # how long the motion lasts [s]
     spread: Spread
 
     def also(self, points: np.ndarray) -> None:
@@ -52,59 +55,112 @@ class Drawn:
 
 
 class Desk:
-    """Tables and scratch of one thread, in the coordinates of assembly and of the motion."""
+    """Tables of some runs, and memory in which it is looked whether they start as they are drawn."""
 
     def __init__(self, of: Drawn, c: Compiled) -> None:
         self.of = of
-        plain = of.begun.base.compiled.values
-        self.same = of.begun.assembly.compiled.values is plain
-        self.motion = Compiled(c.values, c.z.copy(), c.parameters)
-        own = c.values if self.same else replace(plain, system=system_of(plain))
-        self.plain = self.motion if self.same else Compiled(own, c.z.copy(), c.parameters)
-        self.base = Assembly(self.plain, of.begun.base.t, np.zeros(plain.structure.nq), of.begun.base.v.copy())
-        self.start = of.begun.y.copy()
-        self.place: Place = None, 0
-        self.pattern = b""
+        plain = of.begun.base.compiled
+        self.plain = Still(plain.again(), of.begun.base.t)
+        self.same = of.begun.assembly.compiled.values is plain.values
+        self.motion = self.plain if self.same else Still(c, of.begun.base.t)
 
-    def fill(self, point: np.ndarray, own: Mapping[str, np.ndarray]) -> bool:
-        """Write the tables of a run into ``own``, those of the motion; False if it does not start as drawn."""
-        found = self.of.spread.of(point)
-        if found is None:
-            return False
-        self.place = group, k = found
-        tables = group.tables
-        if not (self._take(self.plain, tables[0], k) and self._rests()):
-            return False
-        self.base.q[:] = self.plain.values.q
+    def batches(self, points: np.ndarray) -> list[Batch]:
+        """The runs at some points; those that are left out do not start as they are drawn, or it is not known."""
+        return [b for some in self.of.spread.groups(points)[0] if (b := self._together(some)) is not None]
+
+    def _together(self, some: Together) -> Batch | None:
+        tables, lanes = some.group.tables, np.array(some.lanes)
+        z = [_rows(t.z, lanes) for t in tables]
+        good = self.plain.rests(tables[0], lanes, z[0])
         if not self.same:
-            hints = self.plain.hints
-            if not self._take(self.motion, tables[1], k):
-                return False
-            self.motion.follow(hints)
-            self.motion.at(self.base.t, self.motion.values.q, np.zeros(self.motion.structure.nv))
-            if self.motion.z.tobytes() != tables[1].z.of_run(k).tobytes():
-                return False
-        x = self.motion.values
-        self.pattern = tables[-1].pattern_of(k)
-        self.start[:] = np.concatenate([x.q, np.zeros(x.structure.nv), self.motion.z])
-        return True
+            good &= self.motion.rests(tables[1], lanes, self._followed(z), z[1], closed=False)
+        if not good.any():
+            return None
+        t, lanes, runs = tables[-1], lanes[good], np.array(some.runs)[good]
+        base, parts = shared_and_own(t, lanes)
+        q, z = _rows(t.q, lanes), z[-1][good]
+        start = np.concatenate([q, np.zeros((len(q), self.motion.nv)), z], axis=1)
+        parts.append(Part("y", np.arange(start.shape[1]), start))
+        parts += self._sizes(tables, lanes)
+        places: list[Place] = [(some.group, k) for k in lanes.tolist()]
+        return Batch(runs, base, parts, t.length[lanes], places, [t.pattern_of(k) for k in lanes.tolist()])
 
-    def _take(self, c: Compiled, tables: Tables, k: int) -> bool:
-        """Write one structure's tables; False if something moves, or a body lacks inertia."""
-        x = c.values
-        for name, column in tables.system.items():
-            column.write(k, getattr(x.system, name))
-        x.q, x.v, x.length = tables.q.of_run(k), tables.v.of_run(k), float(tables.length[k])
-        c.z = tables.z.of_run(k)
-        return not (x.v.any() or x.system.glob[SEMIDEFINITE])
+    def _followed(self, z: list[np.ndarray]) -> np.ndarray:
+        """Turns and places that the motion takes over from absolute coordinates."""
+        out, plain = z[1].copy(), self.plain.compiled.structure.state_at
+        for name, k in self.motion.compiled.structure.state_at.items():
+            if name in plain and not name.endswith(".work"):
+                out[:, k] = z[0][:, plain[name]]
+        return out
 
-    def _rests(self) -> bool:
-        """Whether it is closed as it is drawn, and nothing drives it; with the turns that it is drawn with."""
-        c, t, z = self.plain, self.base.t, self.plain.z.tobytes()
-        near = misfit(c, t, c.values.q, c.values.v, 0.0) <= CLOSED
-        return near and not c.work.row[NU].any() and c.z.tobytes() == z
+    def _sizes(self, tables: tuple[Tables, ...], lanes: np.ndarray) -> list[Part]:
+        """What their lengths and weights say (`simulate.size`)."""
+        plain, own = tables[0], tables[-1].length[lanes].tolist()
+        body_x, glob = (_rows(plain.system[name], lanes) for name in ("body_x", "glob"))
+        mass = body_x[..., MASS].sum(axis=1).tolist()
+        g = np.sqrt((glob[:, :3] ** 2).sum(axis=1)).tolist()
+        lengths = plain.length[lanes].tolist()
+        asked, rtol, span = self.of.asked, np.float64(self.of.asked.rtol), self.of.span
+        found = [
+            sizes(x, asked.tolerance(length), rtol, lifted((m, w), length, span))
+            for x, m, w, length in zip(own, mass, g, lengths, strict=True)
+        ]
+        clock, option = (np.array(x) for x in zip(*found, strict=True))
+        return [Part("real", np.array([ATOL, SCALE, LEDGER]), clock), Part("option", np.array([TOL_G, TOL_V]), option)]
 
-    def begin(self, at: Assembly, clock: Clock) -> None:
-        """Write the start of the run that was filled in last, and what its length and weight say."""
-        clock.y[0] = self.start
-        size(clock, self.base, at.compiled, self.of.asked.tolerance(self.plain.values.length))
+
+class Still:
+    """Memory in which runs are looked at as they start, in some coordinates."""
+
+    def __init__(self, c: Compiled, t: float) -> None:
+        s = c.structure
+        self.nv = s.nv
+        self._track = track = Track(
+            c, standing(s.nq + s.nv + len(s.states), t), np.zeros((0, 0)), tableau("rk45"), POSITION
+        )
+        self.compiled, self._metric, (self._nr, self._nz) = c, c.metric, (len(s.rows), len(s.states))
+        row, y = c.work.row, track.clock.y
+        self._told = np.concatenate([track.cells(a) for a in (row[G_VALUE], row[NU], y[0, s.nq + s.nv :])])
+        self._ends = np.array([0, track.cells(track.clock.count)[STATUS], 0])
+
+    def rests(
+        self, t: Tables, lanes: np.ndarray, z: np.ndarray, drawn: np.ndarray | None = None, closed: bool = True
+    ) -> np.ndarray:
+        """Which runs are at rest with the turns that they are drawn with, (n,), from turns and places ``z`` (n, nz).
+
+        ``closed``: and closed as drawn, and nothing drives them.
+        """
+        v = _rows(t.v, lanes)
+        good = ~(v != 0.0).any(axis=1) & (_rows(t.system["glob"], lanes)[:, SEMIDEFINITE] == 0.0)
+        q = _rows(t.q, lanes)
+        state = np.concatenate([q, np.zeros_like(v), z], axis=1)
+        base, parts = shared_and_own(t, lanes)
+        n = len(lanes)
+        batch = Batch(np.arange(n), base, [*parts, Part("y", np.arange(state.shape[1]), state)], t.length, [], [])
+        out = np.zeros((n, 1 + len(self._told)), np.int64)
+        good[self._track.run(self._track.begin(batch), self._ends, self._told, out) :] = False
+        rows, nu, found = np.split(out.view(np.float64)[:, 1:], [self._nr, 2 * self._nr], axis=1)
+        good &= (found == found).all(axis=1)
+        good &= (out[:, 1 + 2 * self._nr :] == (z if drawn is None else drawn).view(np.int64)).all(axis=1)
+        if closed:
+            good &= closed_rows(rows, self._metric, t.length[lanes]) & ~(nu != 0.0).any(axis=1)
+        return good
+
+
+def shared_and_own(t: Tables, lanes: np.ndarray) -> tuple[dict[str, np.ndarray], list[Part]]:
+    """What runs have in common of tables and frames on ground, and what each has of its own."""
+    columns = {**t.system, "FK": t.ground}
+    return {name: x.base for name, x in columns.items()}, [Part(name, x.at, x.x[lanes]) for name, x in columns.items()]
+
+
+def closed_rows(g: np.ndarray, metric: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Which of several positions are closed (`positions.misfit`), (n,), from their rows (n, nr)."""
+    off = np.abs(g) / np.where(metric, length[:, None], 1.0)
+    return np.isfinite(g).all(axis=1) & (off.max(axis=1, initial=0.0) <= CLOSED)
+
+
+def _rows(column: Column, lanes: np.ndarray) -> np.ndarray:
+    """Arrays of some runs, (n, ...)."""
+    out = np.repeat(column.base[None], len(lanes), axis=0)
+    out.reshape(len(lanes), -1)[:, column.at] = column.x[lanes]
+    return out

@@ -9,34 +9,32 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ...errors import FlyballError
 from ...model.model import Model
 from ...model.touching import nothing_touches
-from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import TABLEAUX
 from ...results.departure import changed_velocities, not_allowed
-from ...results.result import Result
 from ...results.study import DONE, WAITING
-from ...tables.system import SEMIDEFINITE, WORST_G
-from ...tables.values import Values, values
+from ...tables.system import SEMIDEFINITE
+from ...tables.values import Values
 from ..motion.choice import AUTO, SimulateOptions, chosen
 from ..motion.driven import leaves_no_freedom
 from ..motion.events.legs import laws_of_time
-from ..motion.later import solved
-from ..motion.reasons import remarks
 from ..motion.start import Start, begin, start_time
+from ..simulate import width as wide
 from .codes import Codes
 from .compute import Answers, Question, alone
-from .desk import Desk, Loop
+from .desk import Desk, Done
 from .drawn import Drawn, rests_as_drawn
 from .judged import Judge, Ran
+from .readable import of_states
 from .reading import FUNCTION
 from .soft import Filling, soft
-from .spread import Place, Spread
-from .stacked import Reader, unjudged
+from .spread import Spread
 
 
 @dataclass(frozen=True)
@@ -49,6 +47,16 @@ class Shared:
     filling: Filling | Drawn
     codes: Codes | None  # made for these mechanisms; none: all run through the tables
     asked: str  # the method
+
+    @cached_property
+    def whole(self) -> bool:
+        """Whether something is asked for that does not follow from positions and velocities alone."""
+        return not all(of_states(self.question.model, r.name) for r in self.question.asked)
+
+    @cached_property
+    def width(self) -> int:
+        """Numbers that are kept of each output time."""
+        return wide(self.begun.assembly) if self.whole else 1 + len(self.begun.y)
 
     @property
     def values(self) -> Values:
@@ -104,7 +112,8 @@ def _filling(question: Question, o: SimulateOptions, begun: Start, points: np.nd
     if not rests_as_drawn(begun):
         return None
     structures = (plain,) if plain is mine else (plain, mine)
-    return Drawn(begun, o, Spread(structures, given, question.names, points))
+    span = float(o.t_end) - begun.base.t or 1.0
+    return Drawn(begun, o, span, Spread(structures, given, question.names, points))
 
 
 def _watched(model: Model) -> bool:
@@ -120,8 +129,7 @@ class Lean:
         self._own = threading.local()
         self.alone_count = 0  # runs that were computed by themselves after all
         q = of.question
-        self._reader, self._judge = Reader(q, of.begun.wound), Judge(of)
-        self.alone = [k for k in range(len(q.asked)) if k not in self._reader.stacked]
+        self.judge = Judge(of)
         self.remarks = [
             *map(not_allowed, changed_velocities(of.begun.base.departures)), *nothing_touches(q.model)
         ]  # fmt: skip
@@ -133,37 +141,29 @@ class Lean:
         desk = getattr(self._own, "desk", None)
         if desk is None:
             desk = self._own.desk = Desk(self.of)
-        ny = len(self.of.begun.y)
-        rows = np.zeros((len(points), len(q.times), 1 + ny))
-        mine, places = np.zeros(len(points), bool), list[Place]()
-        steps, worst = np.zeros((2, len(points)))
         self.of.filling.also(points)
-        for k, point in enumerate(points):
+        ran = Ran.none(points, len(q.times), self.of.width)
+        try:
+            for done in desk.compute(points, stopped):
+                self._take(done, ran, out)
+        except Exception:  # `alone` tells what it is
+            pass
+        for k in np.flatnonzero(~ran.there).tolist():
             if stopped():
                 break
-            try:
-                mine[k] = desk.run(point)
-            except Exception:  # `alone` tells what it is
-                mine[k] = False
-            if not mine[k]:
-                self.alone_count += 1
-                alone(q, point, out, k)
-                continue
-            loop = desk.loop
-            rows[k] = loop.rows[: len(q.times), : 1 + ny]
-            steps[k] = loop.clock.count[ex.ACCEPTED]
-            worst[k] = loop.start.assembly.compiled.work.option[WORST_G]
-            places.append(desk.filler.place)
-            if found := (*self.remarks, *remarks(loop.start.assembly, loop.clock)):
-                out.remarks[k] = "; ".join(found)
-            if self.alone:
-                self._whole(loop, point, out, k)
-        self._reader.read(self.of.values, rows[mine], points[mine], places, np.flatnonzero(mine), out)
-        out.status[mine] = DONE
-        if mine.any():
-            doubted = self._judge.suspected(Ran(points[mine], rows[mine], steps[mine], worst[mine]))
-            self._told(points, np.flatnonzero(mine)[doubted], out, stopped)
+            self.alone_count += 1
+            alone(q, points[k], out, k)
+        doubted = self.judge.read(ran, out)
+        out.status[ran.there] = DONE
+        self._told(points, np.flatnonzero(doubted), out, stopped)
         return out
+
+    def _take(self, done: Done, ran: Ran, out: Answers) -> None:
+        """Runs that were computed together."""
+        for k, run in enumerate(done.runs.tolist()) if self.remarks or done.remarks else ():
+            if found := (*self.remarks, *done.remarks.get(k, ())):
+                out.remarks[run] = "; ".join(found)
+        ran.take(done)
 
     def _told(self, points: np.ndarray, some: np.ndarray, out: Answers, stopped) -> None:  # type: ignore[no-untyped-def]
         """Runs whose balance may be off, by themselves: these say whether it is."""
@@ -172,18 +172,3 @@ class Lean:
                 out.status[k] = WAITING
             else:
                 alone(self.of.question, points[k], out, k)
-
-    def _whole(self, loop: Loop, point: np.ndarray, out: Answers, k: int) -> None:
-        """What depends on forces is read of the run by itself."""
-        q, s = self.of.question, self.of.values.structure
-        x = values(s, q.at(point).parameters)
-        rows = loop.rows[: len(q.times)]
-        cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
-        t, p, v, z, vdot, lam = (np.ascontiguousarray(part) for part in np.split(rows, cuts, axis=1))
-        if loop.later:
-            vdot, lam = solved(loop.start, rows)
-        result = Result(q.model, x, t[:, 0], p, v, z, vdot, lam, unjudged())
-        result.wound = self.of.begun.wound
-        asked = [q.asked[i] for i in self.alone]
-        for i, found in zip(self.alone, q.single.read(result, asked, q.times), strict=True):
-            out.values[i][k] = found

@@ -13,12 +13,11 @@ from ...model.element import Element, resolve
 from ...model.expressions import Expression, law_expression, number
 from ...model.force import Force
 from ...model.model import Model
-from ...numerics.integrators.clock import Clock
 from ...tables.numbers import words
 from ...tables.values import Values
-from ..assembly.start import Assembly
 from ..compiled import Compiled
-from .spread import Place, Spread
+from .spread import Place, Spread, Together
+from .track import Batch, Part
 
 PLACES = ("at", "angle", "orientation", "axis")
 """Fields of forces that say where their frames are."""
@@ -90,33 +89,18 @@ class Filling:
         if self.spread is not None:
             self.spread.also(points)
 
-    @property
-    def place(self) -> Place:
-        """All have the tables of the first run, but for forces."""
-        return None, 0
+    def desk(self, c: Compiled) -> Desk:
+        """What fills in the numbers of runs for one thread."""
+        return Desk(self, c)
 
-    def desk(self, c: Compiled) -> Filling:
-        """What one thread fills in: all of it is in the tables."""
-        return self
-
-    pattern = b""  # of numbers that are 0, 1 or -1: looked at in each run
-
-    def begin(self, at: Assembly, clock: Clock) -> None:
-        """The start is that of the first run."""
-
-    def fill(self, point: np.ndarray, own: Mapping[str, np.ndarray]) -> bool:
-        """Write them into ``own["force_x"]`` and ``own["const"]``: it always can.
+    def fill(self, point: np.ndarray, own: Mapping[str, np.ndarray]) -> None:
+        """Write them into ``own["force_x"]`` and ``own["const"]``.
 
         Raises
         ------
         ModelError
             If a number makes no sense.
         """
-        if self.spread is not None and (found := self.spread.of(point)) is not None:
-            (tables,), k = found[0].tables, found[1]
-            for name in self.tables:
-                tables.system[name].write(k, own[name])
-            return True
         env, force_x, const = dict(self.env), own["force_x"], own["const"]
         env.update(zip(self.names, point.tolist(), strict=True))
         for name, formula in self.derived:
@@ -126,4 +110,34 @@ class Filling:
         for k, e, apart in self.rows:
             par = e.parameters(resolve(e, env), apart)
             force_x[k], force_x[k, : len(par)] = 0.0, par
-        return True
+
+
+class Desk:
+    """Tables of some runs. All start alike, and are of one length."""
+
+    def __init__(self, of: Filling, c: Compiled) -> None:
+        self.of, self._values = of, c.values
+
+    def batches(self, points: np.ndarray) -> list[Batch]:
+        """The runs at some points; those that are left out are for themselves."""
+        groups, alone = self.of.spread.groups(points) if self.of.spread is not None else ([], range(len(points)))
+        return [*map(self._together, groups), *(b for k in alone if (b := self._one(k, points[k])) is not None)]
+
+    def _together(self, some: Together) -> Batch:
+        (t,), lanes = some.group.tables, np.array(some.lanes)
+        columns = {name: t.system[name] for name in self.of.tables}
+        parts = [Part(name, x.at, x.x[lanes]) for name, x in columns.items()]
+        base = {name: x.base for name, x in columns.items()}
+        return self._batch(base, parts, some.runs, [(some.group, k) for k in some.lanes])
+
+    def _one(self, k: int, point: np.ndarray) -> Batch | None:
+        own = {name: getattr(self._values.system, name).copy() for name in self.of.tables}
+        try:
+            self.of.fill(point, own)
+        except Exception:  # by itself it says why
+            return None
+        return self._batch(own, [], [k], [(None, 0)])
+
+    def _batch(self, base: dict[str, np.ndarray], parts: list[Part], runs: list[int], places: list[Place]) -> Batch:
+        pattern = [group.tables[0].pattern_of(k) if group is not None else b"" for group, k in places]
+        return Batch(np.array(runs), base, parts, np.full(len(runs), self._values.length), places, pattern)

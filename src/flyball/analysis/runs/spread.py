@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...equations.scratch import on_ground
 from ...errors import FlyballError
 from ...math.lanes import Diverged, Lanes, lanes_of
 from ...special.recorder import PLAIN
@@ -64,6 +65,7 @@ class Tables:
     """What `values` says of each run of a group, in one structure."""
 
     system: Mapping[str, Column]
+    ground: Column  # records of the frames on ground
     q: Column
     v: Column
     z: Column
@@ -80,7 +82,7 @@ class Tables:
         differ = np.concatenate([c.x for c in system.values()], axis=1)
         base = b"".join(part.tobytes() for c in system.values() for part in (_plain(c.base), c.at))
         state = Column.of(x.q, n), Column.of(x.v, n), Column.of(places(x), n)
-        return cls(system, *state, length, x, _plain(differ), base)
+        return cls(system, Column.of(on_ground(x.system), n), *state, length, x, _plain(differ), base)
 
     def pattern_of(self, k: int) -> bytes:
         """What two runs have in common that have the same numbers 0, 1 and -1."""
@@ -98,7 +100,6 @@ class Group:
     """Runs that decide alike: their tables in each structure."""
 
     tables: tuple[Tables, ...]
-    reads: bool | None = None  # whether curves of its runs can be read at once; None: not known yet
 
     @property
     def finite(self) -> np.ndarray:
@@ -109,6 +110,15 @@ class Group:
 
 Place = tuple[Group | None, int]
 """The group that a run is in, if there are groups, and its number there."""
+
+
+@dataclass
+class Together:
+    """Points of a group: their numbers among those asked for, and in the group."""
+
+    group: Group
+    runs: list[int]
+    lanes: list[int]
 
 
 @dataclass
@@ -146,6 +156,19 @@ class Spread:
                 self._next(self.points[self.given : self.given + BLOCK])
                 self.given += BLOCK
             return block.at.get(key)
+
+    def groups(self, points: np.ndarray) -> tuple[list[Together], list[int]]:
+        """Which of the points are in which group, and those that are for themselves."""
+        found: dict[int, Together] = {}
+        alone = []
+        for k, point in enumerate(points):
+            if (place := self.of(point)) is None:
+                alone.append(k)
+                continue
+            its = found.setdefault(id(place[0]), Together(place[0], [], []))
+            its.runs.append(k)
+            its.lanes.append(place[1])
+        return list(found.values()), alone
 
     def also(self, points: np.ndarray) -> None:
         """Points that are asked for next, if they are not known yet."""

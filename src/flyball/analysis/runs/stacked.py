@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -15,94 +15,27 @@ from ...results.health import Health
 from ...results.records import Records
 from ...results.result import Result
 from ...tables.poses import Poses
-from ...tables.values import Values, values
-from .compute import Answers, Question
-from .readable import of_states
-from .reading import ends_only, reduced
-from .spread import TABLES, Group, Place
+from ...tables.values import Values
+from .spread import TABLES
 
 AT_ONCE = 20_000  # times that are read at once: each takes some kilobytes
 
 
-class Reader:
-    """Reads what depends on positions and velocities alone.
-
-    Attributes
-    ----------
-    stacked : list of int
-        Which of the quantities that are asked for do.
-    """
-
-    def __init__(self, question: Question, wound: Mapping[str, float]) -> None:
-        self.question, self.wound = question, wound
-        self.stacked = [k for k, r in enumerate(question.asked) if of_states(question.model, r.name)]
-
-    def read(
-        self, x: Values, rows: np.ndarray, points: np.ndarray, places: Sequence[Place], at: np.ndarray, out: Answers
-    ) -> None:
-        """Write the quantities of runs, of which rows (runs, times, ...) have the states, as numbers ``at`` of ``out``.
-
-        ``x`` are values of runs that are in no group: where things are is there the same.
-        """
-        if not len(at) or not self.stacked:
-            return
-        if ends_only(self.question.asked):
-            rows = rows[:, -1:]
-        groups: dict[int, list[int]] = {}
-        for k, (group, _) in enumerate(places):
-            groups.setdefault(id(group), []).append(k)
-        most = max(1, AT_ONCE // rows.shape[1])
-        for some in (g[k : k + most] for g in groups.values() for k in range(0, len(g), most)):
-            group = places[some[0]][0]
-            lanes = np.array([places[k][1] for k in some])
-            curves = self._curves(x, rows[some]) if group is None else self._at_once(group, lanes, points, rows, some)
-            if curves is None:
-                found = [self._curves(self._values(x, points[k]), rows[[k]]) for k in some]
-                curves = [np.concatenate(parts) for parts in zip(*found, strict=True)]
-            self._write(curves, at[some], out)
-
-    def _at_once(
-        self, group: Group, lanes: np.ndarray, points: np.ndarray, rows: np.ndarray, some: list[int]
-    ) -> list[np.ndarray] | None:
-        """Curves of runs of a group; none if these are to be read one by one. The first of a group is compared."""
-        if group.reads is False:
-            return None
-        x = group.tables[-1].values
-        try:
-            found = self._curves(stacked(x, lanes, rows.shape[1]), rows[some])
-        except Exception:  # something knows floats only
-            group.reads = False
-            return None
-        if group.reads is None:
-            one = self._curves(self._values(x, points[some[0]]), rows[some[:1]])
-            group.reads = all(a[:1].tobytes() == b.tobytes() for a, b in zip(found, one, strict=True))
-        return found if group.reads else None
-
-    def _values(self, x: Values, point: np.ndarray) -> Values:
-        return values(x.structure, self.question.at(point).parameters)
-
-    def _curves(self, x: Values, rows: np.ndarray) -> list[np.ndarray]:
-        """What is asked for of states, (runs, times) each, as of one motion."""
-        q = self.question
-        result = of_rows(q.model, x, rows, self.wound)
-        return [result.curve(q.asked[i].name)[1].reshape(len(rows), -1) for i in self.stacked]
-
-    def _write(self, curves: list[np.ndarray], at: np.ndarray, out: Answers) -> None:
-        q = self.question
-        for i, curve in zip(self.stacked, curves, strict=True):
-            for k, y in zip(at, curve, strict=True):
-                t = q.times[-len(y) :]
-                out.values[i][k] = reduced(q.asked[i].how, t, np.ascontiguousarray(y), t)
-
-
 def of_rows(model: Model, x: Values, rows: np.ndarray, wound: Mapping[str, float]) -> Result:
-    """States of runs (runs, times, ...), one after the other, as a result without accelerations and reactions."""
+    """Rows of output of runs (runs, times, ...), one after the other, as a result.
+
+    With states alone it has no accelerations and reactions.
+    """
     s, flat = x.structure, rows.reshape(-1, rows.shape[2])
-    t, p, v, z = (np.ascontiguousarray(a) for a in np.split(flat, np.cumsum([1, s.nq, s.nv]), axis=1))
-    none = np.zeros((len(flat), s.nv)), np.zeros((len(flat), len(s.rows) + len(s.prescribed)))
-    result = Result(model, x, t[:, 0], p, v, z, *none, unjudged())
+    cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
+    t, p, v, z, vdot, lam = (np.ascontiguousarray(a) for a in np.split(flat, cuts, axis=1))
+    states = flat.shape[1] <= cuts[3]
+    if states:
+        vdot, lam = np.zeros((len(flat), s.nv)), np.zeros((len(flat), len(s.rows) + len(s.prescribed)))
+    result = Result(model, x, t[:, 0], p, v, z, vdot, lam, unjudged())
     result.wound = dict(wound)
-    result.records = Records(x, p, v, None, wound)
+    if states:
+        result.records = Records(x, p, v, None, wound)
     return result
 
 

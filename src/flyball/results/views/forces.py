@@ -11,6 +11,7 @@ from ...equations.loads import at_rest, power, wide
 from ...errors import AnalysisError
 from ...laws.call import STACK_RESERVE
 from ...laws.evaluation import evaluate
+from ...laws.over_time import over_time, takes_arrays
 from ...math.scalar import sign
 from ...math.vec import dot, sub
 from ...model.force import CoordinateForce, JointForce
@@ -113,6 +114,10 @@ class ForceView(View):
         if at < 0:
             return self._result.records.zeros()
         s, S, t = self._x.structure, self._x.system, self._result.t
+        if self._result.records.dtype == float and takes_arrays(S.code, at):
+            slots = self._result.measured.slots[0]
+            behind = len(slots) - len(s.switches)
+            return over_time(S.code, S.const, at, (t, a, b), (slots[:behind], slots[behind:]))
         stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3), self._result.records.dtype)
         sensed = self._result.measured.slots
         x = np.stack([t, a, b], axis=1)

@@ -1,0 +1,178 @@
+"""Memory of one run, and the engine bound to it: runs go through it one after the other in one compiled call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiler.bound import Bound, Mould, Written
+from ...equations.engine import Sheet, engine
+from ...equations.many import one_after_another
+from ...equations.tasks import COMPLETE
+from ...numerics.integrators.clock import Clock
+from ...numerics.integrators.tableaux import Tableau
+from ...tables.system import LATER, Work
+from ..compiled import Compiled
+from ..motion.later import standing
+from .spread import TABLES, Place
+
+
+class Numbers(NamedTuple):
+    """Tables of numbers in `System`: see there."""
+
+    force_x: np.ndarray
+    const: np.ndarray
+    body_x: np.ndarray
+    glob: np.ndarray
+    frame_x: np.ndarray
+    term_x: np.ndarray
+    switch_x: np.ndarray
+
+
+class Memory(NamedTuple):
+    """All that a run reads as its own or writes to."""
+
+    tables: Numbers
+    work: Work
+    clock: Clock
+    sheet: Sheet
+
+
+@dataclass(frozen=True)
+class Part:
+    """Numbers that differ from run to run: in which array (`Track.arrays`), where in it (j,), and these, (n, j)."""
+
+    name: str
+    at: np.ndarray
+    x: np.ndarray
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Runs that are called together.
+
+    Attributes
+    ----------
+    runs : (n,) ndarray of int
+        Their numbers.
+    base : mapping
+        Array (`Track.arrays`) -> with what it begins in all of them, but for the parts.
+    parts : sequence of Part
+    length : (n,) ndarray
+        Of the mechanism [m].
+    places : list
+        In which group each is.
+    pattern : list of bytes
+        Alike in runs whose tables are plain alike (`spread.Tables.pattern_of`); empty: not known.
+    """
+
+    runs: np.ndarray
+    base: Mapping[str, np.ndarray]
+    parts: Sequence[Part]
+    length: np.ndarray
+    places: list[Place]
+    pattern: list[bytes]
+
+    def some(self, k: Sequence[int]) -> Batch:
+        """Some of them."""
+        parts = [replace(p, x=p.x[k]) for p in self.parts]
+        places, pattern = [self.places[i] for i in k], [self.pattern[i] for i in k]
+        return Batch(self.runs[k], self.base, parts, self.length[k], places, pattern)
+
+    def write(self, k: int, arrays: Mapping[str, np.ndarray]) -> None:
+        """What run k has into those arrays that are given."""
+        for name, x in self.base.items():
+            if name in arrays:
+                arrays[name].ravel()[: x.size] = x.ravel()
+        for part in self.parts:
+            if part.name in arrays:
+                arrays[part.name].ravel()[part.at] = part.x[k]
+
+
+class Track:
+    """Memory of a mechanism's runs, and the engine bound to it.
+
+    Attributes
+    ----------
+    compiled : Compiled
+        With tables and scratch in the memory.
+    clock : Clock
+    rows : ndarray
+        Rows of output.
+    arrays : dict
+        By name what a run may have of its own: tables, ``"FK"`` (frames on ground), ``"y"``, ``"real"``, ``"option"``.
+    """
+
+    def __init__(self, c: Compiled, clock: Clock, rows: np.ndarray, method: Tableau, task: int) -> None:
+        fields = Memory(Numbers(*(getattr(c.values.system, n) for n in TABLES)), c.work, clock, Sheet(rows))
+        mould = Mould(fields, (clock.times, clock.accounts))
+        block = mould.block.copy()
+        own = mould.fill(block)
+        self._cells = block.view(np.int64)
+        self._new = self._cells.copy()
+        self._begin = _address(block)
+        self.compiled, self.clock, self.rows, self.task = c, own.clock, own.sheet.rows, task
+        c.values = replace(c.values, system=c.values.system._replace(**own.tables._asdict()))
+        made, S = [0, 0, 0], c.values.system
+        if c.made is not None:
+            S = c.made.system(S)
+            made, self._addresses = c.made.reckoning(S)
+        c.system = S
+        vars(c)["work"] = own.work
+        self._made = np.array(made, np.int64)
+        self._given = [Written(x) for x in (S, own.work, method, own.clock, own.sheet)]
+        self._bound = Bound(engine, *self._given)
+        self._then = np.zeros(8, np.int64)
+        self.arrays: dict[str, np.ndarray] = own.tables._asdict()
+        self.arrays |= {"FK": own.work.FK, "y": own.clock.y, "real": own.clock.real, "option": own.work.option}
+
+    def cells(self, array: np.ndarray) -> np.ndarray:
+        """Where the numbers of an array of this memory, or of a part of one, stand in it."""
+        at = np.zeros((), np.int64)
+        for stride, n in zip(array.strides, array.shape, strict=True):
+            at = at[..., None] + stride // 8 * np.arange(n)
+        return np.ravel((_address(array) - self._begin) // 8 + at)
+
+    def begin(self, batch: Batch) -> tuple[np.ndarray, np.ndarray]:
+        """Have the memory begin as all runs of a batch do; where these differ (j,), and by what, (n, j)."""
+        for name, x in batch.base.items():
+            self._new[self.cells(self.arrays[name])[: x.size]] = np.ascontiguousarray(x).view(np.int64).ravel()
+        at = [self.cells(self.arrays[p.name])[p.at] for p in batch.parts]
+        own = [np.ascontiguousarray(p.x).view(np.int64) for p in batch.parts]
+        none = np.zeros((len(batch.runs), 0), np.int64)
+        return np.concatenate([np.zeros(0, np.int64), *at]), np.concatenate([none, *own], axis=1)
+
+    def run(
+        self, own: tuple[np.ndarray, np.ndarray], ends: np.ndarray, told: np.ndarray, out: np.ndarray
+    ) -> int:  # fmt: skip
+        """Runs one after the other; see `one_after_another`."""
+        return int(one_after_another(self._bound.asked, self.task, self._then, self._made, self._cells, self._new,
+                                     own[0], own[1], ends, told, out))  # fmt: skip
+
+    def completes(self) -> None:
+        """From now on accelerations and multipliers are solved for when a run has ended (`later.solved`)."""
+        S, W, method, _, sheet = self._given
+        self._complete = Bound(engine, S, W, method, Written(standing(self.clock.y.shape[1])), sheet)
+        cell = self.cells(self.arrays["option"])[LATER]
+        self._then = np.array([*self._complete.asked, cell, COMPLETE], np.int64)
+
+    def complete(self) -> None:
+        """Do so for the run in memory."""
+        if self._then[0]:
+            self.arrays["option"][LATER] = 0.0
+            self._complete(COMPLETE)
+
+    def read(self, cells: np.ndarray) -> np.ndarray:
+        """What stands in some cells."""
+        return self._cells[cells]
+
+    def go_on(self) -> int:
+        """The run in memory goes on."""
+        return self._bound(self.task)
+
+
+def _address(array: np.ndarray) -> int:
+    return int(array.__array_interface__["data"][0])
