@@ -3,18 +3,42 @@
 from __future__ import annotations
 
 import gc
+import os
+import sys
+from collections.abc import Generator
 
-import pytest
+for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(name, "1")  # before NumPy: threads of two test processes wait for each other, busily
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # the hundred processes that tests start find what others have read
+sys.dont_write_bytecode = False
 
-from tests.layers import LAYERS, take
+import pytest  # noqa: E402
+
+from tests.layers import LAYERS, take  # noqa: E402
 
 LONG = ("program/test_added_elements", "robust/test_random", "view/test_p", "checkpoints/", "identities/", "view/")
 """Files that take longest, wherever they stand: one that began last would leave one of two processes alone."""
+SECOND = os.environ.get("PYTEST_XDIST_WORKER", "gw0")[-1] in "13579"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Of two processes one reads the files from the end: asserts are rewritten once, by the one that comes first."""
+    report = yield
+    if SECOND and isinstance(collector, pytest.Directory):
+        report.result.reverse()
+    return report
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Longest files first."""
-    items.sort(key=lambda item: next((k for k, x in enumerate(LONG) if f"tests/{x}" in item.nodeid), len(LONG)))
+    """Longest files first, in each process the same order."""
+    names = [f"tests/{x}" for x in LONG]
+    first = {
+        path: next((k for k, x in enumerate(names) if x in path), len(LONG)) for path in {str(i.path) for i in items}
+    }
+    items.sort(key=lambda item: (first[str(item.path)], str(item.path)))
 
 
 @pytest.fixture(params=LAYERS)

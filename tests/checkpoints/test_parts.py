@@ -62,15 +62,15 @@ def test_a_method_that_was_gone_over_to_is_that_of_the_next_part(tmp_path, monke
     """And is told once."""
     m = fb.Mechanism("lag", planar=True)
     m.add(fb.Body("a", mass=1, inertia=0.1, position=(0.5, 0)), fb.Revolute("A", "ground", "a", at=(0, 0)))
-    m.add(fb.CoordinateSpring("S", "A.angle", stiffness=20, damping=5000), fb.Motor("M", "A", torque="30*sin(t)"))
+    m.add(fb.CoordinateSpring("S", "A.angle", stiffness=200, damping=5e4), fb.Motor("M", "A", torque="300*sin(t)"))
     cut(monkeypatch, 700)
     run = m.simulate(30, outputs=31, checkpoint=tmp_path / "run.nc")
     assert run.health.method.count("radau from t = ") == 1
-    assert run.health.steps < 1500  # 18 000 by dop853
-    t = run.t  # I' w' + 5000 w + 20 x = 30 sin t, but for what is gone after a millisecond: w = x'
+    assert run.health.steps < 1500  # 180 000 by dop853
+    t = run.t  # I' w' + 5e4 w + 200 x = 300 sin t, but for what is gone after a millisecond: w = x'
     inertia = 0.1 + 0.25
-    gain = 30 / ((20 - inertia) + 5000j)
-    slow = -np.imag(gain) * np.exp(-20 * t / 5000)
+    gain = 300 / ((200 - inertia) + 5e4j)
+    slow = -np.imag(gain) * np.exp(-200 * t / 5e4)
     assert run["A.angle"] == pytest.approx(np.imag(gain * np.exp(1j * t)) + slow, abs=1e-5)
 
 

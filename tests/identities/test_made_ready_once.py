@@ -14,6 +14,7 @@ import pytest
 
 import flyball as fb
 from flyball.analysis.compiled import compiled
+from flyball.analysis.motion.start import begin
 from flyball.errors import FlyballError
 from flyball.model.kept import Kept
 from flyball.tables.numbers import numbers
@@ -56,8 +57,8 @@ def same_tables(m: fb.Mechanism, chosen: random.Random) -> None:
         given = {k: (env[k] or 0.1) * (1.0 + 1e-3 * chosen.random()) for k in some}
         if chosen.random() < 0.2:
             given = {k: complex(v, 1e-30) for k, v in given.items()}
+        fresh = deepcopy(m)  # asked for these values only
         for choices in (Choices(), *([Choices(tree=tree)] if tree else [])):
-            fresh = deepcopy(m)
             try:
                 wanted = bits(values(structure(fresh, choices), given))
             except FlyballError:
@@ -221,3 +222,20 @@ def test_functions_whose_globals_change_are_made_again():
     assert m.simulate(1.0)["b"].x[-1] == pytest.approx(0.5)
     scope["k"] = 3.0
     assert m.simulate(1.0)["b"].x[-1] == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("coordinates", ["absolute", "joint"])
+def test_starts_that_are_handed_out_again_share_nothing(coordinates):
+    """What a motion does to its start, and who reads its result later, is nothing to the next motion."""
+    model = mechanisms.four_bar().snapshot()
+    first, second, third = (begin(model, 0.0, None, None, coordinates, switches=True) for _ in range(3))
+    for a, b in ((first, second), (second, third)):
+        assert a.base is not b.base
+        assert a.wound is not b.wound
+        for x, y in ((a.base, b.base), (a.assembly, b.assembly)):
+            assert not any(np.shares_memory(getattr(x, k), getattr(y, k)) for k in ("q", "v"))
+            assert x.compiled.scratch is not y.compiled.scratch
+            assert x.compiled.values is y.compiled.values
+        assert not np.shares_memory(a.y, b.y)
+        assert a.y.tobytes() == b.y.tobytes()
+        assert (a.assembly is a.base) == (b.assembly is b.base)

@@ -104,7 +104,7 @@ def test_a_fast_swing_stays_explicit(ratio, rtol):
 
 def test_a_weakly_damped_swing_is_followed_until_it_is_gone():
     """A hundredth of critical: 10 mm fall by exp(-1e3 t)."""
-    r = on_a_tip(1e-3, 1e7, 0.01, fb.Initial("P.displacement", value=0.01)).simulate(2.0, outputs=21)
+    r = on_a_tip(1e-3, 1e7, 0.01, fb.Initial("P.displacement", value=0.01)).simulate(8.0, outputs=21)
     told = r.health.method
     assert told.startswith("dop853; radau from t = ")
     gone = float(told.split("t = ")[1].split()[0])
@@ -142,19 +142,19 @@ def on_mounts(bodies):
 
 def test_what_is_left_is_counted_by_what_it_costs():
     """As many steps for sixteen bodies as for one, and each is dearer: they go over, one does not."""
-    one, many = (on_mounts(n).simulate(1.0, rtol=1e-3, outputs=3) for n in (1, 16))
+    one, many = (on_mounts(n).simulate(5.0, rtol=1e-3, outputs=3) for n in (1, 16))
     assert one.health.method == ""
     assert many.health.method.startswith("dop853; radau from t = 0.0")
     rest = 1.0 / 2e4  # the way of 1 m/s until it is damped away; the spring brings it back in 2 s
-    assert np.abs(many["x7"].position[-1] - (7 + rest * np.exp(-0.5), 0, 0)).max() < 1e-5
+    assert np.abs(many["x7"].position[-1] - (7 + rest * np.exp(-2.5), 0, 0)).max() < 1e-5
 
 
 def test_it_comes_back_where_nothing_is_stiff_any_more():
     """The damper lets go: then it swings freely, with what energy there is."""
-    off = fb.Event("off", "t - 0.5", do=[fb.Set("c", 0.0), fb.Impulse("s", "3e-3")])
-    r = bushing(1000.0, off).simulate(0.6, outputs=[0.5, 0.501, 0.6])
+    off = fb.Event("off", "t - 0.9", do=[fb.Set("c", 0.0), fb.Impulse("s", "3e-3")])
+    r = bushing(1000.0, off).simulate(1.0, outputs=[0.9, 0.901, 1.0])
     assert "radau from t = " in r.health.method
-    assert r.health.method.rpartition("; ")[2].startswith("dop853 from t = 0.5")
+    assert r.health.method.rpartition("; ")[2].startswith("dop853 from t = 0.9")
     w = np.sqrt(1e9)
     at = np.hypot(r["x"].position[1:, 0] * w, r["x"].velocity[1:, 0])
     assert at == pytest.approx([3.0, 3.0], rel=1e-4)
@@ -163,7 +163,7 @@ def test_it_comes_back_where_nothing_is_stiff_any_more():
 def test_what_radau_does_not_know_stays_explicit_and_health_says_why():
     m = bushing(1000.0)
     m.add(fb.Actuator("a", "s.displacement", force=lambda t: 0.0 * t))
-    r = m.simulate(0.3, outputs=2)
+    r = m.simulate(0.8, outputs=2)
     assert "dop853, though it is stiff" in r.health.method
     assert "is a Python function" in r.health.method
 

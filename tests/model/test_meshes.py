@@ -113,6 +113,17 @@ def test_a_file_that_changes_is_read_again(there: Path) -> None:
     assert m.mass_properties(drawn=True).total.mass == pytest.approx(2)
 
 
+def test_a_motion_begins_with_the_file_as_it_is(there: Path) -> None:
+    """A box of 1 x 1 m, then of 2 x 1, turns from rest about an axis 2 m away: 2 g/(4 + (a^2 + b^2)/12)."""
+    m = fb.Mechanism("pendulum", gravity=(0, -9.81, 0))
+    m.add(fb.Body("b", shape=fb.Mesh(path="part.stl"), density=1.0))
+    m.add(fb.Revolute("hinge", "ground", "b", at=(-2, 0, 0), axis=(0, 0, 1)))
+    for a in (1, 2, 1):
+        trimesh.creation.box((a, 1, 1)).export("part.stl")
+        turned = m.simulate(1e-3, outputs=2)["b"].angular_acceleration[0]
+        assert turned == pytest.approx([0, 0, -2 * 9.81 / (4 + (a * a + 1) / 12)], rel=1e-9)
+
+
 def test_a_path_is_counted_from_the_model_file(there: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (there / "model" / "parts").mkdir(parents=True)
     trimesh.creation.box((1, 2, 3)).export("model/parts/part.stl")

@@ -52,10 +52,11 @@ def test_where_internals_differ_compilation_takes_the_usual_way(asked_anew, monk
 
 def test_nothing_stays_patched():
     from llvmlite.ir import IRBuilder
-    from numba.core import base, callconv, cgutils, codegen, ir, lowering
+    from numba.core import base, callconv, cgutils, codegen, event, ir, lowering, typeinfer
     from numba.core.postproc import PostProcessor
     from numba.core.targetconfig import TargetConfig
     from numba.core.typing.context import BaseContext
+    from numba.core.typing.npydecl import NumpyRulesArrayOperator
 
     def patched():
         library, target = codegen.CPUCodeLibrary, codegen.JITCPUCodegen
@@ -65,7 +66,12 @@ def test_nothing_stays_patched():
         called = base.user_function, callconv.CPUCallConv._return_errcode_raw, cgutils.alloca_once
         target_of = base.BaseContext
         chosen = target_of.get_function, target_of.cast, target_of.pair_first, target_of.pair_second
-        lean = *lower, *called, *chosen, IRBuilder.insert_value, IRBuilder.extract_value
+        handed = lowering.Lower._find_singly_assigned_variable, target_of.declare_function
+        folded = IRBuilder.icmp_signed, IRBuilder.select, IRBuilder.add, IRBuilder.mul
+        told = event.install_timer, event.start_event, event.end_event, base._has_loc, NumpyRulesArrayOperator.generic
+        explained = typeinfer.new_error_context, lowering.new_error_context, callconv.BaseCallConv.decode_arguments
+        built = IRBuilder.insert_value, IRBuilder.extract_value
+        lean = *lower, *called, *chosen, *handed, *folded, *told, *explained, *built
         return [library.finalize, library._optimize_functions, target.set_env, *quick, *found, *lean]
 
     before = patched()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import gc
+import json
 import pickle
 import random
 import re
@@ -16,7 +17,10 @@ import pytest
 import xarray as xr
 
 import flyball as fb
+from flyball.results import stored
+from flyball.results.files import checksum
 from flyball.results.result import Result
+from flyball.results.stored import taken, text_type
 from tests.results.made_up import slider_crank
 
 
@@ -193,11 +197,18 @@ def test_what_was_exchanged_inside_is_found(pair: tuple[str, str], result: Resul
     whole = (tmp_path / "r.nc").read_bytes()
 
     def swap(group) -> None:
-        a, b = (group.variables[name] for name in pair)
+        held = taken(group)
+        a, b = (held[name] for name in pair)
+        if isinstance(a, str):
+            told = json.loads(group.variables["texts"][()])
+            told["texts"][pair[0]] = b
+            group.variables["texts"][...] = np.array(json.dumps(told), object)
+            return
         if a.shape == b.shape:
-            a[...], b[...] = b[...], a[...]
+            a[...], b[...] = b.copy(), a.copy()
         else:
-            a[...] = np.flip(a[...]) if a.dimensions else b[()]
+            a[...] = np.flip(a)
+        group.variables["numbers"][...] = np.concatenate([x.ravel() for x in held.values() if not isinstance(x, str)])
 
     rewritten(tmp_path / "r.nc", swap)
     with pytest.raises(fb.ModelError, match=r"r\.nc is damaged: what it holds does not fit (its|the) checksum"):
@@ -207,6 +218,44 @@ def test_what_was_exchanged_inside_is_found(pair: tuple[str, str], result: Resul
     same(result, fb.load_result(tmp_path / "r.nc"))
 
 
+def as_before(path: Path, kind: int, **changes: str) -> None:
+    """Write the file as earlier versions did: each text and each array a variable by itself."""
+    with h5netcdf.File(path) as file:
+        held = taken(file.groups["flyball"]) | changes
+    with h5netcdf.File(path, "w") as file:
+        group = file.create_group("flyball")
+        group.attrs["format"], group.attrs["version"] = kind, "0.9"
+        for name, x in held.items():
+            if isinstance(x, str):
+                group.create_variable(name, (), dtype=text_type(), data=np.array(x, object))
+                continue
+            dims = tuple(f"n_{name}_{k}" for k in range(x.ndim))
+            for dim, n in zip(dims, x.shape):
+                group.dimensions[dim] = n
+            group.create_variable(name, dims, data=x)
+        if kind == 3:
+            group.attrs["checksum"] = checksum(held, kind)
+
+
+def test_files_of_one_variable_for_each_array_are_read(result: Result, tmp_path: Path) -> None:
+    result.save(tmp_path / "r.nc")
+    as_before(tmp_path / "r.nc", 3)
+    back = fb.load_result(tmp_path / "r.nc")
+    same(result, back)
+    assert back.health.warnings == result.health.warnings
+    rewritten(tmp_path / "r.nc", lambda group: group.attrs.update({"checksum": "0"}))
+    with pytest.raises(fb.ModelError, match="does not fit its checksum"):
+        fb.load_result(tmp_path / "r.nc")
+
+
+def test_arrays_written_one_by_one_are_the_same(result: Result, tmp_path: Path, monkeypatch) -> None:
+    """Large ones are not put together in memory."""
+    result.save(tmp_path / "r.nc")
+    monkeypatch.setattr(stored, "MOST", 10)
+    result.save(tmp_path / "large.nc")
+    same(fb.load_result(tmp_path / "r.nc"), fb.load_result(tmp_path / "large.nc"))
+
+
 def test_files_from_before_checksums_are_read_with_a_note(tmp_path: Path) -> None:
     """Tables went on straight then, unless ``outside`` said something else."""
     result = slider_crank()
@@ -214,18 +263,10 @@ def test_files_from_before_checksums_are_read_with_a_note(tmp_path: Path) -> Non
     result.model.add(fb.Table("a", x=(0, 1), y=(0, 1), beyond="line"))
     result.model.add(fb.Table("b", x=(0, 1, 2), y=(0, 1, 0), beyond="repeat"))
     result.save(tmp_path / "r.nc")
-
-    def older(group) -> None:
-        group.attrs["format"] = 2
-        del group.attrs["checksum"]
-        text = group.variables["model"][()]
-        text = text.decode() if isinstance(text, bytes) else text
-        text = text.replace('beyond = "line"\n', "").replace('beyond = "repeat"', 'outside = "periodic"')
-        group.variables["model"][...] = np.array(text, object)
-
-    whole = (tmp_path / "r.nc").read_bytes()
-    (tmp_path / "r.nc").write_bytes(whole[: whole.rindex(b"\nflyball SHA-256")])
-    rewritten(tmp_path / "r.nc", older)
+    with h5netcdf.File(tmp_path / "r.nc") as file:
+        text = taken(file.groups["flyball"])["model"]
+    text = text.replace('beyond = "line"\n', "").replace('beyond = "repeat"', 'outside = "periodic"')
+    as_before(tmp_path / "r.nc", 2, model=text)
     back = fb.load_result(tmp_path / "r.nc")
     assert [x.beyond for x in back.model.tables] == ["line", "repeat"]
     assert re.search(r"r\.nc was written before result files had checksums", back.health.warnings[-1])

@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.bound import Moulded
+from ..compiler.bound import Bound, Moulded, Written
 from ..constraints.registry import KINDS
-from ..equations.engine import POSITION, evaluate
+from ..equations.engine import POSITION, Sheet, engine, evaluate
 from ..equations.projection import NONE
-from ..equations.scratch import scratch, work
+from ..equations.scratch import scratch, tables, work
 from ..equations.velocities import turned_angles, velocities
 from ..model.body import Body, Frame, Initial
 from ..model.model import Model
+from ..numerics.integrators.clock import Clock
+from ..numerics.integrators.tableaux import Tableau
 from ..tables.controllers import initial
 from ..tables.coordinates import BodyState, positions
 from ..tables.forest import steps
@@ -50,11 +52,11 @@ class Compiled:
 
     def run_on(self, made: Any) -> None:
         """From now on code that was made for this mechanism does what it can for the engine, in scratch that is new."""
-        x, before = self.values, vars(self).pop("work", None)
-        vars(self).pop("scratch", None)
+        x, before = self.values, vars(self).pop("scratch", None)
+        vars(self).pop("work", None)
         self.made, self.system = made, x.kept.get("made", id(made), 1, lambda: (made, made.system(x.system)))[1]
         if before is not None:
-            self.work.option[:] = before.option
+            self.array("option")[:] = before.array("option")
 
     def run_on_tables(self) -> None:
         """From now on the engine's own loops do all."""
@@ -63,18 +65,28 @@ class Compiled:
     @cached_property
     def work(self) -> Work:
         """Scratch of its own."""
-        if self.system.body_x.dtype.kind not in "fc":
-            w = work(self.structure, self.system)
-        else:
-            w = self.scratch.fields
-        w.option[STABILIZE] = NONE
-        w.option[PASS] = 1e-13
+        if self.system.body_x.dtype.kind in "fc":
+            return self.scratch.fields  # type: ignore[no-any-return]
+        w = work(self.structure, self.system)
+        w.option[STABILIZE], w.option[PASS] = NONE, 1e-13
         return w
 
     @cached_property
     def scratch(self) -> Moulded:
         """The same as compiled code has it."""
-        return scratch(self.structure, self.system, self.system.body_x.dtype)
+        made = scratch(self.structure, self.system, self.system.body_x.dtype)
+        option = made.array("option")
+        option[STABILIZE], option[PASS] = NONE, 1e-13
+        return made
+
+    def array(self, name: str) -> np.ndarray:
+        """An array of the scratch, without the others."""
+        return self.scratch.array(name)
+
+    def bound(self, R: Tableau, clock: Clock, out: np.ndarray) -> Bound:
+        """The engine bound to the tables and the scratch that are its own now; as `engine.motion_kernel` else."""
+        tuples = tables(self.structure, self.system), self.scratch, Written(R), Written(clock), Written(Sheet(out))
+        return Bound(engine, *tuples)
 
     @property
     def structure(self) -> Structure:
@@ -204,6 +216,8 @@ class Compiled:
 
     def kinetic_energy(self, v: np.ndarray) -> float:
         """Kinetic energy [J] at velocities v (nv,) of absolute coordinates."""
+        if not v.any():
+            return 0.0
         x = self.values
         i, j, M = x.kept.get("mass", None, 1, lambda: self._entries(INERTIA, x.system.body_x[:, MASS]))
         return float(0.5 * (v[i] * M * v[j]).sum())

@@ -6,11 +6,10 @@ the method alone (`flyball.methods`); ``tests/program/test_options.py`` holds th
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import Field, dataclass, fields
 from numbers import Number
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -28,52 +27,119 @@ class Options:
     @classmethod
     def asked(cls, given: Mapping[str, Any]) -> Self:
         """From the arguments of a method: its ``locals()``."""
-        return cls(**{f.name: given[f.name] for f in fields(cls)})
+        return cls(**{name: given[name] for name in names_of(cls)})
 
     def known(self, **values: Any) -> Self:
         """The same with values that need no check."""
-        out = copy.copy(self)
-        for name, value in values.items():
-            object.__setattr__(out, name, value)
+        out = object.__new__(type(self))
+        vars(out).update(vars(self))
+        vars(out).update(values)
         return out
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if f.name in TIMES and (value is not None or f.type == "float"):
-                value = seconds(value, f.name)
-            elif f.type == "tuple[str, ...]" or (f.type == "tuple[str, ...] | None" and value is not None):
-                value = names(value, f.name)
-            elif f.type == "str" and not isinstance(value, str):
-                raise ModelError(f"{f.name} is a text, not a {type(value).__name__}")
-            elif f.name == "values":
-                value = numbers(value, f.name)
-            elif f.type == "Sequence[float | str]" and (isinstance(value, str) or not isinstance(value, _LISTS)):
-                raise ModelError(f"{f.name} is a list of numbers or quantities, not {value!r}")
-            elif (
-                str(f.type).startswith("Callable") and not callable(value) and not (value is None and "None" in f.type)
-            ):
-                raise ModelError(f"{f.name} is a function, not {value!r}")
-            elif f.type == "bool" and not isinstance(value, bool):
-                raise ModelError(f"{f.name} is True or False, not {value!r}")
-            elif f.name == "parameters" and value is not None:
-                _check_parameters(value)
-                continue
-            elif f.name != "parameters" and str(f.type).startswith("Mapping") and not isinstance(value, Mapping | None):
-                raise ModelError(f"{f.name} maps names to what is given for each, not {value!r}")
-            elif f.name == "progress" and not (isinstance(value, bool) or callable(value)):
-                raise ModelError(f"progress is True, False or a function of the fraction done, not {value!r}")
-            else:
-                continue
-            object.__setattr__(self, f.name, value)
+        own = vars(self)
+        for name, check in _asked(type(self)).checks:
+            own[name] = check(own[name], name)
 
 
-def _check_parameters(value: Any) -> None:
+Check = Callable[[Any, str], Any]
+"""Takes what was given for an option, and its name; returns what it is from then on, or refuses it."""
+
+
+class _Asked(NamedTuple):
+    """What a class of options asks."""
+
+    names: tuple[str, ...]
+    checks: tuple[tuple[str, Check], ...]  # of those of which more is asked than that they are there
+
+
+_ASKED: dict[type, _Asked] = {}
+
+
+def _asked(cls: type[Options]) -> _Asked:
+    """The same for all of a class."""
+    if cls not in _ASKED:
+        every = fields(cls)
+        checks = ((f.name, _check(f)) for f in every)
+        found = tuple((name, check) for name, check in checks if check is not None)
+        _ASKED[cls] = _Asked(tuple(f.name for f in every), found)
+    return _ASKED[cls]
+
+
+def names_of(cls: type[Options]) -> tuple[str, ...]:
+    """Names of the options of a class."""
+    return _asked(cls).names
+
+
+def _check(f: Field[Any]) -> Check | None:
+    """What is asked of an option."""
+    kind = str(f.type)
+    optional = "None" in kind
+    if f.name in TIMES:
+        return seconds if kind == "float" else _unless_none(seconds)
+    if kind in ("tuple[str, ...]", "tuple[str, ...] | None"):
+        return _unless_none(names) if optional else names
+    if f.name == "values":
+        return numbers
+    if f.name == "parameters":
+        return _unless_none(_parameters)
+    if f.name == "progress":
+        return _progress
+    if kind.startswith("Callable"):
+        return _unless_none(_function) if optional else _function
+    return _unless_none(_mapping) if kind.startswith("Mapping") else _OF_TYPE.get(kind)
+
+
+def _unless_none(check: Check) -> Check:
+    return lambda value, name: None if value is None else check(value, name)
+
+
+def _text(value: Any, name: str) -> str:
+    if not isinstance(value, str):
+        raise ModelError(f"{name} is a text, not a {type(value).__name__}")
+    return value
+
+
+def _list(value: Any, name: str) -> Any:
+    if isinstance(value, str) or not isinstance(value, _LISTS):
+        raise ModelError(f"{name} is a list of numbers or quantities, not {value!r}")
+    return value
+
+
+def _truth(value: Any, name: str) -> bool:
+    if not isinstance(value, bool):
+        raise ModelError(f"{name} is True or False, not {value!r}")
+    return value
+
+
+def _function(value: Any, name: str) -> Any:
+    if not callable(value):
+        raise ModelError(f"{name} is a function, not {value!r}")
+    return value
+
+
+def _mapping(value: Any, name: str) -> Any:
+    if not isinstance(value, Mapping):
+        raise ModelError(f"{name} maps names to what is given for each, not {value!r}")
+    return value
+
+
+def _progress(value: Any, name: str) -> Any:
+    if not (isinstance(value, bool) or callable(value)):
+        raise ModelError(f"{name} is True, False or a function of the fraction done, not {value!r}")
+    return value
+
+
+_OF_TYPE: dict[str, Check] = {"str": _text, "bool": _truth, "Sequence[float | str]": _list}
+
+
+def _parameters(value: Any, _: str) -> Any:
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
         raise ModelError(f"parameters maps names to values, for instance {{'mass': 2}}; {value!r} does not")
     for name, x in value.items():
         if isinstance(x, complex):
             raise ModelError(f"parameter {name!r}: {x!r} is complex; a real number is wanted")
+    return value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,6 +165,8 @@ def seconds(value: Any, name: str) -> float:
     ModelError
         If it is none.
     """
+    if type(value) is float and value - value == 0.0:
+        return value
     found = number(value, {}, "s", name)
     if isinstance(found, complex) or not isinstance(found, Number):
         raise ModelError(f"{name} is a time [s], not {value!r}")
@@ -145,6 +213,8 @@ def positive(value: Any, name: str) -> None:
     ModelError
         If it is none.
     """
+    if type(value) is float and value > 0.0:
+        return
     if isinstance(value, bool) or not isinstance(value, Number) or isinstance(value, complex) or not value > 0:  # type: ignore[operator]
         raise ModelError(f"{name} must be greater than 0, got {value!r}")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Protocol
 
 AFTER = 2.0  # seconds before there is a bar
@@ -19,25 +19,15 @@ class Tell(Protocol):
         """Tell."""
 
 
-@contextmanager
-def shown(wish: bool | Callable[[float], None], what: str) -> Iterator[Tell]:
+def shown(wish: bool | Callable[[float], None], what: str) -> AbstractContextManager[Tell]:
     """What an analysis tells how far it is: ``wish`` is a function, or whether there may be a bar.
 
     Nothing is written but to a terminal or a notebook. The bar has no thread of its own and is gone when the analysis
     ends, also by an error or an interrupt.
     """
     if callable(wish):
-        yield lambda fraction, note="": wish(fraction)
-        return
-    make = _place() if wish else None
-    if make is None:
-        yield unwatched
-        return
-    bar = _Bar(make, what)
-    try:
-        yield bar
-    finally:
-        bar.end()
+        return nullcontext(lambda fraction, note="": wish(fraction))
+    return _Bar(what) if wish else nullcontext(unwatched)
 
 
 def unwatched(fraction: float, note: str = "") -> None:
@@ -53,23 +43,27 @@ def _place() -> Callable[[str], Any] | None:
 
 
 class _Bar:
-    """A bar that comes late and is drawn seldom."""
+    """A bar that comes late and is drawn seldom; only then it is asked whether somebody sees it."""
 
-    def __init__(self, make: Callable[[str], Any], what: str) -> None:
-        self.make, self.what = make, what
-        self.drawn: Any = None
+    def __init__(self, what: str) -> None:
+        self.what, self.drawn, self.unseen = what, None, False
         self.begin = self.last = time.monotonic()
+
+    def __enter__(self) -> Tell:
+        return self
 
     def __call__(self, fraction: float, note: str = "") -> None:
         now = time.monotonic()
         if now - self.begin < AFTER or now - self.last < EVERY or (self.drawn is None and fraction >= 1.0):
             return
         self.last = now
-        if self.drawn is None:
-            self.drawn = self.make(self.what)
-        self.drawn.draw(min(max(fraction, 0.0), 1.0), note)
+        if self.drawn is None and not self.unseen:
+            make = _place()
+            self.drawn, self.unseen = make and make(self.what), make is None
+        if self.drawn is not None:
+            self.drawn.draw(min(max(fraction, 0.0), 1.0), note)
 
-    def end(self) -> None:
+    def __exit__(self, *_: object) -> None:
         if self.drawn is not None:
             self.drawn.end()
 

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from ..constraints.modes import BRANCH, FRICTION
-from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
+from ..equations.engine import FOLLOW, INTEGRATE
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import ROWS, breaking, kept
 from ..errors import FlyballError, Interrupted, ModelError, SimulationError, StartWarning, warn
@@ -19,7 +19,7 @@ from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.departure import changed_velocities, not_allowed
 from ..results.result import Result
-from ..tables.system import ALPHA, BETA, LATER, MASS, PASS, STABILIZE, TOL_G, TOL_V
+from ..tables.system import ALPHA, BETA, LATER, MASS, PASS, STABILIZE, TOL_G, TOL_V, System
 from .assembly.start import Assembly
 from .compiled import Compiled
 from .motion import partition
@@ -165,7 +165,7 @@ def moved(
     sampled = sampled_laws(c, known)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o, sampled)
     later = not watched(begun) and open_until_asked(begun, o, task)
-    begun.assembly.compiled.work.option[LATER] = float(later)
+    c.array("option")[LATER] = float(later)
     here = Here(begun, clock)
     if task == INTEGRATE and (o.method in IMPLICIT or watched(begun) or len(known.times) or c.structure.sampled):
         rows, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
@@ -230,9 +230,9 @@ def clock_for(
     """
     a, y = start.assembly, start.y
     refuse_unheld(len(times), width(a))
-    s, W = a.compiled.structure, a.compiled.work
+    s, option = a.compiled.structure, a.compiled.array("option")
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
-    real[[ex.T, ex.T_END, ex.RTOL]] = t, t_end, o.rtol
+    real[ex.T], real[ex.T_END], real[ex.RTOL] = t, t_end, o.rtol
     first = t if start.part.first is None else start.part.first
     real[ex.SPAN] = (t_end - first) or 1.0
     real[ex.STEP] = o.step or 0.0
@@ -244,9 +244,9 @@ def clock_for(
     count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv + len(s.controls) - len(s.sampled), s.nq
     Y = np.zeros((ex.STATES, len(y)))
     Y[0] = y
-    W.option[STABILIZE] = STABILIZATION[o.stabilization]
-    W.option[ALPHA], W.option[BETA] = o.alpha or 0.0, o.beta or 0.0
-    W.option[PASS] = 1e-13
+    option[STABILIZE] = STABILIZATION[o.stabilization]
+    option[ALPHA], option[BETA] = o.alpha or 0.0, o.beta or 0.0
+    option[PASS] = 1e-13
     nothing = sampled is not None and not sampled and not breaking(a.compiled.values.system)
     seen = np.zeros((ROWS, 0)) if nothing else kept(a.compiled.values.system, sampled)
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
@@ -258,7 +258,7 @@ def clock_for(
 
 def size(clock: ex.Clock, base: Assembly, c: Compiled, atol: float) -> None:
     """Write what follows from a mechanism's length and weight: tolerances, and what they are compared with."""
-    real, option = clock.real, c.work.option
+    real, option = clock.real, c.array("option")
     energy = energy_size(base, float(real[ex.SPAN]))
     found = sizes(c.values.length, atol, real[ex.RTOL], energy)
     (real[ex.ATOL], real[ex.SCALE], real[ex.LEDGER]), (option[TOL_G], option[TOL_V]) = found
@@ -278,9 +278,14 @@ def energy_size(a: Assembly, span: float) -> float:
     """An energy [J] that errors of works are small against: to lift the mechanism by its length, and to move it by as
     much in the time there is, besides what it has.
     """
-    S, length = a.compiled.values.system, a.compiled.values.length
-    weight = float(S.body_x[:, MASS].sum()), float(np.sqrt((S.glob[:3] ** 2).sum()))
-    return lifted(weight, length, span) + float(a.compiled.kinetic_energy(a.v))
+    x = a.compiled.values
+    weight = x.kept.get("weight", None, 1, lambda: _weight(x.system))
+    return lifted(weight, x.length, span) + a.compiled.kinetic_energy(a.v)
+
+
+def _weight(S: System) -> tuple[float, float]:
+    """Mass of all bodies [kg], and gravity [m/s^2]."""
+    return float(S.body_x[:, MASS].sum()), float(np.sqrt((S.glob[:3] ** 2).sum()))
 
 
 def lifted(weight: tuple[float, float], length: float, span: float) -> float:
@@ -317,7 +322,8 @@ def run_clock(
     rows = []
     first = clock.real[ex.T]
     span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
-    forget(c.work.stack)
+    bound, of = None, c.scratch
+    forget(c.array("stack"))
     engine.begin(clock)
     quota = engine.limited(clock, float(clock.count[ex.QUOTA]))
     if pace is not None:
@@ -327,7 +333,9 @@ def run_clock(
             begin, clock.count[ex.QUOTA] = time.perf_counter(), part.most(quota)
             before = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
             with interrupts_kept(s.functions):
-                used = motion_kernel(c.system, c.work, method, clock, buffer, task)
+                if bound is None or of is not c.scratch:
+                    bound, of = c.bound(method, clock, buffer), c.scratch
+                used = bound(task)
                 rows.append(buffer[:used].copy())
             reached = max(reached, (clock.real[ex.T] - first) / span)
             tell(reached)
@@ -339,7 +347,7 @@ def run_clock(
             if engine.begins_anew(clock):
                 rows.clear()
                 part.anew()
-                forget(c.work.stack)
+                forget(c.array("stack"))
             if part.over(clock if task == INTEGRATE else None):  # of what is followed every step is one
                 return np.concatenate(rows), False
             quota = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))

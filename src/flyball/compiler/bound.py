@@ -83,7 +83,7 @@ class Moulded(Written):
         return self._of.fill(self._block)
 
     def array(self, name: str) -> np.ndarray:
-        """One of the tuple's own arrays, without the others."""
+        """One of the tuple's own arrays, without the others; of a tuple in it ``"inner.name"``."""
         return self._of.named(name, self._block)
 
 
@@ -143,19 +143,18 @@ class Mould:
         return self._filled(self._new, block, iter(self._laid))
 
     def named(self, name: str, block: np.ndarray) -> np.ndarray:
-        """One of the tuple's own arrays in a block."""
+        """One of the tuple's own arrays in a block: see `Moulded.array`."""
         shape, dtype, begin = self._laid[self._named[name]]
         return np.ndarray(shape, dtype, block, begin)
 
-    def _lay(self, fields: Any, at: int, own: list[int]) -> int:
+    def _lay(self, fields: Any, at: int, own: list[int], of: str = "") -> int:
         """Say where arrays begin in the block, and where among the numbers that stands."""
         for name, x in zip(fields._fields, fields, strict=True):
             if isinstance(x, tuple):
-                at = self._lay(x, at, own)
+                at = self._lay(x, at, own, f"{of}{name}.")
                 continue
             if id(x) not in self._shared:
-                if fields is self._new:
-                    self._named[name] = len(own)
+                self._named[of + name] = len(own)
                 own.append(at + PARTS.index("data"))
                 self._laid.append((x.shape, x.dtype, self._size))
                 self._size += -(-x.nbytes // EVEN) * EVEN
@@ -194,9 +193,13 @@ class Bound:
         self.address = door.address(*(() if door.used else (x.fields for x in tuples)))
         if not _fits(door, tuples):
             raise TypeError(f"{door.__qualname__} was not made for such tuples")
-        self.enter = _C(self.address)
         self.places = [x.place for x in tuples]
         self.asked = np.array([self.address, *self.places], np.int64)  # for `door.ask`
+
+    @cached_property
+    def enter(self) -> Any:
+        """The door, for Python; many are gone through by compiled code only."""
+        return _C(self.address)
 
     def __call__(self, task: int) -> int:
         """Have a task done."""

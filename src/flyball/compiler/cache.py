@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 from ..errors import PerformanceNotice
 from .stamp import source_stamp
+from .turns import Turn
 
 _UNPICKLING = (pickle.UnpicklingError, EOFError, ImportError, AttributeError, LookupError, TypeError, ValueError)
 DAMAGE = (*_UNPICKLING, RuntimeError)
@@ -57,14 +58,30 @@ def _cache_class() -> Any:
     class Cache(caching.FunctionCache):
         _impl_class = Implementation
 
-        def load_overload(self, sig: Any, target_context: Any) -> Any:
-            """What is kept for these types; nothing where the files are damaged, which are then written anew.
+        def __init__(self, function: Any) -> None:
+            super().__init__(function)
+            self.turn = Turn(Path(f"{self._cache_file._index_path}.turn"))
 
-            Numba would first import all that it can compile: what is compiled needs its runtime only.
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            """What is kept for these types, where another process is compiling it when it has ended; else None.
+
+            With None this process compiles: in its turn, which `turns.in_turn` ends, or, after one that left nothing,
+            beside all who waited for that. Numba would first import all that it can compile: what is compiled needs
+            its runtime only.
             """
             from numba.core.runtime import rtsys
 
             rtsys.initialize(target_context)
+            found = self._loaded(sig, target_context)
+            if found is None and self.kept:
+                waited = self.turn.take()
+                found = self._loaded(sig, target_context)
+                if waited and found is None:
+                    self.turn.give()
+            return found
+
+        def _loaded(self, sig: Any, target_context: Any) -> Any:
+            """What is there now; nothing where the files are damaged, which are then written anew."""
             try:
                 return self._load_overload(sig, target_context)
             except DAMAGE:

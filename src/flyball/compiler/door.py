@@ -61,13 +61,14 @@ class Door:
         from .cache import cache_of
         from .held import held_type
         from .steps import products_of_first_order
+        from .turns import in_turn
         from .ways import optimise_once, ours
 
         self._types = tuple(held_type(typeof(x)) for x in tuples)
         made = CFunc(self.function, ((*self._types, types.int64), types.int64), {}, dict(OPTIONS))
         made._cache = cache_of(self.function)
         steps = products_of_first_order() if self.stepped and ours() else nullcontext()
-        with optimise_once(self.function.__qualname__), steps:
+        with in_turn(made._cache), optimise_once(self.function.__qualname__), steps:
             made.compile()
         self._made = made
 

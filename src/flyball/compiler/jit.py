@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 F = TypeVar("F", bound=Callable[..., Any])
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}  # how formulas and kernels are compiled
+INSIDE = {**OPTIONS, "no_cfunc_wrapper": True}  # what only compiled code calls
 KERNELS: list[Any] = []
 LOCK = threading.RLock()
 _pending: list[Callable[[], None]] = []
@@ -37,7 +38,7 @@ def formula(function: F) -> F:
     def register() -> None:
         from numba.extending import register_jitable
 
-        register_jitable(**OPTIONS, no_cfunc_wrapper=True)(function)
+        register_jitable(**INSIDE)(function)
 
     on_numba(register)
     return function
@@ -76,10 +77,11 @@ class Kernel:
 
     def _compiling(self, compile_for: Callable[..., Any]) -> Callable[..., Any]:
         """Numba's compilation for new types of arguments, done our way, one at a time."""
+        from .turns import in_turn
         from .ways import optimise_once
 
         def compile_once(*args: Any, **options: Any) -> Any:
-            with LOCK, optimise_once(self.function.__qualname__):
+            with LOCK, in_turn(self.dispatcher._cache), optimise_once(self.function.__qualname__):
                 return compile_for(*args, **options)
 
         return compile_once
@@ -88,10 +90,11 @@ class Kernel:
         """Compile it for arguments of these types, or find it in the cache; it is not run."""
         from numba import typeof
 
+        from .turns import in_turn
         from .ways import optimise_once
 
         dispatcher = self.dispatcher
-        with LOCK, optimise_once(self.function.__qualname__):
+        with LOCK, in_turn(dispatcher._cache), optimise_once(self.function.__qualname__):
             dispatcher.compile(tuple(typeof(x) for x in args))
 
     @property

@@ -9,15 +9,13 @@ are as expected (`ways.ours`).
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from .handed import called, declared, decoded, noted, parted, remembered, room
+from .operations import added, chosen, compared, multiplied, selected, widened
 from .patched import patched
-
-_SOUND: set[str] = set()  # functions, by their names in LLVM, that were translated here and return no error
-_FAILING: set[str] = set()  # those that may
 
 
 @contextmanager
@@ -34,16 +32,23 @@ def leanly() -> Iterator[None]:
 
     with patched(
         [
-            (callconv.CPUCallConv, "_return_errcode_raw", _noted),
-            (lowering.Lower, "lower_normal_function", _remembered),
+            (callconv.CPUCallConv, "_return_errcode_raw", noted),
+            (lowering.BaseLower, "lower_normal_function", _translated),
             (lowering.Lower, "storevar", _stored),
             (lowering.Lower, "alloca_lltype", _made_room),
+            (lowering.Lower, "_find_singly_assigned_variable", _found),
             (cgutils, "alloca_once", _zeroed_once),
-            (base, "user_function", _called),
-            (base.BaseContext, "get_function", _counted),
-            (base.BaseContext, "cast", _widened),
+            (base, "user_function", called),
+            (base.BaseContext, "declare_function", declared),
+            (callconv.BaseCallConv, "decode_arguments", decoded),
+            (base.BaseContext, "get_function", chosen),
+            (base.BaseContext, "cast", widened),
             (IRBuilder, "insert_value", _put_together),
             (IRBuilder, "extract_value", _taken_apart),
+            (IRBuilder, "icmp_signed", compared),
+            (IRBuilder, "select", selected),
+            (IRBuilder, "add", added),
+            (IRBuilder, "mul", multiplied),
             (base.BaseContext, "pair_first", _first),
             (base.BaseContext, "pair_second", _second),
         ]
@@ -51,28 +56,13 @@ def leanly() -> Iterator[None]:
         yield
 
 
-def _noted(original: Any) -> Any:
-    """``_return_errcode_raw``: which functions may end in an error."""
-    from numba.core import callconv
-
-    fine = callconv.RETCODE_OK, callconv.RETCODE_NONE
-
-    def end(self: Any, builder: Any, code: Any) -> None:
-        if not any(code is x for x in fine):
-            _FAILING.add(builder.function.name)
-        original(self, builder, code)
-
-    return end
-
-
-def _remembered(original: Any) -> Any:
-    """``lower_normal_function``: without what nobody asks for; which functions cannot end so."""
+def _translated(original: Any) -> Any:
+    """``lower_normal_function``: without what nobody asks for."""
+    lower_known = remembered(original)
 
     def lower(self: Any, fndesc: Any) -> None:
-        original(self, fndesc)
+        lower_known(self, fndesc)
         _without_unused(self.function)
-        if self.function.name not in _FAILING:
-            _SOUND.add(self.function.name)
 
     return lower
 
@@ -98,6 +88,7 @@ def _without_unused(function: Any) -> None:
             else:
                 kept.append(x)
         block.instructions[:] = reversed(kept)
+    parted(function, uses)
 
 
 def _put_together(original: Any) -> Any:
@@ -105,53 +96,43 @@ def _put_together(original: Any) -> Any:
 
     def insert_value(self: Any, agg: Any, value: Any, idx: Any, name: str = "") -> Any:
         made = original(self, agg, value, idx, name)
-        if type(idx) is int:
-            made.members = {**getattr(agg, "members", {}), idx: value}
+        k = idx if type(idx) is int else idx[0] if len(idx) == 1 else None
+        if k is not None:
+            made.members = {**getattr(agg, "members", {}), k: value}
         return made
 
     return insert_value
 
 
 def _taken_apart(original: Any) -> Any:
-    """``extract_value``."""
+    """``extract_value``: of what is known, what it was put together of; else once in a block, of arguments once."""
+    from llvmlite.ir.instructions import ExtractValue
 
     def extract_value(self: Any, agg: Any, idx: Any, name: str = "") -> Any:
-        if type(idx) is int:
-            known = getattr(agg, "members", {}).get(idx)
-            if known is not None:
-                return known
-        return original(self, agg, idx, name)
+        k = idx if type(idx) is int else idx[0] if len(idx) == 1 else None
+        if k is None:
+            return original(self, agg, idx, name)
+        known = getattr(agg, "members", {}).get(k)
+        if known is not None:
+            return known
+        taken = vars(agg).setdefault("taken", {})
+        before = taken.get(k)
+        from_argument = getattr(agg, "from_argument", False)
+        if before is not None and (from_argument or before.parent is self.block):
+            return before
+        entry = self.function.blocks[0]
+        if from_argument and entry.is_terminated:
+            from_argument = False
+        if from_argument and self.block is not entry:
+            made = ExtractValue(entry, agg, [k], name=name)
+            entry.instructions.append(made)
+        else:
+            made = original(self, agg, k, name)
+        made.from_argument = from_argument
+        taken[k] = made
+        return made
 
     return extract_value
-
-
-def _called(original: Any) -> Any:
-    """``user_function``: a call; how it ended is looked at where it may have failed."""
-    from numba.core import types
-
-    def user_function(fndesc: Any, libs: Any) -> Any:
-        usual = original(fndesc, libs)
-
-        def imp(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            function = context.declare_function(builder.module, fndesc)
-            if function.name not in _SOUND or isinstance(fndesc.restype, types.Optional):
-                return usual(context, builder, sig, args)
-            packed = context.call_conv._get_arg_packer(fndesc.argtypes).as_arguments(builder, args)
-            place, error = function.args[0].type, function.args[1].type
-            found = _room(builder, place.pointee)
-            builder.call(function, [found, error(None), *packed])
-            return context.get_returned_value(builder, fndesc.restype, builder.load(found))
-
-        imp.signature, imp.libs = usual.signature, usual.libs
-        return imp
-
-    return user_function
-
-
-def _room(builder: Any, of: Any, name: str = "") -> Any:
-    """Room on the stack, with nothing in it."""
-    with builder.goto_entry_block():
-        return builder.alloca(of, name=name)
 
 
 def _zeroed_once(original: Any) -> Any:
@@ -160,11 +141,53 @@ def _zeroed_once(original: Any) -> Any:
     def alloca_once(builder: Any, ty: Any, size: Any = None, name: str = "", zfill: bool = False) -> Any:
         if not zfill or size is not None:
             return original(builder, ty, size=size, name=name, zfill=zfill)
-        place = _room(builder, ty, name)
+        place = room(builder, ty, name)
         builder.store(ty(None), place)
         return place
 
     return alloca_once
+
+
+def _found(original: Any) -> Any:
+    """``_find_singly_assigned_variable``: what is set once, before all that asks for it, needs no place in memory."""
+    from numba.core.analysis import compute_cfg_from_blocks
+
+    def find(self: Any) -> None:
+        if self.context.enable_nrt or self.func_ir.func_id.is_generator:
+            original(self)
+            return
+        blocks = self.func_ir.blocks
+        set_in, asked_in = _set_and_asked(blocks)
+        once = {name: places[0] for name, places in set_in.items() if len(places) == 1}
+        if any(asked_in.get(name) for name in once):
+            dominators = compute_cfg_from_blocks(blocks).dominators()
+            for name in [x for x in once if x in asked_in]:
+                at = once[name]
+                if not all(at < k and at in dominators[k] for k in asked_in[name]):
+                    del once[name]
+        self._singly_assigned_vars, self._blk_local_varmap = set(once), {}
+
+    return find
+
+
+def _set_and_asked(blocks: Any) -> tuple[dict[str, list[int]], dict[str, set[int]]]:
+    """In which blocks each variable is set, and in which it is asked for without having been set there before."""
+    from numba.core.ir import Assign, Inst, Var
+
+    set_in: dict[str, list[int]] = {}
+    asked_in: dict[str, set[int]] = {}
+    for k, block in blocks.items():
+        here: set[str] = set()
+        for x in block.body:
+            value = x.value if isinstance(x, Assign) else x
+            asked = [value] if isinstance(value, Var) else value.list_vars() if isinstance(value, Inst) else []
+            for y in asked:
+                if y.name not in here:
+                    asked_in.setdefault(y.name, set()).add(k)
+            if value is not x:
+                set_in.setdefault(x.target.name, []).append(k)
+                here.add(x.target.name)
+    return set_in, asked_in
 
 
 def _made_room(original: Any) -> Any:
@@ -173,7 +196,7 @@ def _made_room(original: Any) -> Any:
     def alloca_lltype(self: Any, name: str, lltype: Any, datamodel: Any = None) -> Any:
         if self.context.enable_nrt:
             return original(self, name, lltype, datamodel)
-        return _room(self.builder, lltype, name)
+        return room(self.builder, lltype, name)
 
     return alloca_lltype
 
@@ -192,100 +215,6 @@ def _stored(original: Any) -> Any:
             self.builder.store(value, self.getvar(name))
 
     return storevar
-
-
-def _counted(original: Any) -> Any:
-    """``get_function``: ranges that count by ones."""
-    from numba.core import types
-
-    def get_function(self: Any, fn: Any, sig: Any, **more: Any) -> Any:
-        if fn == "iternext" and sig.args[0] == types.range_iter64_type:
-            return lambda builder, args, *_: _next(self, builder, sig, args[0])
-        if fn == "getiter" and sig.args[0] == types.range_state64_type:
-            usual = original(self, fn, sig, **more)
-            return lambda builder, args, *_: _begun(self, builder, sig, args[0], usual)
-        simple = SIMPLE.get(getattr(fn, "typing_key", None))
-        if simple and isinstance(sig.return_type, types.Complex) and sig.return_type == sig.args[0] == sig.args[-1]:
-            return lambda builder, args, *_: _of_both(self, builder, sig, args, simple)
-        if sig.return_type == types.range_state64_type and len(sig.args) < 3 and _is_range(fn):
-            return lambda builder, args, *_: _range(self, builder, sig, args)
-        return original(self, fn, sig, **more)
-
-    return get_function
-
-
-SIMPLE = {
-    operator.add: "fadd",
-    operator.iadd: "fadd",
-    operator.sub: "fsub",
-    operator.isub: "fsub",
-    operator.neg: "fneg",
-}
-
-
-def _of_both(context: Any, builder: Any, sig: Any, args: Any, name: str) -> Any:
-    """Sum, difference, negative of complex numbers."""
-    pairs = zip(*([builder.extract_value(x, k) for k in range(2)] for x in args), strict=True)
-    return struct(context, builder, sig.return_type, [getattr(builder, name)(*x) for x in pairs])
-
-
-def _widened(original: Any) -> Any:
-    """``cast``: real numbers to complex ones."""
-    from numba.core import types
-
-    def cast(self: Any, builder: Any, val: Any, fromty: Any, toty: Any) -> Any:
-        if not (isinstance(toty, types.Complex) and isinstance(fromty, types.Float)):
-            return original(self, builder, val, fromty, toty)
-        real = original(self, builder, val, fromty, toty.underlying_float)
-        return struct(self, builder, toty, (real, real.type(0.0)))
-
-    return cast
-
-
-def _is_range(fn: Any) -> bool:
-    return getattr(fn, "typing_key", None) is range
-
-
-def struct(context: Any, builder: Any, of: Any, values: Any) -> Any:
-    """A value of Numba's type ``of`` put together of its members."""
-    from llvmlite import ir
-
-    made = ir.Constant(context.get_value_type(of), ir.Undefined)
-    for k, x in enumerate(values):
-        made = builder.insert_value(made, x, k)
-    return made
-
-
-def _range(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """``range(stop)``, ``range(start, stop)``: start, stop, step."""
-    number = args[0].type
-    start, stop = args if len(args) == 2 else (number(0), args[0])
-    made = struct(context, builder, sig.return_type, (start, stop, number(1)))
-    made.by_ones = start, stop  # for the loop that begins with it
-    return made
-
-
-def _begun(context: Any, builder: Any, sig: Any, state: Any, usual: Any) -> Any:
-    """``iter(range)``: the place of the next number, stop, step, the place of how many are left."""
-    by_ones = getattr(state, "by_ones", None)
-    if by_ones is None:  # not known here
-        return usual(builder, (state,))
-    start, stop = by_ones
-    at, left = _room(builder, start.type), _room(builder, start.type)
-    builder.store(start, at)
-    builder.store(builder.sub(stop, start), left)
-    return struct(context, builder, sig.return_type, (at, stop, start.type(1), left))
-
-
-def _next(context: Any, builder: Any, sig: Any, iterator: Any) -> Any:
-    """The next number, and whether there is one."""
-    at, step, left = (builder.extract_value(iterator, k) for k in (0, 2, 3))
-    count, value = builder.load(left), builder.load(at)
-    more = builder.icmp_signed(">", count, count.type(0))
-    with builder.if_then(more):
-        builder.store(builder.sub(count, count.type(1), flags=["nsw"]), left)
-        builder.store(builder.add(value, step), at)
-    return struct(context, builder, sig.return_type, (value, more))
 
 
 def _first(original: Any) -> Any:

@@ -9,6 +9,7 @@ from ..errors import PerformanceNotice, warn
 
 BEGINS = "compiling for this machine, once: "
 _said: set[str] = set()
+_there: set[str] = set()  # what this process has, or finds in the cache
 
 
 class Part(NamedTuple):
@@ -23,13 +24,24 @@ class Part(NamedTuple):
 
 def announce(parts: Iterable[Part]) -> None:
     """Say what of these has to be compiled first; of each once a process."""
-    cold = [p for p in parts if p.what not in _said and any(x.cold for x in p.code)]
+    cold = [p for p in parts if missing(p)]
     if cold:
         _said.update(p.what for p in cold)
         seconds = 5 * max(1, round(sum(p.seconds for p in cold) / 5))
         warn(f"{BEGINS}{' and '.join(p.what for p in cold)}, about {seconds} s", PerformanceNotice)
 
 
+def missing(part: Part) -> bool:
+    """Whether it has to be compiled first, and nothing was said of that."""
+    if part.what in _said or part.what in _there:
+        return False
+    if any(x.cold for x in part.code):
+        return True
+    _there.add(part.what)
+    return False
+
+
 def forget() -> None:
     """As if nothing had been said."""
     _said.clear()
+    _there.clear()

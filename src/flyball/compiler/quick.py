@@ -24,9 +24,10 @@ def quickly() -> Iterator[None]:
     AttributeError
         If Numba's internals are others.
     """
-    from numba.core import ir, postproc
+    from numba.core import base, event, ir, lowering, postproc, typeinfer
     from numba.core.targetconfig import TargetConfig
     from numba.core.typing.context import BaseContext
+    from numba.core.typing.npydecl import NumpyRulesArrayOperator
 
     with patched(
         [
@@ -36,6 +37,13 @@ def quickly() -> Iterator[None]:
             (ir.Inst, "_rec_list_vars", lambda _: _variables_in(ir)),
             (BaseContext, "resolve_function_type", _remembered),
             (postproc.PostProcessor, "run", lambda _: _lifetimes_when_asked(postproc)),
+            (NumpyRulesArrayOperator, "generic", _of_arrays),
+            (base, "_has_loc", _takes_place),
+            (event, "install_timer", lambda _: _untimed(event)),
+            (event, "start_event", lambda told: _where_told(event, told)),
+            (event, "end_event", lambda told: _where_told(event, told)),
+            (typeinfer, "new_error_context", _explained),
+            (lowering, "new_error_context", _explained),
         ]
     ):
         yield
@@ -143,3 +151,65 @@ def _lifetimes_when_asked(postproc: Any) -> Any:
         made.generator_info = None
 
     return run
+
+
+def _of_arrays(original: Any) -> Any:
+    """``NumpyRulesArrayOperator.generic``: what operators on arrays give; of numbers alone they give nothing."""
+    from numba.core import types
+
+    numbers = types.Number, types.Boolean
+
+    def generic(self: Any, args: Any, kws: Any) -> Any:
+        return None if all(isinstance(x, numbers) for x in args) else original(self, args, kws)
+
+    return generic
+
+
+def _takes_place(original: Any) -> Any:
+    """``_has_loc``: whether a function has a parameter ``loc``, which functions know without `inspect`."""
+
+    def takes(function: Any) -> bool:
+        code = getattr(function, "__code__", None)
+        if code is None or hasattr(function, "__wrapped__"):
+            return bool(original(function))
+        return "loc" in code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+
+    return takes
+
+
+def _untimed(event: Any) -> Any:
+    """``install_timer``: no stopwatch for every function, each told of all that those above it do."""
+
+    @contextmanager
+    def install(kind: Any, callback: Any) -> Iterator[Any]:
+        yield event.TimingListener()
+
+    return install
+
+
+def _where_told(event: Any, told: Any) -> Any:
+    """``start_event``, ``end_event``: events are made for those who listen."""
+
+    def tell(kind: str, *args: Any, **more: Any) -> None:
+        if event._registered.get(event._guard_kind(kind)):
+            told(kind, *args, **more)
+
+    return tell
+
+
+def _explained(original: Any) -> Any:
+    """``new_error_context``: where an error was, put together when there is one."""
+
+    class Context:
+        def __init__(self, *args: Any, **more: Any) -> None:
+            self.args, self.more = args, more
+
+        def __enter__(self) -> None:
+            pass
+
+        def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+            if error is not None:
+                with original(*self.args, **self.more):
+                    raise error
+
+    return Context

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from .lean import struct
+from .operations import struct
 from .patched import patched
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..compiler.bound import Bound, Written
 from ..compiler.door import door
 from ..compiler.jit import formula
@@ -9,9 +11,8 @@ from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import TRY
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watching import STAGE
-from ..tables.system import System, Work
 from .asking import OWN, arrive, inspect, put, tangent, through
-from .callbacks import Going, Own, meet
+from .callbacks import meet
 from .tasks import MOTION, WATCH
 
 
@@ -57,11 +58,11 @@ class Explicit:
     R : Tableau
     """
 
-    failed = None
+    failed, width = None, 0  # what it has the engine write is a row of output
 
     def __init__(self, R: Tableau) -> None:
         self.R, self.c, self.stages = R, R.c, int(R.order_i[1])
 
-    def bind(self, S: System, W: Work, own: Own, going: Going, *known: Written) -> Bound:
+    def bind(self, tables: Written, scratch: Written, own: Written, going: Written, doors: np.ndarray) -> Bound:
         """The door with these tuples bound to it."""
-        return Bound(explicit_steps, *(Written(x, *known) for x in (S, W, self.R, own, going)))
+        return Bound(explicit_steps, tables, scratch, Written(self.R), own, going)

@@ -67,16 +67,22 @@ class Plan(NamedTuple):
     own_mass: np.ndarray  # (nv,): numbers of the inertia of each velocity alone
 
 
-class Means(NamedTuple):
-    """What steps of an implicit method work with."""
+class Workshop(NamedTuple):
+    """What steps of an implicit method write to, and what they read it by."""
 
-    SC: System  # in complex numbers
-    WC: Work
+    WC: Work  # in complex numbers
     moved: Bench  # with steps of positions and velocities
     pushed: Bench  # of accelerations
     pressed: Bench  # without
     plan: Plan
     desk: Desk  # of the method
+
+
+class Means(NamedTuple):
+    """What steps of an implicit method work with."""
+
+    SC: System  # in complex numbers
+    own: Workshop
 
 
 @formula
@@ -325,12 +331,12 @@ def as_modes_are(A):
 def perform(method, callbacks, S, W, M, own, going, task):
     """What a loop asks of an implicit method."""
     A = (
-        own.doors[0], S, W, own.R, own.clock, own.sheet, going.group, own.doors[1], M.SC, M.WC, M.moved, M.pushed,
-        M.pressed, M.plan, going, method[1],
+        own.doors[0], S, W, own.R, own.clock, own.sheet, going.group, own.doors[1], M.SC, M.own.WC, M.own.moved,
+        M.own.pushed, M.own.pressed, M.own.plan, going, method[1],
     )  # fmt: skip
     if task == BEGIN:
         as_modes_are(A)
-    return answer(method, callbacks, A, M.desk, going.clock, task)
+    return answer(method, callbacks, A, M.own.desk, going.clock, task)
 
 
 @formula

@@ -43,9 +43,7 @@ from .tasks import INTEGRATE, MOTION
 PERIOD, OFFSET = range(2)  # columns of Samples.clock
 SAMPLED, STATE, LAW, LATER = range(4)  # columns of Samples.row: clock, state, law, whether it waits for all others
 NEAR = 1e-9  # of a period: a time that is an instant
-AFTER = (
-    8.0 * 2.0**-52
-)  # of a time: more than what an instant may be off by from the time that it stands for, by rounding
+AFTER = 8.0 * 2.0**-52  # of a time: more than an instant is off, by rounding, from the time that it stands for
 ROWS = 64  # of output that are taken at once
 ENGINE, S_, W_, R_, CLOCK, SHEET, PLAN = range(7)
 

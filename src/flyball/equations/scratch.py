@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compiler.bound import Mould, Moulded
+from ..compiler.bound import Mould, Moulded, Written
 from ..laws.call import STACK_RESERVE
 from ..tables.reads import width
 from ..tables.specs import Structure
@@ -34,7 +35,7 @@ def work(s: Structure, system: System, dtype: Any = None) -> Work:
     dtype = np.dtype(system.body_x.dtype if dtype is None else dtype)
     if dtype.kind in "fc":
         return scratch(s, system, dtype).fields  # type: ignore[no-any-return]
-    W = _new(s, system, dtype)
+    W = blank(s, system, dtype)
     W.switch[LOWER], W.switch[UPPER] = system.switch_x[:, SWITCH_LOWER], system.switch_x[:, SWITCH_UPPER]
     ground_frames(system, W)
     return W
@@ -43,14 +44,24 @@ def work(s: Structure, system: System, dtype: Any = None) -> Work:
 def scratch(s: Structure, system: System, dtype: Any) -> Moulded:
     """The same as compiled code has it."""
     key = np.dtype(dtype).char, int(system.flat[SCRATCH])
-    made = s.kept.get("scratch", key, MOST, lambda: Mould(_new(s, system, dtype))).new()
+    made = s.kept.get("scratch", key, MOST, lambda: Mould(blank(s, system, dtype))).new()
+    fill(s, system, made.array)
+    return made
+
+
+def fill(s: Structure, system: System, array: Callable[[str], np.ndarray]) -> None:
+    """Put into blank scratch, whose arrays are found by name, what the tables say of it."""
     if len(system.switch_x):
-        switch = made.array("switch")
+        switch = array("switch")
         switch[LOWER], switch[UPPER] = system.switch_x[:, SWITCH_LOWER], system.switch_x[:, SWITCH_UPPER]
     if n := system.kinds[GROUND_FRAMES]:
         _, at_rest = s.kept.get("ground", id(system), MOST, lambda: (system, on_ground(system)))  # told by its address
-        made.array("FK")[:n] = at_rest
-    return made
+        array("FK")[:n] = at_rest
+
+
+def tables(s: Structure, system: System) -> Written:
+    """The tables as compiled code has them."""
+    return s.kept.get("written", id(system), MOST, lambda: Written(system))  # whose address it keeps from others
 
 
 def on_ground(system: System) -> np.ndarray:
@@ -66,8 +77,8 @@ class Records(NamedTuple):
     FK: np.ndarray
 
 
-def _new(s: Structure, system: System, dtype: Any) -> Work:
-    """Arrays of zeros."""
+def blank(s: Structure, system: System, dtype: Any) -> Work:
+    """Scratch of zeros."""
     nb, nf, nr, nv = len(system.body_i), len(system.frame_i), len(system.row_i), s.nv
     n, ny, nl, nw = len(system.ldl.perm), s.nq + nv + len(s.states), len(s.loads), len(s.switches)
     nc, ne = len(system.control_i), width(s)

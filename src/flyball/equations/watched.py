@@ -1,4 +1,4 @@
-"""A motion that goes on by steps of any method, and whose steps end on events where there are guards.
+"""A motion that goes on by steps of any method, which end on events or are sampled (else see `unwatched`).
 
 The loops of the integrators, through the engine's door and that of a method. What guards depend on is kept at the ends
 of every step, and multipliers and loads at some places within it; so between the ends guards are the same formula on
@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..compiler.bound import Bound, Written
+from ..compiler.bound import Bound, Moulded, Written
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..numerics.cone.shares import OPEN
@@ -22,6 +22,7 @@ from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.integrators.watched import begun, onward
 from ..numerics.integrators.watching import ASTRAY, FASTEST, GRAIN_END, GRAIN_START, START, Watch, watching
+from ..tables.specs import Structure
 from ..tables.system import (
     BIAS,
     G_BACK,
@@ -49,6 +50,7 @@ from .pace import quickest
 from .rows import measured
 from .sampled import Sampling
 from .sampled import advance as from_instant_to_instant
+from .scratch import tables
 from .sharing import GRAIN, Sharing, guard_of_group, renewed, shares
 from .tasks import MOTION
 
@@ -150,14 +152,6 @@ def watched_kernel(doors, S, W, R, own, sheet, group, expected, desk, clock, out
     return advance(callbacks, A, held(desk), held(R), held(clock), out)
 
 
-@kernel
-def unwatched_kernel(doors, S, W, R, own, sheet, desk, clock, out):
-    """Go on with an integration in which nothing is watched."""
-    A = (doors[1][0], held(S), held(W), held(R), held(own), held(sheet))
-    callbacks = (steps, doors[0], report, nothing, whole)
-    return advance(callbacks, A, held(desk), held(R), held(clock), out)
-
-
 @formula
 def by_steps(X, rows):
     """The loop in which nothing is watched."""
@@ -185,8 +179,8 @@ class Steps(Protocol):
     stages: int  # how many of these there are
     failed: Exception | None  # why it does not go on, where that is the method's own reason
 
-    def bind(self, S: System, W: Work, own: Own, going: Going, *known: Written) -> Bound:
-        """The door with these tuples bound to it; ``known``: what is written of tuples in the last two."""
+    def bind(self, tables: Written, scratch: Written, own: Written, going: Written, doors: np.ndarray) -> Bound:
+        """The door bound to a System, a Work, an `Own` and a `Going`; ``doors``: of `Own`, its second to be set."""
 
 
 def keeps(S: System) -> np.ndarray:
@@ -214,42 +208,48 @@ def _desk(S: System, expected: Work, c: np.ndarray, stages: int) -> Watch:
 
 
 @lru_cache(maxsize=16)
-def _idle(c: bytes, stages: int) -> Written:
+def idle_watch(c: bytes, stages: int) -> Written:
     """What a loop keeps where there is nothing to watch, for all of them."""
     none, empty = np.zeros(0, np.int64), (np.zeros((RETURNED + 1, 0)), np.zeros(0))
     return Written(watching(none, none, np.frombuffer(c).copy(), stages, 0, none, none, empty))
 
 
 @lru_cache(maxsize=1)
-def _tableau() -> Written:
+def idle_tableau() -> Written:
     """A tableau that the engine does not look at."""
     return Written(tableau("rk45"))
 
 
 class Loop:
-    """A motion by steps of a method: the compiled loop and what it keeps; watched where there are guards.
+    """A motion by steps of a method that is watched, or sampled: the compiled loop and what it keeps.
 
     Parameters
     ----------
     steps : Steps
     clock : Clock
         Of the integration.
-    S, W : System, Work
+    s : Structure
+    S : System
+    scratch : Moulded
+        The Work.
     width : int
         Of a row of output, and of what the method has the engine write.
     group : Sharing
         What holds together.
     """
 
-    def __init__(self, steps: Any, clock: Clock, S: System, W: Work, width: int, group: Sharing) -> None:
-        self.steps, self.clock, self.S, self.W = steps, clock, S, W
-        self._known = [_tableau()]
+    def __init__(
+        self, steps: Any, clock: Clock, s: Structure, S: System, scratch: Moulded, width: int, group: Sharing
+    ) -> None:
+        self.steps, self.clock, self.s, self.S, self.scratch = steps, clock, s, S, scratch
+        W = scratch.fields
+        self._known = [idle_tableau()]
         if len(S.guard_i):
             self.expected = W._replace(sensed=W.sensed.copy(), row=W.row.copy())
             self.desk = _desk(S, self.expected, steps.c, steps.stages)
         else:  # nobody looks at it, or writes to it
             self.expected = W
-            idle = _idle(steps.c.tobytes(), steps.stages)
+            idle = idle_watch(steps.c.tobytes(), steps.stages)
             self.desk = idle.fields
             self._known.append(idle)
         ny = clock.y.shape[1]
@@ -263,25 +263,24 @@ class Loop:
         self.own = Own(own, sheet, self._known[0].fields, np.zeros(2, np.int64))
         self._bound: Bound | None = None
 
-    def go_on(self, S: System, W: Work, out: np.ndarray, sampling: Sampling | None = None) -> int:
+    def go_on(self, S: System, out: np.ndarray, sampling: Sampling | None = None) -> int:
         """Go on until an event, the end, or what else `loop.advance` returns for. Returns rows written.
 
         Where nothing is watched, what ``sampling`` says is sampled on the way.
         """
-        x = self.own
+        x, W = self.own, self.scratch.fields
         if self._bound is None or S is not self.S:
             x.doors[0] = engine.address(S, W, x.R, x.clock, x.sheet)
-            self.S, self._bound = S, self.steps.bind(S, W, x, Going(self.clock, self.desk, self.group), *self._known)
+            own, going = (Written(f, *self._known) for f in (x, Going(self.clock, self.desk, self.group)))
+            self.S, self._bound = S, self.steps.bind(tables(self.s, S), self.scratch, own, going, x.doors)
         if self.group.Q.count[OPEN] and not self.group.door[0]:
             self.group.door[0] = shares.address(S, W, self.group, self.desk, self.desk)
         doors = self._bound.asked, x.doors
-        tables = S, W, x.R, x.clock, x.sheet
+        asked = S, W, x.R, x.clock, x.sheet
         if not len(S.guard_i) and sampling is not None:
             plan, part = sampling.plan, sampling.sheet.rows
-            return int(sampled_steps_kernel(doors, *tables, self.desk, self.clock, plan, part, out))
-        if not len(S.guard_i):
-            return int(unwatched_kernel(doors, *tables, self.desk, self.clock, out))
-        return int(watched_kernel(doors, *tables, self.group, self.expected, self.desk, self.clock, out))
+            return int(sampled_steps_kernel(doors, *asked, self.desk, self.clock, plan, part, out))
+        return int(watched_kernel(doors, *asked, self.group, self.expected, self.desk, self.clock, out))
 
     @property
     def fired(self) -> tuple[int, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -125,12 +125,16 @@ def forget(stack: np.ndarray) -> None:
     stack[-STACK_RESERVE:] = 0.0
 
 
-@contextmanager
-def interrupts_kept(functions: Sequence[Called]) -> Iterator[None]:
+def interrupts_kept(functions: Sequence[Called]) -> AbstractContextManager[None]:
     """Keep the user's interrupt until compiled code has returned, where that calls back into Python.
 
     Python would raise KeyboardInterrupt on entering the callback, and ctypes would swallow it.
     """
+    return _kept(functions) if functions else nullcontext()
+
+
+@contextmanager
+def _kept(functions: Sequence[Called]) -> Iterator[None]:
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main or not any(f.native.reason for f in functions) or signal.getsignal(signal.SIGINT) is None:
         yield

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import operator
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from copy import copy
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -121,22 +120,24 @@ def same_values(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
 
 def _same_parts(model: Model, last: Model) -> bool:
     """The same but for the values of the parameters."""
-    return (
-        all(_identical(getattr(model, k), getattr(last, k)) for k in CATEGORIES)
-        and all(_alike(getattr(model, k), getattr(last, k)) for k in SETTINGS)
-        and _alike(_gravity(model), last.gravity)
-        and type(model) is type(last)
-        and list(model.parameters) == list(last.parameters)
-    )
+    mine, its = vars(model), vars(last)
+    for k in CATEGORIES:
+        a, b = mine[k], its[k]
+        if len(a) != len(b):
+            return False
+        for x, y in zip(a, b, strict=True):
+            if x is not y:
+                return False
+    for k in SETTINGS:
+        if not _alike(mine[k], its[k]):
+            return False
+    gravity = _alike(_gravity(model), last.gravity) and type(model) is type(last)
+    return gravity and list(model.parameters) == list(last.parameters)
 
 
 def _gravity(model: Model) -> tuple[Any, ...]:
     """Gravity as a tuple: a user may have put a list or an array there, and change it."""
     return model.gravity if isinstance(model.gravity, tuple) else tuple(plain(model.gravity))
-
-
-def _identical(a: Iterable[Any], b: Iterable[Any]) -> bool:
-    return len(a) == len(b) and all(map(operator.is_, a, b))  # type: ignore[arg-type]
 
 
 def _alike(a: Any, b: Any) -> bool:

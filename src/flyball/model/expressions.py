@@ -87,7 +87,7 @@ class Expression:
                 refuse_attached(*part, {*known, *CONSTANTS}, None)
             except UnitError as error:
                 raise ExpressionError(f"'{self}': {error}") from None
-        if self.names <= set(known):
+        if all(name in known for name in self.names):
             return
         nodes = self.tree.walk() if self.function is None else arguments(self.tree, known)
         node = next((n for n in nodes if n.kind == "name" and n.value not in known), None)
@@ -120,7 +120,7 @@ class Expression:
 
     def require_tables(self, known: Collection[str]) -> None:
         """Raise `ExpressionError` if a table that it calls is not there."""
-        for name in sorted(self.tables - set(known)):
+        for name in sorted(self.tables - set(known)) if self.tables else ():
             raise ExpressionError(f"'{self}': there is no table '{name}'; add the Table before the law that calls it")
 
     def require_derivatives(self) -> None:
@@ -169,6 +169,8 @@ def number(
         result = _number(value, env, dimension, env if names is None else names)
     except ModelError as error:
         raise type(error)(f"{where}: {error}") from None
+    if type(result) is float and result - result == 0.0:
+        return result
     if isinstance(result, Complex) and not (result - result == 0):
         advice = "check for division by zero and roots or logarithms of negative numbers"
         problem = f"'{value}' gives {result}" if isinstance(value, str | Expression) else f"the value is {value}"
@@ -227,6 +229,10 @@ def is_number_text(text: str) -> bool:
 
 
 def _number(value: Any, env: Mapping[str, Any], dimension: str | None, names: Collection[str]) -> Any:
+    if type(value) is float:  # first, as what comes most: Python asks for abstract kinds slowly
+        return value
+    if type(value) is str:
+        return _of_text(value, env, dimension, names)
     if isinstance(value, bool | np.bool_):
         raise ModelError(f"{value} is true or false, a number is wanted; write 1 or 0 if you mean that")
     if isinstance(value, Real):
@@ -234,8 +240,7 @@ def _number(value: Any, env: Mapping[str, Any], dimension: str | None, names: Co
     if isinstance(value, Complex):
         return complex(value)
     if isinstance(value, Expression):
-        result = value.evaluate(env)
-        return float(result) if isinstance(result, Integral) else result
+        return _evaluated(value, env)
     if hasattr(value, "called"):  # an expression in place of a number: see `math/scalar.py`
         return value
     if not isinstance(value, str):
@@ -243,9 +248,18 @@ def _number(value: Any, env: Mapping[str, Any], dimension: str | None, names: Co
             f"{value!r} ({type(value).__name__}) is not a number; write a number, a quantity such as '5 mm', "
             "or an expression of parameters"
         )
+    return _of_text(value, env, dimension, names)
+
+
+def _evaluated(x: Expression, env: Mapping[str, Any]) -> Any:
+    result = x.evaluate(env)
+    return result if type(result) is float or not isinstance(result, Integral) else float(result)
+
+
+def _of_text(value: str, env: Mapping[str, Any], dimension: str | None, names: Collection[str]) -> Any:
     parts = split_quantity(value)
     if parts is None:
-        return _number(Expression.parse(value), env, dimension, names)
+        return _evaluated(Expression.parse(value), env)
     names = {*names, *CONSTANTS}
     if parts[1]:
         refuse_attached(*parts, names, dimension)

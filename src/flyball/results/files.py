@@ -24,6 +24,7 @@ from ..errors import cannot_write
 from ..model.quantities import ENERGY
 from .labels import TIME, coordinates, labelled
 from .numbers import with_unit
+from .stored import put, text_type
 from .stored_contacts import packed
 from .stored_events import packed as events_packed
 from .stored_stretches import packed as stretches_packed
@@ -36,15 +37,8 @@ if TYPE_CHECKING:
 
 GROUP = "flyball"
 SEAL = b"\nflyball SHA-256 "
-FORMAT = 3  # 1: before joint coordinates, 2: before checksums
-ARRAYS = {
-    "t": ("time",),
-    "q": ("time", "nq"),
-    "v": ("time", "nv"),
-    "vdot": ("time", "nv"),
-    "multipliers": ("time", "nr"),
-    "states": ("time", "nz"),
-}
+FORMAT = 4  # 1: before joint coordinates, 2: before checksums, 3: each text and array a variable by itself
+ARRAYS = ("t", "q", "v", "vdot", "multipliers", "states")
 MOST = 3000  # labelled quantities in a file; HDF5 takes more than a millisecond for each
 SLASH = "\N{DIVISION SLASH}"  # a name must not hold "/" in a NetCDF file
 
@@ -126,7 +120,7 @@ def _write(result: Result, path: Path, whole: bool) -> None:
         file.attrs.update(_about(result) | {"Conventions": "CF-1.11"})
         file.dimensions[TIME] = len(result.t)
         file.create_variable(TIME, (TIME,), data=result.t).attrs["units"] = "s"
-        for name, labels in coordinates(result).items():
+        for name, labels in coordinates(result).items() if whole else ():
             file.dimensions[name] = len(labels)
             file.create_variable(name, (name,), dtype=text_type(), data=np.array(labels, object))
         listed = False
@@ -148,13 +142,6 @@ def _unread(result: Result) -> Result:
             vars(out).pop(name, None)
     vars(out).pop("_views", None)
     return out
-
-
-def text_type() -> Any:
-    """Of texts of any length in a file."""
-    import h5py
-
-    return h5py.string_dtype()
 
 
 def seal(path: Path) -> None:
@@ -185,9 +172,9 @@ def file_hash(path: Path, size: int) -> str:
     return digest.hexdigest()
 
 
-def checksum(stored: Mapping[str, Any]) -> str:
+def checksum(stored: Mapping[str, Any], kind: int = FORMAT) -> str:
     """SHA-256 of texts and arrays by name, in an order and with bytes that do not depend on the machine."""
-    digest = hashlib.sha256(str(FORMAT).encode())
+    digest = hashlib.sha256(str(kind).encode())
     for name in sorted(stored):
         value = stored[name]
         if isinstance(value, str):
@@ -220,28 +207,14 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
         "carried": json.dumps(result.carried),
         "done": json.dumps(result.begun.done),
     }
-    told, more = packed(result)
-    happened, states = events_packed(result)
-    texts, more = texts | told | happened, more | states | stretches_packed(result)
-    for name, text in texts.items():
-        group.create_variable(name, (), dtype=text_type(), data=np.array(text, object))
-    for name, (_, *rest) in ARRAYS.items():
-        values = getattr(result, name)
-        for k, dim in enumerate(rest):
-            if dim not in group.dimensions:
-                group.dimensions[dim] = values.shape[k + 1]
-        group.create_variable(name, (TIME, *rest), data=values)
-    numbers = {
+    arrays = {name: getattr(result, name) for name in ARRAYS} | {
         "parameter_values": result.values.system.const[: len(result.model.parameters)],
         "final": np.r_[result.final[0], result.final[1]],
     }
     if result.begun.y is not None and len(result.begun.y):
-        numbers["begun"] = result.begun.y
-    for name, values in numbers.items():
-        group.dimensions[f"n_{name}"] = len(values)
-        group.create_variable(name, (f"n_{name}",), data=np.array(values, float))
-    for name, values in more.items():
-        for k, n in enumerate(values.shape):
-            group.dimensions[f"n_{name}_{k}"] = n
-        group.create_variable(name, tuple(f"n_{name}_{k}" for k in range(values.ndim)), data=values)
-    group.attrs["checksum"] = checksum(texts | {name: getattr(result, name) for name in ARRAYS} | numbers | more)
+        arrays["begun"] = result.begun.y
+    told, more = packed(result)
+    happened, states = events_packed(result)
+    texts, arrays = texts | told | happened, arrays | more | states | stretches_packed(result)
+    put(group, texts, arrays)
+    group.attrs["checksum"] = checksum(texts | arrays)

@@ -24,6 +24,7 @@ from .departure import Departure
 from .files import ARRAYS, FORMAT, GROUP, checksum, sealed
 from .health import Health
 from .result import Result
+from .stored import taken
 from .stored_contacts import unpack
 from .stored_events import unpack as events_unpack
 from .stored_stretches import switched
@@ -85,14 +86,14 @@ def _stored(path: Path) -> tuple[dict[str, Any], int]:
             kind, written = int(group.attrs["format"]), group.attrs.get("checksum")
             if kind > FORMAT:
                 raise ModelError(f"{path} was written by flyball {group.attrs['version']}, a later version than this")
-            stored = {k: _read(v) for k, v in group.variables.items()}
+            stored = taken(group)
     except ModelError:
         raise
     except Exception as error:  # HDF5 and its wrappers fail in many ways on what is no such file, or no longer
         raise ModelError(f"{path} cannot be read as a NetCDF result ({_first_line(error)}); {REMEDY}") from None
     if written is None and kind >= 3:
         raise _damaged(os.fspath(path), "its checksum is missing")
-    if written is not None and written != checksum(stored):
+    if written is not None and written != checksum(stored, kind):
         raise _damaged(os.fspath(path), "what it holds does not fit its checksum")
     if kind < 3 and "model" in stored:
         stored["model"] = _of_now(stored["model"])
@@ -115,13 +116,6 @@ def _of_now(model: str) -> str:
             beyond = f'beyond = "{names[given[1]] if given else "line"}"'
             parts[k] = rest.replace("[[tables]]\n", f"[[tables]]\n{beyond}\n", 1)
     return "".join(parts)
-
-
-def _read(variable: Any) -> Any:
-    if variable.dimensions == ():
-        value = variable[()]
-        return value.decode() if isinstance(value, bytes) else str(value)
-    return np.ascontiguousarray(variable[...])
 
 
 def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .files import GROUP, SLASH, replaced, seal, text_type
+from .files import GROUP, SLASH, replaced, seal
+from .stored import text_type
 
 if TYPE_CHECKING:
     import xarray

@@ -63,12 +63,12 @@ def numbers(model: Model, parameters: Mapping[str, Any] | None = None) -> Number
     """
     model = model.snapshot()
     env = _environment(model, parameters or {})
-    files = tuple(_state_of(path) for path in _files(model))
+    read = tuple(_state_of(path) for path in files(model))
     if has_lanes(env.values()):
-        return _found(model, env, (object(), files))
+        return _found(model, env, (object(), read))
     if kind_of(env.values()) is object:
         return _all(model, env, object())
-    key = bits(env), files
+    key = bits(env), read
     return model.kept.get("numbers", key, MOST, lambda: _found(model, env, key))
 
 
@@ -162,7 +162,7 @@ def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -
     )
 
 
-def _files(model: Model) -> tuple[str, ...]:
+def files(model: Model) -> tuple[str, ...]:
     """Files that shapes are read from."""
     return model.kept.get(
         "files", None, 1, lambda: tuple(f for b in owners(model) for s in b.shapes() if (f := getattr(s, "file", None)))

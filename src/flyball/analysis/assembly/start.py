@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,8 @@ class Assembly:
 
     def again(self) -> Assembly:
         """The same with arrays and scratch of its own."""
-        return replace(self, compiled=self.compiled.again(), q=self.q.copy(), v=self.v.copy(), moved=dict(self.moved))
+        c, q, v = self.compiled.again(), self.q.copy(), self.v.copy()
+        return Assembly(c, self.t, q, v, dict(self.moved), self.iterations, self.departures)
 
     @property
     def y(self) -> np.ndarray:

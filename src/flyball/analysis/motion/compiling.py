@@ -9,8 +9,9 @@ from ...equations.explicit import explicit_steps
 from ...equations.implicit import radau_steps
 from ...equations.instant import instant
 from ...equations.residual import stepped
+from ...equations.unwatched import unwatched
 from ...equations.variational import variational_steps
-from ...equations.watched import unwatched_kernel, watched_kernel
+from ...equations.watched import watched_kernel
 from ...model.model import Model
 from ...tables.switches import declared
 from .implicit.suited import ALPHA, RADAU, VARIATIONAL
@@ -18,7 +19,7 @@ from .implicit.suited import ALPHA, RADAU, VARIATIONAL
 ENGINE = Part("the equations of motion", 18.0, (engine,))
 EVENTS = Part("what finds events and decides what happens there", 15.0, (watched_kernel, explicit_steps, instant))
 DERIVATIVES = Part("the derivatives of the equations", 12.0, (stepped,))
-LOOP = Part("the loop of implicit methods", 2.0, (unwatched_kernel,))
+LOOP = Part("the loop of implicit methods", 2.0, (unwatched,))
 STAGES = {
     RADAU: (DERIVATIVES, LOOP, Part("the implicit method", 6.0, (radau_steps,))),
     ALPHA: (DERIVATIVES, LOOP, Part("the generalised-alpha method", 5.0, (alpha_steps,))),
@@ -29,5 +30,10 @@ STAGES = {
 def announce_motion(model: Model, integrated: bool, method: object = "") -> None:
     """Say what a motion of the model has to compile first, if it has to: the first on a machine does."""
     stages = STAGES.get(method, ()) if isinstance(method, str) else ()
-    eventful = integrated and bool(model.events or model.contacts or declared(model))
+    eventful = integrated and model.snapshot().kept.get("eventful", None, 1, lambda: _eventful(model))
     announce((ENGINE, *((EVENTS,) if eventful else ()), *stages))
+
+
+def _eventful(model: Model) -> bool:
+    """Whether something may happen at an instant."""
+    return bool(model.events or model.contacts or declared(model))

@@ -22,8 +22,8 @@ def _by_state(c: Compiled) -> frozenset[int]:
 
 def told_of(c: Compiled, sampled: frozenset[int]) -> str:
     """What health says of laws that are sampled; nothing where there are none."""
-    names = dict.fromkeys(c.structure.laws[at] for at in sorted(sampled))
-    if not names:
+    if not sampled:
         return ""
+    names = dict.fromkeys(c.structure.laws[at] for at in sorted(sampled))
     first = ", ".join(list(names)[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
     return f"{first}: sampled within steps; what a state passes between two samples is not seen"

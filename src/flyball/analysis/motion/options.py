@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ import numpy as np
 from ...equations import projection
 from ...errors import ModelError
 from ...numerics.integrators.tableaux import tableau
-from ..options import Options, count, positive, seconds
+from ..options import Options, count, names_of, positive, seconds
 from .layer import known as known_coordinates
 
 STABILIZATION = {
@@ -28,6 +28,8 @@ STABILIZATION = {
 MOST = 10_000_000  # steps
 HELD = 2  # copies of a motion in memory while its parts are put together
 LEAST = 4  # numbers kept of each time: of one hinge
+LITTLE = 2**18  # [bytes] that every machine has
+DOUBLE = np.dtype(float).itemsize
 MEMORY = 2**36  # [bytes] of a machine that does not say how much it has
 RATE = 10.0  # [1/s] of Baumgarte's method, where none is given
 FINEST = 1e-13  # relative tolerance below which rounding decides
@@ -54,12 +56,13 @@ class Integration(Options):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        own = vars(self)
         for name in ("max_step", "step"):
-            if isinstance(getattr(self, name), str):
-                object.__setattr__(self, name, seconds(getattr(self, name), name))
+            if isinstance(own[name], str):
+                own[name] = seconds(own[name], name)
         for name in ("rtol", "atol", "max_step", "step"):
-            if getattr(self, name) is not None or name in ("rtol", "max_step"):
-                positive(getattr(self, name), name)
+            if own[name] is not None or name in ("rtol", "max_step"):
+                positive(own[name], name)
         if self.step is not None and self.max_step != np.inf:
             raise ModelError("max_step does nothing with steps of fixed width (step=); leave one of the two out")
         count(self.max_steps, "max_steps")
@@ -110,7 +113,8 @@ class Integration(Options):
 
     def choices(self) -> dict[str, Any]:
         """The choices of the integration by name, without what else was asked."""
-        return {f.name: getattr(self, f.name) for f in dataclasses.fields(Integration)}
+        own = vars(self)
+        return {name: own[name] for name in names_of(Integration)}
 
 
 def usual_atol(rtol: float, length: float) -> float:
@@ -143,8 +147,8 @@ def refuse_unheld(outputs: int, width: int) -> None:
     ModelError
         With how many bytes they take, and how many times would fit.
     """
-    each, there = HELD * width * np.dtype(float).itemsize, _memory()
-    if outputs * each > there:
+    each = HELD * width * DOUBLE
+    if outputs * each > LITTLE and outputs * each > (there := _memory()):
         raise ModelError(
             f"outputs: {outputs:,} times take {outputs * each // 2**20:,} MiB of memory or more, and this machine has "
             f"{there // 2**20:,} MiB. Ask for fewer ({there // each:,} would fill it), or simulate in parts (start=)"
@@ -159,6 +163,15 @@ def _memory() -> int:
         return MEMORY
 
 
+def _even(t_start: float, t_end: float, n: int) -> np.ndarray:
+    """Evenly spaced times: those of ``np.linspace``, in a third of its time."""
+    times = np.arange(n, dtype=float)
+    times *= (t_end - t_start) / (n - 1)
+    times += t_start
+    times[-1] = t_end
+    return times
+
+
 def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -> np.ndarray:
     """Ascending output times within the interval.
 
@@ -167,7 +180,7 @@ def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -
     ModelError
         If the interval is empty or not finite, or the times are not ascending within it.
     """
-    if not (np.isfinite(t_start) and np.isfinite(t_end)):
+    if not (math.isfinite(t_start) and math.isfinite(t_end)):
         raise ModelError(f"start and end time must be finite, got {t_start} and {t_end}")
     if not t_end > t_start:
         raise ModelError(f"the end time {t_end:g} s must be later than the start time {t_start:g} s")
@@ -175,7 +188,7 @@ def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -
         if outputs < 2:
             raise ModelError(f"outputs must be at least 2 (start and end), got {outputs}")
         refuse_unheld(int(outputs), LEAST)
-        return np.linspace(t_start, t_end, int(outputs))
+        return _even(t_start, t_end, int(outputs))
     try:
         times = np.asarray(outputs, float)
     except (TypeError, ValueError):

@@ -113,16 +113,16 @@ def _for_the_next(here: Here, followed: bool) -> dict[str, Any]:
 
 def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
     """Figures of a run."""
-    W = start.assembly.compiled.work
+    option, info = (start.assembly.compiled.array(name) for name in ("option", "info"))
     return Health(
         success=True,
         message="",
-        violation=float(W.option[WORST_G]),
-        velocity_violation=float(W.option[WORST_V]),
+        violation=float(option[WORST_G]),
+        velocity_violation=float(option[WORST_V]),
         steps=int(clock.count[ex.ACCEPTED]),
         rejected=int(clock.count[ex.REJECTED]),
-        evaluations=int(W.info[EVALUATIONS]),
-        factorisations=int(W.info[FACTORISATIONS]),
+        evaluations=int(info[EVALUATIONS]),
+        factorisations=int(info[FACTORISATIONS]),
         seconds=time.perf_counter() - start.since,
         compiling=compiled_since(start.since),
         options=o.choices(),

@@ -99,7 +99,8 @@ def remarks(a: Assembly, clock: ex.Clock) -> tuple[str, ...]:
 
 
 def _overcome(a: Assembly) -> str:
-    found = fault(a.compiled.work.stack, a.compiled.structure.functions, overcome=True)
+    functions = a.compiled.structure.functions
+    found = fault(a.compiled.array("stack"), functions, overcome=True) if functions else None
     if found is None:
         return ""
     return (

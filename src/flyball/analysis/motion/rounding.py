@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ...numerics.integrators import clock as ex
@@ -39,8 +41,8 @@ def excess(clock: ex.Clock) -> str:
 def far_off(a: Assembly, clock: ex.Clock) -> str:
     """How far from the origin it is, where positions are not known there to the tolerance."""
     length = a.compiled.values.length
-    far = float(np.abs(a.compiled.work.FK[:, :3]).max(initial=0.0))
-    digit = float(np.spacing(far))
+    far = float(np.abs(a.compiled.array("FK")[:, :3]).max(initial=0.0))
+    digit = math.ulp(far)
     if not digit > clock.real[ex.ATOL] + clock.real[ex.RTOL] * length:
         return ""
     return (

@@ -39,6 +39,8 @@ class Often(NamedTuple):
 def often(c: Compiled) -> list[Often]:
     """The sampled controllers, the one of the shortest period first."""
     s, numbers = c.structure, c.values.numbers
+    if not s.sampled:
+        return []
     names = dict.fromkeys(name for name, *_ in s.sampled)
     found = [Often(s.model[k].title, float(numbers[k].period), float(numbers[k].offset)) for k in names]
     return sorted(found, key=lambda x: x.period)
@@ -68,7 +70,7 @@ def too_often(c: Compiled, clock: ex.Clock, begun: float) -> str:
 
 def never(c: Compiled, clock: ex.Clock) -> tuple[str, ...]:
     """What to say of controllers whose first instant lies beyond the end; nothing where events might change that."""
-    if c.structure.model.events:
+    if c.structure.model.events or not c.structure.sampled:
         return ()
     end = _end(clock)
     return tuple(

@@ -16,6 +16,8 @@ from ...results.booked import Begun, ended
 from ...results.records import wound
 from ...results.result import Result
 from ...tables.branches import bent_laws
+from ...tables.numbers import files
+from ...tables.specs import Structure
 from ...tables.switches import declared
 from ...tables.system import HOLD, MODE, Q0, SEMIDEFINITE, VALUE
 from ..assemble import assemble
@@ -24,7 +26,8 @@ from ..compiled import compiled
 from ..mobility import mobility
 from .engines import Engine
 from .joined import refuse_jump
-from .layer import in_coordinates, known
+from .layer import in_coordinates
+from .layer import known as known_coordinates
 from .part import Part, whole
 from .stiff import Pace
 
@@ -45,6 +48,12 @@ class Start:
     pace: Pace | None = None  # whether it goes on by another method; none: it does not
     since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
     part: Part = field(default_factory=whole)  # of the motion
+
+    def again(self, part: Part) -> Start:
+        """The same with arrays and scratch of its own; it is of a mechanism as described, with nothing before it."""
+        base = self.base.again()
+        a = base if self.assembly is self.base else self.assembly.again()
+        return Start(base, a, self.y.copy(), self.coordinates, dict(self.wound), part=part)
 
     @property
     def carried(self) -> Mapping[str, Any]:
@@ -93,6 +102,28 @@ def begin(
         If a body can move without inertia, or the earlier result is of another mechanism.
     """
     part = part or whole()
+    if before is not None or parameters or not model.frozen:
+        return _worked_out(model, t, parameters, before, coordinates, switches, part)
+    key = float(t).hex(), coordinates, switches
+    known: Start | None = model.kept.known("begun", key)
+    if known is None:
+        found = _worked_out(model, t, None, None, coordinates, switches, part)
+        if _lasting(found.base.compiled.structure):
+            model.kept.get("begun", key, MOST, lambda: found.again(whole()))
+        return found
+    return known.again(part)
+
+
+def _worked_out(
+    model: Model,
+    t: float,
+    parameters: Mapping[str, float] | None,
+    before: Result | None,
+    coordinates: str,
+    switches: bool,
+    part: Part,
+) -> Start:
+    """Where it begins, found from the description."""
     if before is not None and before.stretches is not None:
         set_by_events = _set_by_events(model, before)
         parameters = {**(parameters or {}), **set_by_events} if part.later else {**set_by_events, **(parameters or {})}
@@ -102,6 +133,11 @@ def begin(
     if base.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
         mobility(model, base, inertia=True)
     return replace(begin_at(base, parameters, coordinates, before, switches=switches), part=part)
+
+
+def _lasting(s: Structure) -> bool:
+    """Whether what is made of it is what would be made of it now: no file is read, no Python function called."""
+    return not s.functions and not files(s.model)
 
 
 def _as_it_came(base: Assembly, parameters: Mapping[str, float] | None, before: Result, switches: bool) -> Start:
@@ -140,7 +176,7 @@ def begin_at(
     switches: bool = False,
 ) -> Start:
     """Begin where the mechanism is assembled already; choose coordinates."""
-    known(coordinates)
+    known_coordinates(coordinates)
     x = base.compiled.values
     key = coordinates, float(base.t).hex(), base.y.tobytes(), switches
     found = x.kept.get("begun", key, MOST, lambda: _begun(base, coordinates, parameters, switches))

@@ -27,7 +27,7 @@ EVERY = 100  # steps of it between two looks
 LOOK, LITTLE = 8e5, 0.01  # what a look takes [ns], and part of the time that looks may take where they find nothing
 SELDOM = 60  # steps of the implicit method
 IN_A_ROW = 2  # looks that say the same
-LONG = 8e7  # that the explicit method has left at least [ns], as estimated: the implicit one may have to be compiled
+LONG = 4e8  # that the explicit method has left at least [ns], as estimated: what it takes to load the implicit one
 LEAST = 270.0  # that an evaluation takes [ns], with the loop about it
 EDGE = 3.5  # h rho of wide steps that are hardly stable any more
 WHOLE = 0.3  # part of the state; what swings so far is the motion itself, at whatever tolerance
@@ -193,5 +193,7 @@ def limited_by(fast: complex, clock: ex.Clock, lately: Lately) -> bool:
 
 def on_corner(c: Compiled) -> bool:
     """Whether a law is held on its corner: its side follows from accelerations, which implicit steps do not find."""
+    if not len(c.system.switch_i):
+        return False
     kinds, modes = c.system.switch_i[:, SWITCH_KIND], c.work.switch[MODE]
     return bool(((kinds == BRANCH) & (modes != OFF)).any())

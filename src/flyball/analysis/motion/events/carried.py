@@ -12,7 +12,7 @@ from .rest import Bounces
 
 def carried(here: Here) -> dict[str, Any]:
     """How often events happened, what they were as they last did, bounces and swings of late; plain data, by names."""
-    names = _names(here)
+    names = _names(here) if here.bounces or here.swings else []
     bounces = [[*names[s], b.count, b.last, b.before] for s, b in here.bounces.items()]
     swings = [[*names[s], *past] for s, past in here.swings.items()]
     every = {"counts": dict(here.counts), "true": list(here.true), "bounces": bounces, "swings": swings}

@@ -56,6 +56,9 @@ def begin(here: Here) -> None:
     ModelError
         If a limit starts violated.
     """
+    s = here.structure
+    if here.start.before is None and not (s.switches or s.events or s.model.events):
+        return
     acts = act_at_start(here)
     if len(here.c.system.switch_i) or here.kick is not None:
         n = instant_of(here)

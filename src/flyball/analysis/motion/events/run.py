@@ -15,6 +15,7 @@ import numpy as np
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
 from ....equations.explicit import Explicit
 from ....equations.sampled import Sampling
+from ....equations.unwatched import Unwatched
 from ....equations.watched import Loop
 from ....errors import FlyballError, ModelError
 from ....laws.breaks import Breaks
@@ -95,8 +96,8 @@ class Run:
         self.guarded = len(here.c.system.guard_i) > 0
         watched = self.guarded or len(here.c.system.switch_i) or here.structure.model.events
         here.seen = Segments() if watched else None
-        self.loop = self._loop()
         self.sampling = self._sampling(here.t)
+        self.loop = self._loop()
 
     def _sampling(self, t: float) -> Sampling | None:
         return sampling(self.here.c, self.method, (t, self.end), (self.width, len(self.buffer)))
@@ -124,20 +125,19 @@ class Run:
             self.rows[-1][-1] = self.row()
         return True
 
-    def _loop(self) -> Loop | None:
+    def _loop(self) -> Loop | Unwatched | None:
         """By steps behind a door; nothing where the engine's own loop does."""
-        c, clock, width = self.here.c, self.here.clock, self.width
-        if self.now in IMPLICIT:
-            steps = implicit(self.now, c, clock, self.options)
-            return Loop(steps, clock, c.system, c.work, max(width, steps.width), self.here.group)
-        if not self.guarded:
+        here, c = self.here, self.here.c
+        if self.now not in IMPLICIT and not self.guarded:
             return None
-        return Loop(Explicit(self.method), clock, c.system, c.work, width, self.here.group)
+        steps = implicit(self.now, c, here.clock, self.options) if self.now in IMPLICIT else Explicit(self.method)
+        way = steps, here.clock, c.structure, c.system, c.scratch, max(self.width, steps.width)
+        return Loop(*way, here.group) if self.guarded or self.sampling is not None else Unwatched(*way)
 
     def go(self, known: Breaks) -> tuple[np.ndarray, bool]:
         """Go to the end, or as far as it goes: (rows of output, whether the user interrupted)."""
         here, engine = self.here, self.engine
-        forget(here.c.work.stack)
+        forget(here.c.array("stack"))
         try:
             self.begin()
             engine.begin(here.clock)
@@ -162,7 +162,7 @@ class Run:
             here.failed = error
         finally:
             engine.end()
-            if self.loop is not None and self.guarded:
+            if isinstance(self.loop, Loop) and self.guarded:
                 here.watched = told(self.loop)
                 as_left(here, self.loop)
             if self.loop is not None and here.failed is None:
@@ -177,11 +177,8 @@ class Run:
         self.now = to
         self.engine.stop()
         self.loop = self._loop()
-        if before is not None and self.loop is not None:
-            for mine, its in zip(
-                (self.loop.desk.side, self.loop.desk.g), (before.desk.side, before.desk.g), strict=True
-            ):
-                mine[:] = its
+        if isinstance(before, Loop) and isinstance(self.loop, Loop):
+            self.loop.desk.side[:], self.loop.desk.g[:] = before.desk.side, before.desk.g
         clock.count[ex.STARTED], clock.count[ex.STATUS] = 0, ex.RUNNING
         if to not in IMPLICIT and not clock.real[ex.STEP]:
             clock.real[ex.H] = 0.0  # as at a start
@@ -223,7 +220,7 @@ class Run:
             self.rows = self.rows[:1]
             self.part.anew()
             self.here.seen = self.here.seen and Segments()
-            forget(self.here.c.work.stack)
+            forget(self.here.c.array("stack"))
             self.legs.anew()
         if self.pauses.here():
             return True
@@ -259,7 +256,7 @@ class Run:
         if not on and self.stops is not None and self.stops.due(here.t):
             self.stops.sample(here.c.system, here.c.work, here.clock)
         begin(here)
-        if self.loop is not None and self.guarded and on:
+        if isinstance(self.loop, Loop) and self.guarded and on:
             resume(here, self.loop)
         here.true = true_already(here)
         self.here.fresh = False
@@ -277,9 +274,11 @@ class Run:
                 used = self.sampling.go_on(c.system, c.work, clock, self.buffer)
             elif self.loop is None:
                 used = motion_kernel(c.system, c.work, self.method, clock, self.buffer, INTEGRATE)
+            elif isinstance(self.loop, Unwatched):
+                used = self.loop.go_on(self.buffer)
             else:
                 tie(here, self.loop)
-                used = self.loop.go_on(c.system, c.work, self.buffer, self.sampling)
+                used = self.loop.go_on(c.system, self.buffer, self.sampling)
             self.take(self.buffer[:used].copy())
         self.tell(max(0.0, min(1.0, (clock.real[ex.T] - self.first) / self.span)))
         done = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps)
@@ -306,7 +305,7 @@ class Run:
         self.counts.add(fired, here.t)
         if found := self.counts.accumulate(fired, self.legs.end):
             raise accumulating(instant_of(here), *found)
-        if self.loop is not None:
+        if isinstance(self.loop, Loop):
             here.astray = astray(here, self.loop)
             as_fired(here, self.loop)
         self.happens(fired)
@@ -331,7 +330,7 @@ class Run:
             other = self._sampling(here.t)
             if other is not None and self.sampling is not None and other.differs(self.sampling):
                 self.sampling = other
-        if self.loop is not None and here.c.work is not self.loop.W:
+        if self.loop is not None and here.c.scratch is not self.loop.scratch:
             self.loop = self._loop()
         if here.fresh:
             clock.real[ex.H] = min(clock.real[ex.H], clock.real[ex.WIDE] or clock.real[ex.H])
@@ -347,7 +346,7 @@ class Run:
         ``before``: expressions of events on the other side of that time, across which nothing is followed.
         """
         here = self.here
-        if self.loop is not None:
+        if isinstance(self.loop, Loop):
             as_grains(here, self.loop)
         n, (kinds, of) = instant_of(here), here.c.system.guard_i[:, [GUARD_KIND, GUARD_OF]].T
         values, sides = n.guards(), np.isin(kinds, (*DISTANCES, G_BACK))

@@ -11,7 +11,7 @@ from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
 from ....numerics.lu import Rows
 from ...compiled import Compiled
-from .loop import DESK, EPS, Implicit
+from .loop import EPS, Implicit
 
 
 class Desk(NamedTuple):
@@ -73,7 +73,7 @@ class Alpha(Implicit):
         super()._settle(real, turns)
         steps = float(self.clock.real[ex.SPAN] / self.clock.real[ex.STEP])  # what each leaves to its iteration adds up
         real[ds.NEWTON] = max(10.0 * EPS / real[ds.RTOL], min(0.1, 1.0 / steps))
-        self.own[DESK].array("rho")[0] = self.rho
+        self.own.array("desk.rho")[0] = self.rho
 
     def _desk(self, nz: int, springy: np.ndarray) -> Desk:  # type: ignore[override]
         w = super()._desk(nz, springy)

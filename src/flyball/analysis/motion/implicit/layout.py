@@ -188,8 +188,6 @@ def layout(s: Structure, S: System, index_3: bool = False) -> Layout:
 def metric(c: Compiled, t: float, y: np.ndarray) -> np.ndarray:
     """Of each velocity the inverse of its inertia, (nv,), which is at least a small part of the largest."""
     s, S, W = c.structure, c.system, c.work
-    if not len(s.rows):
-        return np.ones(s.nv)
     if S.kinds[SOLVER] == SCHUR:
         inertia = c.mass().diagonal()
     else:

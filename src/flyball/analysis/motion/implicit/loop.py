@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....compiler.bound import Bound, Joined, Mould, Written
+from ....compiler.bound import Bound, Joined, Mould, Moulded, Written
 from ....equations import residual
-from ....equations.callbacks import Going, Own
-from ....equations.implicit import SIZES, Means, Plan, radau_steps
+from ....equations.implicit import SIZES, Means, Plan, Workshop, radau_steps
 from ....equations.residual import Bench
-from ....equations.scratch import scratch
+from ....equations.scratch import blank, fill
 from ....errors import SimulationError
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
 from ....numerics.integrators.implicit.desk import Desk
-from ....tables.system import FREE, NV, Q0, SCHUR, SOLVER, SPHERICAL, TREE, V0, System, Work
+from ....tables.system import FREE, NV, Q0, SCHUR, SCRATCH, SOLVER, SPHERICAL, TREE, V0, System
 from ...compiled import Compiled
 from ...linear.derivatives import refuse_functions
 from ...linear.loads import STEP, as_complex
@@ -26,7 +25,7 @@ SMALL, LARGE = 1e-7, 1e-6  # relative corrections that are taken for rounding if
 CHEAP, DEAR, FEW = 1e-3, 0.1, 12  # rates of the iteration up to which a Jacobian serves on, where it takes few
 # evaluations and where it takes more
 EPS = float(np.finfo(float).eps)
-PLAN, DESK = 3, 4  # of what steps have of their own
+MOST = 2  # of what steps work with, of a structure, that is known
 SEEN = np.array([0.0, 0.0, 0.25, 0.6, 0.857])  # places in a step at which guards are seen, behind two that are not
 
 
@@ -52,28 +51,33 @@ class Implicit:
         self.layout = x = layout(s, S, index_3)
         self.width, self.system = x.width, S
         self.light = c.values.kept.get("light", None, 1, lambda: light(c))
-        key = type(self).__name__, index_3, self.light.tobytes()
-        moulds = s.kept.get("implicit steps", key, 2, lambda: self._moulds(clock.y.shape[1]))
-        self.own = [mould.new() for mould in moulds]
-        self.own[PLAN].array("metric")[:] = metric(c, float(clock.real[ex.T]), clock.y[ex.NOW])
-        self.count = self.own[DESK].array("count")
-        self._settle(self.own[DESK].array("real"), len(S.angle_i) > 0)
-        self.scratch = scratch(s, self._tables(S)[1].fields, complex)
+        key = type(self).__name__, index_3, self.light.tobytes(), int(S.flat[SCRATCH])
+        self.own: Moulded = s.kept.get("implicit steps", key, MOST, lambda: self._mould(clock.y.shape[1])).new()
+        fill(s, self._stepped(S).fields, lambda name: self.own.array(f"WC.{name}"))
+        if len(s.rows):
+            self.own.array("plan.metric")[:] = metric(c, float(clock.real[ex.T]), clock.y[ex.NOW])
+        self.count = self.own.array("desk.count")
+        self._settle(self.own.array("desk.real"), len(S.angle_i) > 0)
 
-    def bind(self, S: System, W: Work, own: Own, going: Going, *known: Written) -> Bound:
+    def bind(self, tables: Written, scratch: Written, own: Written, going: Written, doors: np.ndarray) -> Bound:
         """The door with these tuples bound to it."""
+        S = tables.fields
         if S is not self.system:  # other values of parameters: masses too, perhaps
             self.system = S
             self.count[ds.JACOBIANS] = 0
-        real, stepped = self._tables(S)
-        means = Joined(Means, stepped, self.scratch, *self.own)
-        own.doors[1] = residual.stepped.address(*(() if residual.stepped.used else residual.asked(*means.fields[:3])))
-        c = self.compiled
-        engine = c.scratch if W is c.work else Written(W)
-        return Bound(self.door, real, engine, means, Written(own, *known), Written(going, *known))
+        means = Joined(Means, self._stepped(S), self.own)
+        doors[1] = self._residuals(means)
+        return Bound(self.door, tables, scratch, means, own, going)
 
-    def _moulds(self, ny: int) -> list[Mould]:
-        """What steps work with besides tables and scratch, as it is new: benches, plan, desk."""
+    def _residuals(self, means: Joined) -> int:
+        """Where residuals in complex numbers are."""
+        door = residual.stepped
+        if door.used:
+            return door.address()
+        return door.address(*residual.asked(means.fields.SC, means.fields.own.WC, means.fields.own.moved))
+
+    def _mould(self, ny: int) -> Mould:
+        """What steps work with besides tables, as it is new: scratch, benches, plan, desk."""
         x, S = self.layout, self.system
         still = [y for y in (*vars(x).values(), *x.terms, *x.mass, *x.P, *x.whole_P)
                  if isinstance(y, np.ndarray)]  # fmt: skip
@@ -83,14 +87,13 @@ class Implicit:
         )  # fmt: skip
         springy = x.spring[self.light[x.spring[:, 0]] == 0.0] if len(self.light) else x.spring
         desk = self._desk(len(self.compiled.structure.states), springy)
-        still += [self.light, springy]
         benches = self._benches(ny)
-        return [*(Mould(b, [b.steps]) for b in benches), Mould(plan, still), Mould(desk, still)]
+        still += [self.light, springy, *(b.steps for b in benches)]
+        return Mould(Workshop(blank(x.s, self._stepped(S).fields, complex), *benches, plan, desk), still)
 
-    def _tables(self, S: System) -> tuple[Written, Written]:
-        """The same for every run with them: tables, and these in complex numbers, as compiled code has them."""
-        kept = self.layout.s.kept
-        return kept.get("written", id(S), 2, lambda: (Written(S), Written(as_complex(S))))
+    def _stepped(self, S: System) -> Written:
+        """Tables in complex numbers, as compiled code has them: the same for every run with them."""
+        return self.layout.s.kept.get("stepped", id(S), MOST, lambda: (S, Written(as_complex(S))))[1]
 
     @property
     def failed(self) -> SimulationError | None:

@@ -7,14 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ....compiler.bound import Bound, Written
-from ....equations.callbacks import Going, Own
 from ....equations.tree import quaternion_at
 from ....equations.variational import variational_steps
 from ....errors import ModelError, SimulationError
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
 from ....numerics.integrators.tableaux import tableau
-from ....tables.system import EXCESS, EXCESS_MASS, LENGTH, SEMIDEFINITE, System, Work
+from ....tables.system import EXCESS, EXCESS_MASS, LENGTH, SEMIDEFINITE
 from ...compiled import Compiled
 from ..start import Start
 from .loop import SEEN
@@ -74,9 +73,9 @@ class Variational:
             np.array(turns, np.int64), z((4, nv)), z((3, nv)), z(nr), z((2, n)), z((KEPT, nr)), z((KEPT, nv)),
         )  # fmt: skip
 
-    def bind(self, S: System, W: Work, own: Own, going: Going, *known: Written) -> Bound:
+    def bind(self, tables: Written, scratch: Written, own: Written, going: Written, doors: np.ndarray) -> Bound:
         """The door with these tuples bound to it."""
-        return Bound(variational_steps, *(Written(x, *known) for x in (S, W, self.desk, own, going)))
+        return Bound(variational_steps, tables, scratch, Written(self.desk), own, going)
 
     @property
     def failed(self) -> SimulationError | None:
