@@ -82,8 +82,8 @@ class Legs:
         return bool(self.goal - real[ex.T] <= SLIVER * real[ex.LARGEST])
 
     def aim(self) -> None:
-        """Have the clock run to the end of the stretch, or to what it stops for before; what is left to that by rounding
-        alone (an instant of sampling beside an event's) is no step, and is passed.
+        """Have the clock run to the end of the stretch, or to what it stops for before. What rounding leaves to that
+        (an instant of sampling beside an event's) is no step, and is passed.
         """
         real = self.clock.real
         real[ex.T_END] = end = self.until(self.goal)
