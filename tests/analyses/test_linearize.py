@@ -9,6 +9,7 @@ import flyball as fb
 from flyball.analysis.assemble import assemble
 from flyball.analysis.linear.derivatives import Equations, State
 from flyball.analysis.linear.free import free
+from flyball.errors import ModelError
 from tests.analyses.made import G, conical_pendulum, parallelogram, rod, watt
 
 LAYERS = ("absolute", "joint")
@@ -29,6 +30,21 @@ def test_stiffness_of_joints_that_turn_with_bodies(layer):
 def test_hanging_parallelogram(layer):
     """Two rods and a bar that goes round without turning: omega^2 = (1/2 + 1 + 1/2) g / (1/3 + 1 + 1/3)."""
     assert squares(parallelogram().linearize(coordinates=layer)) == pytest.approx(11.772, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("name", "instead"),
+    [("push.work", "push.power"), ("spring.work", "spring.power"), ("energy.balance", "energy.total"), ("W", "push.p")],
+)
+def test_what_counts_from_the_start_is_no_output(name, instead):
+    """The work of a constant torque is no function of a state: it was told as one that nothing changes."""
+    m = rod()
+    joint = m.joints[0].name
+    m.add(fb.TorsionalSpringDamper("spring", joint, stiffness=5), fb.Motor("push", joint, torque=0))
+    m.add(fb.Sensor("W", "push.work"))
+    with pytest.raises(ModelError, match=f"output {name!r} counts from the start of a motion on.*{instead}"):
+        m.linearize(["push"], [name])
+    assert m.linearize(["push"], ["push.power", "energy.total"]).C.shape == (2, 2)
 
 
 def test_self_stress_changes_nothing():

@@ -35,6 +35,19 @@ def test_numbers_of_a_curve():
         np.testing.assert_allclose(s[name], part * np.array([0.1, 0.2]), atol=1e-6)
 
 
+def test_means_are_over_time_however_output_times_are_spread():
+    """Of x = t^2 / 2 by trapezoids: each time counts as much as the spans beside it."""
+    m = fb.Mechanism("block", planar=True, parameters={"a": 1.0})
+    m.add(fb.Body("b", mass=1.0, inertia=1.0), fb.Prismatic("slide", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Actuator("push", "slide.displacement", force="a"))
+    t = np.array([0.0, 0.05, 0.1, 0.2, 1.0])
+    s = m.study({"a": [1.0, 3.0]}, ["mean(b.x)", "mean(b.vx)", "rms(b.vx)"], t_end=1.0, outputs=t.tolist())
+    a = np.array([1.0, 3.0])
+    np.testing.assert_allclose(s["mean(b.vx)"], a / 2, rtol=1e-9)  # exact: it is linear; alike they gave 0.27 a
+    np.testing.assert_allclose(s["mean(b.x)"], a * np.trapezoid(t**2 / 2, t), rtol=1e-8)
+    np.testing.assert_allclose(s["rms(b.vx)"], a * np.sqrt(np.trapezoid(t**2, t)), rtol=1e-8)
+
+
 def test_functions_of_results():
     s = oscillator().study(
         {"x0": [0.1, 0.2]}, {"energy": lambda r: r.energy.total[0], "turns": lambda r: len(r.t)}, t_end=0.1, outputs=3

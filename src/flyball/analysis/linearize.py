@@ -15,13 +15,13 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
-from ..model.quantities import one
 from ..model.touching import holds_at_times
 from ..results.descriptor import Descriptor
 from ..results.equilibrium import Equilibrium
 from ..results.linear import LinearModel, StateSpace
 from ..results.result import Result
 from .compiled import compiled
+from .linear.counted import refuse_counted
 from .linear.curves import slopes, snapshot
 from .linear.cycles import Sample, over_a_cycle, refuse_unsettled
 from .linear.derivatives import Equations, State
@@ -83,6 +83,7 @@ class LinearizeOptions(InstantOptions):
 
 def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
+    refuse_counted(model, o.outputs)
     if model.controllers:
         return small_motions(model, o)[0]
     if holds_at_times(model):
@@ -95,8 +96,6 @@ def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
 
 def _linear(model: Model, o: LinearizeOptions) -> LinearModel:
     """Of a mechanism in which nothing holds at times any more, but friction that slides."""
-    for name in o.outputs:
-        one(model, name)  # refuses those that do not exist; inputs are looked up where they are added
     here = model
     if o.about is None:  # the copy with inputs is assembled at once
         here, named = with_inputs(model, o.inputs)

@@ -23,13 +23,14 @@ from .linear.controlled import determined_copy
 from .linear.curves import over_time, slopes, snapshot
 from .linear.derivatives import Equations, State, announce, stepped_values
 from .linear.differences import Found, check, whole
-from .linear.jumps import refuse_jumps
+from .linear.in_motion import moving_copy
+from .linear.jumps import refuse_jumps, refuse_switching
 from .linear.kinks import refuse_kinks
 from .linear.moded import at_modes, of_modes
 from .linear.own_words import in_own_words
 from .linear.question import Question
 from .linear.rest import Rest
-from .linear.sliders import Slid, beginnings, refuse_sampled, slid
+from .linear.sliders import Slid, refuse_sampled
 from .linear.tangent import Direction, Linear, Tangent, friction
 from .linear.undetermined import refuse_undetermined, told_by_reactions
 from .linear.variation import Variation, Varied, followed
@@ -111,6 +112,15 @@ def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
 
 
 def _asked(model: Model, o: SensitivityOptions) -> Sensitivity:
+    a = _question(model, o)
+    out = ANALYSES[o.analysis][0](a)
+    env = model.environment(o.parameters)
+    out.parameters = {name: env[name] for name in a.to}
+    return _verified(a, o.analysis, out) if o.verify else out
+
+
+def _question(model: Model, o: SensitivityOptions) -> Question:
+    """What is asked, looked through: names there are, of quantities and parameters."""
     refuse_contact(model, "sensitivity", controlled=True)
     env = model.environment(o.parameters)
     for name in o.to:
@@ -122,23 +132,18 @@ def _asked(model: Model, o: SensitivityOptions) -> Sensitivity:
         one(model, name)
     if not env:
         raise ModelError(f"{model.name!r} has no parameters to take derivatives by; give it some: parameters={{...}}")
-    times = np.zeros(0) if o.t_end is None else output_times(o.t, o.t_end, o.of_motion("outputs"))
-    rtol, atol = o.of_motion("rtol"), o.of_motion("atol")
-    a = Question(
+    return Question(
         model.snapshot(),
         o.of,
         o.to or tuple(env),
         o.t,
         dict(o.parameters or {}),
-        times,
+        np.zeros(0) if o.t_end is None else output_times(o.t, o.t_end, o.of_motion("outputs")),
         o.about,
-        rtol,
-        atol,
+        o.of_motion("rtol"),
+        o.of_motion("atol"),
         o.coordinates,
     )
-    out = ANALYSES[o.analysis][0](a)
-    out.parameters = {name: env[name] for name in a.to}
-    return _verified(a, o.analysis, out) if o.verify else out
 
 
 def _controlled(model: Model, o: SensitivityOptions) -> Sensitivity:
@@ -150,11 +155,13 @@ def _controlled(model: Model, o: SensitivityOptions) -> Sensitivity:
     if o.analysis != "motion":
         return _asked(model, o)
     refuse_sampled(model, "sensitivity")
-    for name in o.of:
-        one(model, name)
-    other = slid(model, beginnings(model), o.of)
-    found = sensitivity(other.model, replace(o, of=tuple(other.outputs.get(name, name) for name in o.of)))
-    return _named(found, o.of, other)
+    a = _question(model, o)
+    refuse_switching(model, a.to)
+    other = moving_copy(model, o.parameters, o.of)
+    named = tuple(other.outputs.get(name, name) for name in o.of)
+    with in_own_words(other):
+        found = _named(_asked(other.model, replace(o, of=named, verify=False)), o.of, other)
+    return _verified(a, o.analysis, found) if o.verify else found
 
 
 def _named(found: Sensitivity, of: tuple[str, ...], other: Slid) -> Sensitivity:

@@ -124,6 +124,15 @@ class PID(Controller):
             return self
         return replace(self, lower=None, upper=None, anti_windup=None, tracking=None)
 
+    def smoother(self, state: str) -> str:
+        """Clamping stops the integral and lets it go."""
+        if state != "integral" or self.windup != CLAMPING:
+            return ""
+        return (
+            f"anti_windup={CLAMPING!r} stops the integral and lets it go again: give anti_windup={BACK!r}, which leads "
+            f"it back smoothly, or 'none'"
+        )
+
     def given(self) -> dict[str, Any]:
         """Inputs, gains, limits."""
         numbers = ("kp", "ki", "kd", "filter", "lower", "upper", "tracking", "bias", "period")

@@ -215,13 +215,14 @@ class Design(Model):
             ``"lognormal(median, sd of the logarithm)"``.
         of : sequence of str, or mapping of str to callable
             Curves of a result (``"slider.x"``), or one number of each: ``"end(slider.x)"``, ``max``, ``min``, ``mean``,
-            ``rms``, over the output times, each of which counts alike: where they are far apart for what the curve
-            does, ``mean`` and ``rms`` are as rough. Of an equilibrium also ``"least"`` (its least stiffness) and
-            ``"stable"`` (1 or 0); of modes ``"frequency[0]"``, ``"omega[0]"``, ``"damping_ratio[0]"``, slowest first,
-            and ``"stable"``; of linear models ``"gain(output, input)"``, with an angular frequency [rad/s] as third
-            also ``phase``, and ``"abscissa"``, the largest real part of an eigenvalue [1/s]; of sampled models
-            ln(abs(z)) / period of the largest multiplier z. Or name -> function of a run's answer that returns a
-            number.
+            ``rms``: of the curve at the output times, ``mean`` and ``rms`` over time by the trapezoidal rule, so that
+            it matters not how times are spread; where they are far apart for what the curve does, both are as rough.
+            Of an equilibrium also ``"least"`` (its least stiffness) and ``"stable"`` (1 or 0); of modes
+            ``"frequency[0]"``, ``"omega[0]"``, ``"damping_ratio[0]"``, slowest first, and ``"stable"``; of linear
+            models ``"gain(output, input)"``, with an angular frequency [rad/s] as third also ``phase``, and
+            ``"abscissa"``, the largest real part of an eigenvalue [1/s]; of sampled models ln(abs(z)) / period of the
+            largest multiplier z.
+            Or name -> function of a run's answer that returns a number.
         analysis : {"motion", "kinematics", "instant", "equilibrium", "modes", "linearize"} or callable
             What each run is: `simulate`, `kinematics`, `assemble` with accelerations and reactions, `equilibrium`,
             `modes`, `linearize`; or a function of the mechanism and the values of its parameters, of any other.

@@ -145,7 +145,8 @@ class Statics(Model):
             Forces, torques and motors that have a law (``"push.x"`` where it has components): what is added to it;
             drivers: what is added to their law; parameters.
         outputs : sequence of str
-            Sensors, or curves of a result: ``"A.angle"``, ``"slider.vx"``, ``"A.fx"``, ``"energy.kinetic"``.
+            Sensors, or curves of a result: ``"A.angle"``, ``"slider.vx"``, ``"A.fx"``, ``"energy.kinetic"``. Works and
+            the energy's balance count from the start of a motion on, and are refused.
         about : Result or Equilibrium, optional
             Where: the end of a motion, or an equilibrium; else as drawn and assembled at ``t``.
         t : float or str [s], optional

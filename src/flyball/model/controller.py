@@ -91,6 +91,10 @@ class Controller(Element, ABC):
         """The same without limits of its output; itself where it has none."""
         return self
 
+    def smoother(self, state: str) -> str:
+        """What to give instead where the rate of a state jumps by what this controller is; empty: laws of the user."""
+        return ""
+
     @abstractmethod
     def given(self) -> dict[str, Any]:
         """Laws of the user's by the names that formulas know them by: inputs, gains, limits."""

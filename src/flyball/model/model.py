@@ -57,6 +57,7 @@ class Model:
 
     frozen: ClassVar[bool] = False  # whether it is a snapshot
     kept: Kept  # of a snapshot: what was worked out of it
+    aside: frozenset[str] = frozenset()  # parts of a copy that stand for something else: in no energy and no work
 
     def __init__(
         self,

@@ -76,12 +76,18 @@ class Energy(Named):
         return quantities(self._result.model, ENERGY)
 
     @cached_property
+    def _bodies(self) -> list[int]:
+        """Rows of the body table, but for bodies that stand for something else."""
+        s = self._result.values.structure
+        aside = {s.place[name] for name in s.model.aside if name in s.place}
+        return [b for b in range(len(self._result.values.system.body_i)) if b not in aside]
+
+    @cached_property
     def kinetic(self) -> np.ndarray:
         """Sum of m v^2 / 2 + w . I w / 2 over the bodies."""
         if self._result.pieces:
             return self._of_pieces("kinetic")
-        every = range(len(self._result.values.system.body_i))
-        return sum((b.kinetic for b in self._result.bulk.values()), kinetic(self._result, every))
+        return sum((b.kinetic for b in self._result.bulk.values()), kinetic(self._result, self._bodies))
 
     @cached_property
     def gravity(self) -> np.ndarray:
@@ -89,7 +95,7 @@ class Energy(Named):
         if self._result.pieces:
             return self._of_pieces("gravity")
         S = self._result.values.system
-        total = gravity(self._result, range(len(S.body_i)))
+        total = gravity(self._result, self._bodies)
         return sum((b.potential(S.glob[:3]) for b in self._result.bulk.values()), total)
 
     @cached_property

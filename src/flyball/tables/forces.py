@@ -115,7 +115,7 @@ def forces(s: Structure) -> None:
         else:
             table[k, :2] = frame(s, e, "F") if "F" in e.ends() else 0, frame(s, e, "M")
         _compile_laws(s, e, table[k])
-        if not e.conservative():
+        if not e.conservative() and e.name not in s.model.aside:
             table[k, 5] = s.state(f"{e.name}.work")
     s.tables["force_i"] = table
 

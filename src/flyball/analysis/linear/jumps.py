@@ -13,8 +13,13 @@ from ...errors import ModelError
 from ...model.element import LawOf, fields_with
 from ...model.expressions import Expression
 from ...model.model import Model
+from ...model.wiring import wired
 
 DECIDING = ("<", "<=", "sign")
+SMOOTH = (
+    "Write what is smooth, for instance step(x, x0, y0, x1, y1) or tanh(x/width), "
+    "and max(0, x) for a force that sets in"
+)
 
 
 def refuse_jumps(model: Model, to: Sequence[str]) -> None:
@@ -26,19 +31,34 @@ def refuse_jumps(model: Model, to: Sequence[str]) -> None:
         Naming the element and what its law decides by.
     """
     for title, law in laws(model):
-        for node in law.tree.walk():
-            if node.kind not in DECIDING:
-                continue
+        if by := _decides(law, model, to):
+            raise ModelError(
+                f"{title}: its law {law.text!r} decides by {by!r}, so it may jump at an instant that the parameters "
+                f"shift, and the sensitivity of a motion does not follow jumps. {SMOOTH}"
+            )
+
+
+def refuse_switching(model: Model, to: Sequence[str]) -> None:
+    """The same of the rates of controllers' states."""
+    for x in wired(model):
+        if by := _decides(x.law, model, to):
+            instead = x.controller.smoother(x.state) or SMOOTH
+            raise ModelError(
+                f"{x.controller.title}: the rate of {x.name!r} decides by {by!r}, so it may jump at an instant that "
+                f"the parameters shift, and the sensitivity of a motion does not follow jumps. {instead}"
+            )
+
+
+def _decides(law: Expression, model: Model, to: Sequence[str]) -> str:
+    """What a law decides by at instants that parameters shift; empty if it does not."""
+    for node in law.tree.walk():
+        if node.kind in DECIDING:
             names = {n.value for n in node.walk() if n.kind == "name"}
             state = sorted(names - {"t"} - set(model.parameters))
             moved = sorted(names & set(to)) if "t" in names else []
             if state or moved:
-                raise ModelError(
-                    f"{title}: its law {law.text!r} decides by {(state or moved)[0]!r}, so it may jump at an instant "
-                    f"that the parameters shift, and the sensitivity of a motion does not follow jumps. Write what "
-                    f"is smooth, for instance step(x, x0, y0, x1, y1) or tanh(x/width), and max(0, x) for a force "
-                    f"that sets in"
-                )
+                return str((state or moved)[0])
+    return ""
 
 
 def laws(model: Model) -> Iterator[tuple[str, Expression]]:

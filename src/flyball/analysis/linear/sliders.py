@@ -136,6 +136,7 @@ def slid(
     *,
     places: bool = False,
     scales: Mapping[str, Scale] | None = None,
+    board: float = 1.0,
 ) -> Slid:
     """The copy.
 
@@ -150,8 +151,10 @@ def slid(
         Whether places stand for states; else velocities.
     scales : mapping, optional
         State -> what stands for it; if not given, a metre or a metre per second for one, a newton for a rate of one.
+    board : float [kg]
+        Mass of the body that stands still, if there is one.
     """
-    return _Sliding(model, at, places, scales or {}).made(outputs)
+    return _Sliding(model, at, places, scales or {}).made(outputs, board)
 
 
 class _Sliding:
@@ -176,8 +179,9 @@ class _Sliding:
             name += "_"
         return name
 
-    def made(self, outputs: Sequence[str]) -> Slid:
+    def made(self, outputs: Sequence[str], board: float) -> Slid:
         """The copy, with curves for these signals."""
+        self.heavy = board
         for name, body in self.body.items():
             self.new.add(
                 self._solid(body, self.scales[name].mass),
@@ -195,6 +199,7 @@ class _Sliding:
         laws = {x.name: self._curve(f"law_{k}_", self.text(x.law)) for k, x in enumerate(sampled)}
         self.new.sensors = [e for e in self.new.sensors if not self._own(getattr(e, "of", ""))]
         slides = {body: name for name, body in self.body.items()}
+        self.new.aside = frozenset(self.new.by_name) - frozenset(self.old.by_name)
         added = (*slides, self.board) if self.board else tuple(slides)
         held = frozenset(x.name for x in self.states if x.controller.sampled)
         return Slid(self.new, slides, added, found, laws, self.at, held, self.scales, self.words)
@@ -281,7 +286,7 @@ class _Sliding:
         """A formula as a curve of the copy: a force on a body that stands still, which another one takes away again."""
         if not self.board:
             self.board = self._free("board")
-            self.new.add(self._solid(self.board, 1.0), welded(f"{self.board}_weld", self.board, self._place()))
+            self.new.add(self._solid(self.board, self.heavy), welded(f"{self.board}_weld", self.board, self._place()))
         told, along = self._free(name), f"{self.board}.x"
         self.new.add(pushing(told, along, text), pushing(f"{told}back", along, f"-{text}"))
         return f"{told}.force"
