@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 
+import numpy as np
 import pytest
 
 import flyball as fb
@@ -20,3 +21,19 @@ def test_a_law_that_jumps_at_an_instant_is_there_what_it_is_from_then_on(offset,
         half = 0.5 * float(period)
         r = m.simulate(jump + float(period), outputs=[0.0, jump - half, jump + half])
         assert r["s.output"].tolist() == [0.0, 0.0, 1.0], (k, jump)
+
+
+@pytest.mark.parametrize("method", ["auto", "rk45", "radau"])
+@pytest.mark.parametrize("t_end", [1.25, 3.0])
+def test_an_event_beside_an_instant_is_passed(method, t_end):
+    """3 * 0.1 is a bit more than 0.3: what is left to it after a blow is no step. It is w' = -(300 w + 8 x) / J."""
+    for at in ("0.3", "0.6", "0.7", "1.2"):
+        m = fb.Mechanism("z", planar=True)
+        m.add(fb.Body("a", mass=1.0, inertia=0.1, angular_velocity=-0.9), fb.Revolute("A", "ground", "a", at=(0, 0)))
+        m.add(fb.StateSpace("s", period=0.1, inputs=["A.angle"], D=[[-3.0]]), fb.Motor("M", "A", torque="s"))
+        m.add(fb.CoordinateSpring("k", "A.angle", stiffness=5, damping=300.0))
+        m.add(fb.Event("blow", f"t > {at}", do=[fb.Impulse("A.angle", 0.05)]))
+        r = m.simulate(t_end, outputs=[0.0, float(at), t_end], method=method)
+        assert r["A.angle_rate"][1] == pytest.approx(0.5, abs=1e-3), "after the blow"
+        thrown = (-0.09 * np.exp(-8 * t_end / 300) + 0.05 * np.exp(-8 * (t_end - float(at)) / 300)) / 300
+        assert r["A.angle"][-1] == pytest.approx(thrown, abs=5e-7)

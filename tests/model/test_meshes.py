@@ -115,6 +115,7 @@ def test_a_file_that_changes_is_read_again(there: Path) -> None:
 
 def test_a_motion_begins_with_the_file_as_it_is(there: Path) -> None:
     """A box of 1 x 1 m, then of 2 x 1, turns from rest about an axis 2 m away: 2 g/(4 + (a^2 + b^2)/12)."""
+    trimesh.creation.box((1, 1, 1)).export("part.stl")
     m = fb.Mechanism("pendulum", gravity=(0, -9.81, 0))
     m.add(fb.Body("b", shape=fb.Mesh(path="part.stl"), density=1.0))
     m.add(fb.Revolute("hinge", "ground", "b", at=(-2, 0, 0), axis=(0, 0, 1)))

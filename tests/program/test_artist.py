@@ -28,7 +28,7 @@ PICTURES = [
 @pytest.fixture
 def second(monkeypatch: pytest.MonkeyPatch) -> None:
     """A second process, whatever this one has imported and however many cores there are."""
-    monkeypatch.delitem(sys.modules, "matplotlib", raising=False)
+    monkeypatch.setattr(beside, "loaded", lambda: False)
     monkeypatch.setattr(beside, "cores", lambda: 2)
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Any
 
-from .jit import KERNELS, LOCK, OPTIONS, on_numba, start_numba
+from .jit import INSIDE, KERNELS, LOCK, OPTIONS, on_numba, start_numba
 
 
 class Door:
@@ -136,7 +136,7 @@ def _register() -> None:
 
         return types.int64(*[types.int64] * 7), generate
 
-    @overload(ask, jit_options=OPTIONS)
+    @overload(ask, jit_options=INSIDE)
     def call(places, task):  # type: ignore[no-untyped-def]
         return lambda places, task: leap(
             places[0], places[1], places[2], places[3], places[4], places[5], types.int64(task)
@@ -154,6 +154,6 @@ def _register() -> None:
 
         return types.int64(types.int64, *given, types.int64), generate
 
-    @overload(enter, jit_options=OPTIONS)
+    @overload(enter, jit_options=INSIDE)
     def choose(address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
         return lambda address, A, B, C, D, E, task: jump(address, A, B, C, D, E, task)

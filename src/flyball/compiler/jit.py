@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 F = TypeVar("F", bound=Callable[..., Any])
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}  # how formulas and kernels are compiled
-INSIDE = {**OPTIONS, "no_cfunc_wrapper": True}  # what only compiled code calls
+INSIDE: Any = {**OPTIONS, "no_cfunc_wrapper": True}  # what only compiled code calls
 KERNELS: list[Any] = []
 LOCK = threading.RLock()
 _pending: list[Callable[[], None]] = []

@@ -163,7 +163,7 @@ def _found(original: Any) -> Any:
             dominators = compute_cfg_from_blocks(blocks).dominators()
             for name in [x for x in once if x in asked_in]:
                 at = once[name]
-                if not all(at < k and at in dominators[k] for k in asked_in[name]):
+                if not all(at < k and at in dominators.get(k, ()) for k in asked_in[name]):
                     del once[name]
         self._singly_assigned_vars, self._blk_local_varmap = set(once), {}
 

@@ -23,7 +23,7 @@ d), four arrays among them, and returns a float:
 from __future__ import annotations
 
 from ..compiler.held import held
-from ..compiler.jit import formula, on_numba
+from ..compiler.jit import INSIDE, formula, on_numba
 from ..tables.system import FLAT, MADE, SCRATCH, STABILIZE
 from .tasks import COMPLETE, FOLLOW, INTEGRATE
 
@@ -70,7 +70,7 @@ def _register() -> None:
 
         return types.float64(types.int64, S, W, types.float64, *arrays), generate
 
-    @overload(run, jit_options={"error_model": "numpy"})
+    @overload(run, jit_options=INSIDE)
     def choose(address, S, W, t, a, b, c, d):  # type: ignore[no-untyped-def]
         if isinstance(a.dtype, types.Complex):
             return lambda address, S, W, t, a, b, c, d: 0.0

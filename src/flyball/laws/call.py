@@ -11,7 +11,7 @@ import math
 from typing import Any
 from weakref import WeakValueDictionary
 
-from ..compiler.jit import formula, on_numba
+from ..compiler.jit import INSIDE, formula, on_numba
 from .opcodes import ADDRESS, COUNT, INDEX
 
 STACK_RESERVE = 3
@@ -93,7 +93,7 @@ def _register() -> None:
 
         return types.void(types.int64, getattr(stack, "array", stack), types.int64), generate  # the whole array
 
-    @overload(call, jit_options={"error_model": "numpy"})
+    @overload(call, jit_options=INSIDE)
     def choose(address, stack, row):
         if isinstance(stack.dtype, types.Complex):
             return lambda address, stack, row: None

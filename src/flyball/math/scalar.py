@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.jit import formula, on_numba
+from ..compiler.jit import INSIDE, formula, on_numba
 
 Function = Callable[..., Any]
 
@@ -269,23 +269,21 @@ def _register() -> None:
     from numba import types
     from numba.extending import overload
 
-    options = {"error_model": "numpy"}
-
     def analytic(function: Function, name: str) -> None:
         real, complex_ = getattr(math, name), getattr(cmath, name)
 
-        @overload(function, jit_options=options)
+        @overload(function, jit_options=INSIDE)
         def choose(x):
             return (lambda x: complex_(x)) if isinstance(x, types.Complex) else (lambda x: real(x))
 
     for function, name in _ANALYTIC.items():
-        if function not in (sin, cos, sqrt):
+        if function not in (sin, cos, tan, atan, tanh, sqrt):
             analytic(function, name)
 
     def stepped(function: Function, real: Function, complex_: Function) -> None:
         """Overload a function whose complex argument carries a step: of first order, which is what it is for."""
 
-        @overload(function, jit_options=options)
+        @overload(function, jit_options=INSIDE)
         def choose(x):
             return complex_ if isinstance(x, types.Complex) else real
 
@@ -299,10 +297,22 @@ def _register() -> None:
     stepped(cos, lambda x: math.cos(x), lambda x: complex(math.cos(x.real), -x.imag * math.sin(x.real)))
     stepped(sqrt, lambda x: math.sqrt(x), complex_sqrt)
 
+    def complex_tan(x):
+        t = math.tan(x.real)
+        return complex(t, x.imag * (1.0 + t * t))
+
+    def complex_tanh(x):
+        c = math.cosh(x.real)
+        return complex(math.tanh(x.real), x.imag / (c * c))
+
+    stepped(tan, lambda x: math.tan(x), complex_tan)
+    stepped(tanh, lambda x: math.tanh(x), complex_tanh)
+    stepped(atan, lambda x: math.atan(x), lambda x: complex(math.atan(x.real), x.imag / (1.0 + x.real * x.real)))
+
     def either(function: Function, real: Function, complex_: Function) -> None:
         """Overload a function of two numbers, of which one or both may be complex."""
 
-        @overload(function, jit_options=options)
+        @overload(function, jit_options=INSIDE)
         def choose(a, b):
             return complex_ if isinstance(a, types.Complex) or isinstance(b, types.Complex) else real
 
@@ -310,44 +320,44 @@ def _register() -> None:
         turned, square = x.real * y.imag - y.real * x.imag, x.real * x.real + y.real * y.real
         return complex(math.atan2(y.real, x.real), turned / square if turned != 0.0 else 0.0)
 
-    @overload(atan2, jit_options=options)
+    @overload(atan2, jit_options=INSIDE)
     def choose_atan2(y, x):
         is_complex = isinstance(y, types.Complex) or isinstance(x, types.Complex)
         return complex_atan2 if is_complex else (lambda y, x: math.atan2(y, x))
 
-    @overload(absolute, jit_options=options)
+    @overload(absolute, jit_options=INSIDE)
     def choose_absolute(x):
         return lambda x: -x if x.real < 0 else x
 
-    @overload(sign, jit_options=options)
+    @overload(sign, jit_options=INSIDE)
     def choose_sign(x):
         if isinstance(x, types.Complex):
             return lambda x: complex(sign(x.real), 0.0)
         return lambda x: x * 1.0 if x != x else float((x > 0) - (x < 0))
 
-    @overload(rounded, jit_options=options)
+    @overload(rounded, jit_options=INSIDE)
     def choose_rounded(x):
         if isinstance(x, types.Complex):
             return lambda x: complex(np.floor(x.real + 0.5), 0.0)
         return lambda x: np.floor(x + 0.5)
 
-    @overload(magnitude, jit_options=options)
+    @overload(magnitude, jit_options=INSIDE)
     def choose_magnitude(x):
         return lambda x: x.real if x.real > 0.0 else -x.real
 
-    @overload(larger, jit_options=options)
+    @overload(larger, jit_options=INSIDE)
     def choose_larger(a, b):
         return lambda a, b: a if a > b else b
 
-    @overload(nonzero, jit_options=options)
+    @overload(nonzero, jit_options=INSIDE)
     def choose_nonzero(x):
         return lambda x: not (x.real == 0.0 or x.real != x.real)
 
-    @overload(positive, jit_options=options)
+    @overload(positive, jit_options=INSIDE)
     def choose_positive(x):
         return lambda x: x.real > 0.0
 
-    @overload(choose, jit_options=options)
+    @overload(choose, jit_options=INSIDE)
     def choose_choose(x, a, b):
         return lambda x, a, b: a if x.real > 0 else b
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.jit import formula, on_numba
+from ..compiler.jit import INSIDE, formula, on_numba
 
 GRACE = 1e-9  # part of a table's width by which rounding may go beyond its ends
 BREAKS = 2  # place of the first break
@@ -162,12 +162,10 @@ def _register() -> None:
     """In compiled code x is one number."""
     from numba.extending import overload
 
-    options: Any = {"error_model": "numpy"}
-
-    @overload(piece, jit_options=options)
+    @overload(piece, jit_options=INSIDE)
     def choose(data, at, x):
         return found
 
-    @overload(spline, jit_options=options)
+    @overload(spline, jit_options=INSIDE)
     def choose_spline(data, at, x):
         return lambda data, at, x: on_pieces(data, at, x)

@@ -62,6 +62,11 @@ class Artist:
                 self._process.communicate()
 
 
+def loaded() -> bool:
+    """Whether this process has Matplotlib: then it draws sooner than another would."""
+    return "matplotlib" in sys.modules
+
+
 def _started() -> subprocess.Popen | None:
     """The second process, importing already; None where it would not help, or cannot be had."""
-    return None if cores() < 2 or "matplotlib" in sys.modules else started("flyball.view.artist")
+    return None if cores() < 2 or loaded() else started("flyball.view.artist")

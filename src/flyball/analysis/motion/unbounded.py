@@ -15,6 +15,7 @@ from ..assembly.start import Assembly
 BOUNDLESS = 1e30  # times what it began with, or a unit, that nothing comes to that is meant
 ASTRAY = 1e3  # the same, of a motion that a fixed step may have led astray
 ESCAPING = 1e-4  # part of itself by which a state changes within a step that is as narrow as times can be told apart
+NARROW = 1e-13  # part of the largest time: such steps
 MOST = 400  # coordinates, velocities and states whose eigenvalues are looked for
 SMALL = 1e-7  # differences, as part of the state
 FARTHEST, FINELY = 15.0, 3000  # h |lambda| up to which steps may be stable, and how finely that is looked at
@@ -60,6 +61,8 @@ def escaping(a: Assembly, clock: ex.Clock, named: Named) -> str:
     Where there are no rows, nothing can lock, and coordinates and velocities are looked at, too.
     """
     s, t = a.compiled.structure, float(clock.real[ex.T])
+    if not clock.real[ex.H] < NARROW * max(abs(t), clock.real[ex.LARGEST]):
+        return ""
     y, rate, n = clock.y[ex.NOW], clock.K[0], _length(a)
     first = s.nq + s.nv if s.rows else 0
     with np.errstate(all="ignore"):

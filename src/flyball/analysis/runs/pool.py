@@ -15,7 +15,8 @@ from .remote import elsewhere, packed
 from .runner import runner, timed
 
 LONG, FIRST, PARTS = 512, 8, 64  # most runs in a task; in the first ones; into how many these divide a study
-SECONDS = 0.25  # that a task should take
+SECONDS = 0.5  # that a task should take
+TAIL = 10  # part of that which the last ones take at least: to read and judge runs has a price for each task
 TIMES = 100_000  # states that a task keeps at most
 AHEAD = 4  # tasks that wait, for each worker that there may be
 Task = Callable[[np.ndarray], "Future[Answers]"]
@@ -44,7 +45,7 @@ def computed(
             while at < len(todo) or waiting:
                 while at < len(todo) and len(waiting) < AHEAD * workers:
                     left = len(todo) - at
-                    part = todo[at : at + max(1, min(size, left // (2 * workers)))]
+                    part = todo[at : at + max(1, size // TAIL, min(size, left // (2 * workers)))]
                     waiting[submit(points[part])] = part
                     at += len(part)
                 for part, found in _done(waiting):

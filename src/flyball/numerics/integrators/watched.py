@@ -10,7 +10,7 @@ W is a `Watch`. It returns besides when a step ends on events; whoever calls cha
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from .clock import NEXT, NOW, STATUS, TRIED, WIDE, H, T
+from .clock import NEXT, NOW, STATUS, TRIED, ULP, WIDE, H, T
 from .concave import NOISE
 from .grains import hush, rounding, side_at_start, strayed
 from .loop import ENDED, ENTER, OVERLOOKED, ending, full, narrow, shorten, unclear, write
@@ -37,6 +37,7 @@ from .watching import (
 )
 
 OFTEN = 64.0  # times as long as from event to event that the step after one is at most
+SAME = 4.0  # units in the last place: an output time so little before an event is the event's
 
 
 @formula
@@ -76,7 +77,8 @@ def onward(callbacks, S, W, R, c, out, used):
     if status != 0:  # what lies inside the step cannot be told: take a shorter one
         unclear(c, most)
         return used, False
-    if hit and used > 0 and out[used - 1, 0] == ending(c):  # written when it is known how the motion goes on
+    at_once = ending(c) - SAME * ULP * abs(ending(c))
+    if hit and used > 0 and out[used - 1, 0] >= at_once:  # written when it is known how the motion goes on
         used -= 1
         c.count[NEXT] -= 1
     elif full(c):

@@ -82,8 +82,13 @@ class Legs:
         return bool(self.goal - real[ex.T] <= SLIVER * real[ex.LARGEST])
 
     def aim(self) -> None:
-        """Have the clock run to the end of the stretch."""
-        self.clock.real[ex.T_END] = self.until(self.goal)
+        """Have the clock run to the end of the stretch, or to what it stops for before. What rounding leaves to that
+        (an instant of sampling beside an event's) is no step, and is passed.
+        """
+        real = self.clock.real
+        real[ex.T_END] = end = self.until(self.goal)
+        if end < self.goal and 0.0 < end - real[ex.T] <= SLIVER * real[ex.LARGEST]:
+            real[ex.T] = end
 
     @property
     def goal(self) -> float:

@@ -133,7 +133,7 @@ def stages(callbacks, S, K, c, h):
     predict(K, h)
     status, asked = iterate(residual, S, K, c, h)
     if status == 0:
-        K.real[CURVED] = max(K.real[CURVED], h)
+        K.real[CURVED] = max(K.real[CURVED], h / LESS)
     elif K.count[FRESH] == 1 and not curved:
         predict(K, h)
         status, found = iterate_whole((residual, linearise), S, K, c, h)
