@@ -280,6 +280,7 @@ def test_a_first_motion_says_what_it_compiles(monkeypatch: pytest.MonkeyPatch, c
     for name in ("ENGINE", "EVENTS"):
         monkeypatch.setattr(motion, name, getattr(motion, name)._replace(code=(Cold(),)))
     monkeypatch.setattr(notice, "_said", set())
+    monkeypatch.setattr(notice, "_there", set())
     with pytest.warns(fb.PerformanceNotice, match=r"^compiling for this machine, once: the equations of motion, about"):
         m.simulate(0.1, outputs=2)
     m.add(fb.Event("half", "t - 0.05"))

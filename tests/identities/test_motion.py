@@ -8,7 +8,7 @@ import pytest
 import flyball as fb
 from flyball.analysis import simulate
 from flyball.analysis.assemble import assemble
-from flyball.analysis.compiled import compiled
+from flyball.analysis.compiled import Compiled, compiled
 from flyball.equations import motion, projection
 from flyball.equations.engine import MOTION, motion_kernel
 from flyball.numerics.integrators import clock as explicit
@@ -183,8 +183,8 @@ def test_chunks_change_nothing(monkeypatch, make):
     assert all(a <= b for a, b in pairwise(calls))
     assert calls[-1] == 1.0
     assert equal(whole, stepwise)
-    original = simulate.motion_kernel
-    monkeypatch.setattr(simulate, "motion_kernel", lambda S, W, R, c, out, task: original(S, W, R, c, out[:3], task))
+    original = Compiled.bound
+    monkeypatch.setattr(Compiled, "bound", lambda self, R, clock, out: original(self, R, clock, out[:3]))
     narrow = make().simulate(1.0, outputs=101)
     assert equal(whole, narrow)
     assert (narrow.health.violation, narrow.health.steps) == (whole.health.violation, whole.health.steps)

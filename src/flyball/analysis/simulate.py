@@ -322,7 +322,7 @@ def run_clock(
     rows = []
     first = clock.real[ex.T]
     span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
-    bound, of = None, c.scratch
+    bound, on = None, (c.system, c.scratch)
     forget(c.array("stack"))
     engine.begin(clock)
     quota = engine.limited(clock, float(clock.count[ex.QUOTA]))
@@ -333,8 +333,8 @@ def run_clock(
             begin, clock.count[ex.QUOTA] = time.perf_counter(), part.most(quota)
             before = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
             with interrupts_kept(s.functions):
-                if bound is None or of is not c.scratch:
-                    bound, of = c.bound(method, clock, buffer), c.scratch
+                if bound is None or c.system is not on[0] or c.scratch is not on[1]:  # made code came, or went
+                    bound, on = c.bound(method, clock, buffer), (c.system, c.scratch)
                 used = bound(task)
                 rows.append(buffer[:used].copy())
             reached = max(reached, (clock.real[ex.T] - first) / span)

@@ -1,8 +1,9 @@
-"""Formulas of a kernel call each other with tuples whole, and look at how a call ended only where it can have failed.
+"""Formulas of a kernel hand over what the callee uses, and look at how a call ended only where it can have failed.
 
 Numba takes every tuple apart into numbers at a call, and the callee puts it together again: a record of a frame and its
 motion is 24 numbers. That was half of all code before optimisation; the optimiser takes it out where a callee is put
-in its caller's place, which is nearly everywhere. What is called so is known by its name, so that kernels, callbacks
+in its caller's place, which is nearly everywhere. So a formula is translated with its tuples whole, and then told which
+of their members it uses; callers hand these over (`parted`), as single numbers. What is called so is known by its name, so that kernels, callbacks
 and what Numba itself compiles are called as ever.
 """
 

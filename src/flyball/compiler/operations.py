@@ -1,6 +1,6 @@
 """Operations of formulas in as few instructions as they take.
 
-Formulas raise nothing and mostly count by ones, and members of a tuple whose number is only known while running are
+Formulas divide as C does and mostly count by ones, and members of a tuple whose number is only known while running are
 there. So a loop over a range needs no division, a quotient no look at what it divides by, a member no ladder of
 branches; the numbers are those of Numba's own code.
 """
@@ -208,7 +208,7 @@ def compared(original: Any) -> Any:
 
     def icmp_signed(self: Any, cmpop: str, lhs: Any, rhs: Any, name: str = "") -> Any:
         a, b = _number(lhs), _number(rhs)
-        if a is None or b is None:
+        if a is None or b is None or max(abs(a), abs(b)) >= 2 ** (lhs.type.width - 1):  # of which some are negative
             return original(self, cmpop, lhs, rhs, name)
         return IntType(1)(int(COMPARED[cmpop](a, b)))
 

@@ -23,7 +23,9 @@ def optimise_once(top: str) -> Iterator[None]:
     if not ours():
         yield
         return
-    with linked_as_a_whole(top), quickly(), leanly():
+    from numba.core.compiler_lock import global_compiler_lock
+
+    with global_compiler_lock, linked_as_a_whole(top), quickly(), leanly():  # nobody else's code is compiled so
         yield
 
 
@@ -51,6 +53,7 @@ def ours() -> bool:
 def _probe() -> float:
     """7, by a kernel of its own that calls functions of its own, linked our way: one in a loop, one that fails."""
     from numba import njit
+    from numba.core.compiler_lock import global_compiler_lock
     from numba.extending import register_jitable
 
     @register_jitable
@@ -69,7 +72,7 @@ def _probe() -> float:
             total = more(total + a * i, (i, 1.0)) - 1j
         return root(total.real + 1.0) + (total + 1j).imag  # 5 - 3
 
-    with linked_as_a_whole(probe_kernel.__qualname__), quickly(), leanly():
+    with global_compiler_lock, linked_as_a_whole(probe_kernel.__qualname__), quickly(), leanly():
         kernel = njit(probe_kernel)
         found = kernel(2.0, 5)  # 2 (1 + 2 + 3 + 4) + 4 - 4 i
         try:

@@ -58,7 +58,7 @@ def one_after_another(asked, task, then, made, cells, new, at, x, ends, told, ou
         good = found == ends[0] and cells[ends[1]] == ends[2]
         if good and then[0] != 0:
             cells[then[6]] = 0
-            ask(then, then[7])
+            good = ask(then, then[7]) == 0
         out[k, 0] = found
         for i in range(told.shape[0]):
             out[k, 1 + i] = cells[told[i]]

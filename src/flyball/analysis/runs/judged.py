@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...errors import FlyballError
 from ...results.doubts import OPEN, suspected
 from ...results.ledger import whole
 from ...results.result import Result
@@ -94,18 +95,24 @@ class Judge:
         most = max(1, AT_ONCE // ran.rows.shape[1])
         for some in (g[k : k + most] for g in groups.values() for k in range(0, len(g), most)):
             for part, seen in self._seen(ran, some):
+                if seen is None:
+                    found[part] = True
+                    continue
                 self._write(seen.curves, part, out)
                 found[part] = seen.suspected
         return found
 
-    def _seen(self, ran: Ran, some: list[int]) -> Iterator[tuple[list[int], Seen]]:
-        """Runs of a group at once; or if these are to be looked at one by one, each by itself."""
+    def _seen(self, ran: Ran, some: list[int]) -> Iterator[tuple[list[int], Seen | None]]:
+        """Runs of a group at once; or if these are to be looked at one by one, each by itself: none if that fails."""
         group = ran.places[some[0]][0]
         if group is not None and (seen := self._at_once(group, ran.of(some))) is not None:
             yield some, seen
             return
         for k in some:
-            yield [k], self._one(ran.of([k]))
+            try:
+                yield [k], self._one(ran.of([k]))
+            except FlyballError:
+                yield [k], None
 
     def _at_once(self, group: Group, ran: Ran) -> Seen | None:
         """Those of a group; none if they are to be looked at one by one. The first of a group is compared."""

@@ -1,8 +1,8 @@
 """Many runs that share all but the numbers of forces or masses, to the last bit what each is by itself.
 
 A run of a small mechanism takes less time in compiled code than to be made ready. Where only forces and laws see what
-is varied, structure, coordinates, start and clock are those of the first run, and a run is: numbers into two tables,
-scratch and clock as new, one call. Whatever is unusual is left to `compute.alone`.
+is varied, structure, coordinates, start and clock are those of the first run; of many such runs in one call see `desk`,
+of what is read of them and how they are judged `judged`. Whatever is unusual is left to `compute.alone`.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def _watched(model: Model) -> bool:
 
 
 class Lean:
-    """Runs that share all but the numbers of forces; each thread has a desk of its own."""
+    """Runs that share all but numbers; each thread has a desk of its own."""
 
     def __init__(self, of: Shared) -> None:
         self.of = of

@@ -159,11 +159,12 @@ class Track:
         cell = self.cells(self.arrays["option"])[LATER]
         self._then = np.array([*self._complete.asked, cell, COMPLETE], np.int64)
 
-    def complete(self) -> None:
-        """Do so for the run in memory."""
-        if self._then[0]:
-            self.arrays["option"][LATER] = 0.0
-            self._complete(COMPLETE)
+    def complete(self) -> bool:
+        """Do so for the run in memory; whether there are such."""
+        if not self._then[0]:
+            return True
+        self.arrays["option"][LATER] = 0.0
+        return self._complete(COMPLETE) == 0
 
     def read(self, cells: np.ndarray) -> np.ndarray:
         """What stands in some cells."""

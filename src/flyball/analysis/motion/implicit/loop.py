@@ -132,7 +132,6 @@ class Implicit:
         real[ds.NEWTON] = max(10.0 * EPS / own, near)
         real[ds.ROUGH] = max(0.1, (SMALL if step == 0.0 else LARGE) / own)
         real[ds.SOFT] = SOFTER if len(x.pressing) else SOFT
-        real[ds.CURVED] = np.inf
         real[ds.SERVES] = CHEAP if x.groups <= FEW else DEAR
         real[ds.STAYS] = 2.0 if x.dear else 1.2  # Hairer and Wanner (1996), IV.8, of large systems and of others
         count[ds.LEAST], count[ds.INDEX_3] = 2 if turns else 1, int(x.index_3)

@@ -39,13 +39,12 @@ from ..clock import (
 )
 from ..loop import BEGIN, ENDED, ENTER, OVERLOOKED, REFUSE, TRY, WITHIN, ending
 from ..refusal import afresh
-from .desk import ASKED, CURVED, FRESH, LAST_ERROR, RATE, START, THETA, WIDTH
+from .desk import ASKED, FRESH, LAST_ERROR, RATE, START, THETA, WIDTH
 from .desk import BEFORE as FOLLOWS
 from .step import defect
 
 SURE = 1e-3  # a rate of the iteration below which the Jacobian serves on
 WIDEST = 8.0  # what the width changes by at most
-EVER = 1e300  # wider than any step
 FIRST = 1e-4  # part of the time span that is tried first
 MOVED = 1e-5  # part of size and speed by which a state that is off its constraints has not moved by itself
 
@@ -76,7 +75,6 @@ def begin(arrive, inspect, S, K, c):
         K.count[FRESH] = 0
         K.real[WIDTH] = 0.0
         K.real[RATE], K.real[THETA] = 1.0, SURE
-        K.real[CURVED] = EVER
         c.real[EXCESS] = 1.0
         c.real[WIDE] = 0.0  # steps of before tell nothing of what is narrow now
     c.real[BEFORE] = c.real[T]

@@ -25,8 +25,8 @@ ITERATIONS, JACOBIANS, FACTORS, FRESH, BEFORE, REFINE, LEAST, WHOLE, INDEX_3, SH
 # width that is factored for; width and error of the step before; what the last step asks for: iterations it took, or
 # the factor of its width; regularisation; size of corrections that are taken for rounding where they do not fall any
 # more; rate of the iteration up to which a Jacobian serves on; what a step could be wider by and is not, since its
-# factors serve on; width from which on one Jacobian is taken not to serve all stages
-RTOL, ATOL, NEWTON, THETA, RATE, WIDTH, LAST_H, LAST_ERROR, ASKED, SOFT, ROUGH, SERVES, STAYS, CURVED, REALS = range(15)
+# factors serve on
+RTOL, ATOL, NEWTON, THETA, RATE, WIDTH, LAST_H, LAST_ERROR, ASKED, SOFT, ROUGH, SERVES, STAYS, REALS = range(14)
 START = 3  # row of the state at which a step begins, and of the error estimate
 
 

@@ -35,22 +35,16 @@ def fill(K, A, scale):
 @formula
 def factor(K, h):
     """Factor both matrices for steps of width h. Returns 0, or not."""
-    status = factor_real(K, h)
-    if status == 0:
-        fill(K, K.pair_A, complex(ALPHA / h, BETA / h))
-        status = lu_factor(K.P, K.pair_A, K.pair_L, K.pair_U, K.pair_D, K.pair_Y)
-    if status == 0:
-        K.real[WIDTH] = h
-    return status
-
-
-@formula
-def factor_real(K, h):
-    """Factor the real matrix alone, by which errors are estimated. Returns 0, or not."""
     fill(K, K.real_A, GAMMA / h)
+    fill(K, K.pair_A, complex(ALPHA / h, BETA / h))
     K.count[FACTORS] += 1
-    K.real[WIDTH] = 0.0
-    return lu_factor(K.P, K.real_A, K.real_L, K.real_U, K.real_D, K.real_Y)
+    K.real[WIDTH] = h
+    status = lu_factor(K.P, K.real_A, K.real_L, K.real_U, K.real_D, K.real_Y)
+    if status == 0:
+        status = lu_factor(K.P, K.pair_A, K.pair_L, K.pair_U, K.pair_D, K.pair_Y)
+    if status != 0:
+        K.real[WIDTH] = 0.0
+    return status
 
 
 @formula

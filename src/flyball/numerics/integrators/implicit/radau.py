@@ -40,7 +40,6 @@ from .asked import WIDEST
 from .desk import (
     ASKED,
     BEFORE,
-    CURVED,
     FRESH,
     JACOBIANS,
     LAST_ERROR,
@@ -54,7 +53,7 @@ from .desk import (
     THETA,
     WIDTH,
 )
-from .newton import factor, factor_real
+from .newton import factor
 from .step import MOST, begin, estimate, iterate, predict
 from .whole import iterate_whole
 
@@ -65,7 +64,6 @@ FALLS, NARROWER = 0.5, 0.1  # what an error falls by at least in a step that is 
 SLIGHT = 10.0  # an error from rounding that is accepted where no step of another width is found
 ROUGH = 1e-5  # a relative error of a step above which rounding is no excuse
 ELSEWHERE = 1.24  # what half a step taken back is taken wider by: two of them end beyond where it did
-LESS, AGAIN = 0.7, 1.05  # of the width at which one Jacobian did not serve: where it is not tried, and how long
 REFINED = 1  # times that solves are refined after a step that could not be taken
 SINGULAR = 3
 
@@ -94,9 +92,19 @@ def attempt(callbacks, S, K, c, h):
         K.count[JACOBIANS] += 1
         K.count[FRESH] = 1
         K.real[WIDTH] = 0.0
-    status, asked = stages(callbacks, S, K, c, h)
+    if K.real[WIDTH] != h and factor(K, h) != 0:
+        return SINGULAR, 0.0, 0.5
+    predict(K, h)
+    status, asked = iterate(residual, S, K, c, h)
     if status != 0:
-        return status, 0.0, asked
+        if K.count[FRESH] == 1:
+            predict(K, h)
+            status = iterate_whole((residual, linearise), S, K, c, h)
+            if status == 0:
+                asked = float(MOST)
+                K.real[THETA] = 1.0
+        if status != 0:
+            return status, 0.0, asked
     compose(c.y[NOW], K.d[2], K.v[2], K.z[2], c.y[NEW], S)
     error = 0.0
     if c.real[STEP] == 0.0:
@@ -107,41 +115,6 @@ def attempt(callbacks, S, K, c, h):
             return 0, error, asked
     status, _ = arrive(c.real[T] + h, c.y[NEW], c.K[1], S, K)
     return status, error, asked if status == 0 else 0.5
-
-
-@formula
-def stages(callbacks, S, K, c, h):
-    """Find the stage values. Returns (status, iterations or the factor that a failed one asks for).
-
-    With one Jacobian for all, and if that does not do with that of each. Where it did not of late, by steps hardly
-    wider, the second comes first; now and then the first is tried again. Not where rows are soft: there solves are
-    not refined, and the first finds more digits.
-    """
-    residual, linearise = callbacks[:2]
-    curved = h >= K.real[CURVED] and K.count[FRESH] == 1
-    if curved:
-        if factor_real(K, h) != 0:
-            return SINGULAR, 0.5
-        predict(K, h)
-        status, found = iterate_whole((residual, linearise), S, K, c, h)
-        if status == 0:
-            K.real[THETA] = 1.0
-            K.real[CURVED] *= AGAIN
-            return 0, float(MOST)
-    if K.real[WIDTH] != h and factor(K, h) != 0:
-        return SINGULAR, 0.5
-    predict(K, h)
-    status, asked = iterate(residual, S, K, c, h)
-    if status == 0:
-        K.real[CURVED] = max(K.real[CURVED], h / LESS)
-    elif K.count[FRESH] == 1 and not curved:
-        predict(K, h)
-        status, found = iterate_whole((residual, linearise), S, K, c, h)
-        if status == 0:
-            asked = float(MOST)
-            K.real[THETA] = 1.0
-            K.real[CURVED] = LESS * h if K.count[SHARED] == 0 else K.real[CURVED]
-    return status, asked
 
 
 @formula

@@ -15,7 +15,7 @@ from .desk import NEWTON, ROUGH, SHARED, WHOLE
 from .step import STAGES, account, lead, rates, share
 
 MOST = 12
-REFINED, SETTLED = 6, 1e-6  # times that each solve is refined at most; part of a number whose change is none
+REFINED = 6  # times that each solve is refined
 AGAIN = 10.0  # what corrections may grow by
 PLAIN, SOFT = -1, -2  # what a number is multiplied by, if not by an entry of A^-1 / h
 
@@ -53,12 +53,8 @@ def solve_whole(K, h):
         for i in range(n):
             x[2, i] = x[1, i] - x[2, i]
         lu_solve(K.whole_P, K.whole_L, K.whole_U, K.whole_D, x[2])
-        settled = True
         for i in range(n):
             x[0, i] += x[2, i]
-            settled = settled and abs(x[2, i]) <= SETTLED * abs(x[0, i])
-        if settled:
-            break
 
 
 @formula
@@ -93,7 +89,7 @@ def correct_whole(K, h):
 
 @formula
 def settle_whole(callbacks, S, K, c, h):
-    """Newton's iteration. Returns a status, the size of the first correction, and how many there were."""
+    """Newton's iteration. Returns a status, and the size of the first correction."""
     residual, linearise = callbacks
     last, moved = 1e300, 0.0
     for n in range(MOST):
@@ -101,32 +97,32 @@ def settle_whole(callbacks, S, K, c, h):
         for k in range(STAGES):
             t = c.real[T] + C[k] * h
             if residual(t, k, S, K, c) != 0 or linearise(t, k, S, K, c) != 0:
-                return 1, moved, 0.0
+                return 1, moved
         share(K, h)
         fill_whole(K, h)
         if lu_factor(K.whole_P, K.whole_A, K.whole_L, K.whole_U, K.whole_D, K.whole_Y) != 0:
-            return 1, moved, 0.0
+            return 1, moved
         size = correct_whole(K, h)
         K.count[WHOLE] += 1
         moved = size if n == 0 else moved
         if not size < 1e300 or (n > 1 and size > AGAIN * last):
-            return 1, moved, 0.0
+            return 1, moved
         if size <= K.real[NEWTON] or (n > 0 and size * size / last <= K.real[NEWTON] and size < 0.1 * last):
-            return 0, moved, n + 1.0
+            return 0, moved
         if n > 2 and 0.5 * last < size <= K.real[ROUGH]:
-            return 0, moved, n + 1.0
+            return 0, moved
         last = size
-    return 1, moved, 0.0
+    return 1, moved
 
 
 @formula
 def iterate_whole(callbacks, S, K, c, h):
-    """Find the stage values. Returns a status, and how many iterations it took."""
+    """Find the stage values. Returns a status."""
     more = lead(K, 0)
-    status, moved, found = settle_whole(callbacks, S, K, c, h)
+    status, moved = settle_whole(callbacks, S, K, c, h)
     pass_ = 0
     while status == 0 and more and (pass_ == 0 or moved > K.real[NEWTON]):
         pass_ += 1
         more = lead(K, pass_)
-        status, moved, _ = settle_whole(callbacks, S, K, c, h)
-    return account(callbacks[0], S, K, c, h) if status == 0 else status, found
+        status, moved = settle_whole(callbacks, S, K, c, h)
+    return account(callbacks[0], S, K, c, h) if status == 0 else status
