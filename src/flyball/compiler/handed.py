@@ -1,10 +1,10 @@
 """Formulas of a kernel hand over what the callee uses, and look at how a call ended only where it can have failed.
 
 Numba takes every tuple apart into numbers at a call, and the callee puts it together again: a record of a frame and its
-motion is 24 numbers. That was half of all code before optimisation; the optimiser takes it out where a callee is put
-in its caller's place, which is nearly everywhere. So a formula is translated with its tuples whole, and then told which
-of their members it uses; callers hand these over (`parted`), as single numbers. What is called so is known by its name, so that kernels, callbacks
-and what Numba itself compiles are called as ever.
+motion is 24 numbers. That was half of all code before optimisation; the optimiser takes it out where a callee is put in
+its caller's place, which is nearly everywhere. So a formula is translated with its tuples whole, and then told which of
+their members it uses; callers hand these over (`parted`), as single numbers. What is called so is known by its name, so
+that kernels, callbacks and what Numba itself compiles are called as ever.
 """
 
 from __future__ import annotations

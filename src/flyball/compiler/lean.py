@@ -1,9 +1,9 @@
 """Leaner code from Numba while a kernel of ours compiles: without what it writes out of caution only.
 
-Hardly a formula can fail (`handed` knows which), and none owns memory. So a call of one that cannot needs no look at how
-it ended, a variable no zeros before it is set and no look at what it was; and what was just put together need not be
-taken apart. The optimiser takes all this out again: it was two fifths of all code before
-it, and the code that comes out is the same in kind. Like `link` this leans on internals of Numba and is used where they
+Hardly a formula can fail (`handed` knows which), and none owns memory. So a call of one that cannot needs no look at
+how it ended, a variable no zeros before it is set and no look at what it was; and what was just put together need not
+be taken apart. The optimiser takes all this out again: it was two fifths of all code before it, and the code that comes
+out is the same in kind. Like `link` this leans on internals of Numba and is used where they
 are as expected (`ways.ours`).
 """
 
