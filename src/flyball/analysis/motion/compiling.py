@@ -18,10 +18,10 @@ from .implicit.suited import ALPHA, RADAU, VARIATIONAL
 
 ENGINE = Part("the equations of motion", 18.0, (engine,))
 EVENTS = Part("what finds events and decides what happens there", 13.0, (watched_kernel, explicit_steps, instant))
-DERIVATIVES = Part("the derivatives of the equations", 11.0, (stepped,))
+DERIVATIVES = Part("the derivatives of the equations", 9.5, (stepped,))
 LOOP = Part("the loop of implicit methods", 2.0, (unwatched,))
 STAGES = {
-    RADAU: (DERIVATIVES, LOOP, Part("the implicit method", 5.5, (radau_steps,))),
+    RADAU: (DERIVATIVES, LOOP, Part("the implicit method", 4.5, (radau_steps,))),
     ALPHA: (DERIVATIVES, LOOP, Part("the generalised-alpha method", 4.0, (alpha_steps,))),
     VARIATIONAL: (LOOP, Part("the variational method", 3.5, (variational_steps,))),
 }
