@@ -1,5 +1,6 @@
 """Versions of Numba: our way of linking where it is known to work, the usual one with a notice elsewhere."""
 
+import threading
 import tomllib
 
 import numba
@@ -110,3 +111,15 @@ def test_flags_and_variables_are_what_numba_itself_finds():
     with quickly():
         assert answers() == usual
     assert answers() == usual
+
+
+def test_nobody_elses_code_compiles_our_way():
+    """A thread that compiles something of its own meanwhile waits: its library was never finalised, and it crashed."""
+    found = []
+    other = threading.Thread(target=lambda: found.append(numba.njit(lambda x: x + 1.0)(1.0)))
+    with ways.optimise_once("some_kernel"):
+        other.start()
+        other.join(0.3)
+        assert other.is_alive()
+    other.join(60.0)
+    assert found == [2.0]
