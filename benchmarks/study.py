@@ -62,7 +62,7 @@ class Kernels:
         """Time [s] of the calls for some points, as a clock tells it."""
         desk, total = Desk(self.shared), 0.0
         spread = self.shared.filling.spread
-        spread.points, spread.given = points, 0
+        spread.given = len(spread.points)  # tables are made for those that are asked for next, by each thread
 
         def timed(*arguments: object) -> int:
             nonlocal total
@@ -73,6 +73,7 @@ class Kernels:
 
         call, desk.call = desk.call, timed
         for k in range(0, len(points), BLOCK):
+            self.shared.filling.also(points[k : k + BLOCK])
             for _ in desk.compute(points[k : k + BLOCK], lambda: False):
                 pass
         spent.append(total)
