@@ -59,3 +59,27 @@ def test_a_floor_that_nothing_touches_is_told():
     assert any("'floor' touches nothing" in w for w in m.simulate(0.1).health.warnings)
     m.add(fb.Contact(friction=0.3))
     assert not any("touches nothing" in w for w in m.simulate(0.1).health.warnings)
+
+
+def test_a_body_without_a_shape_beside_contact_is_named():
+    """It falls through the floor, since it has nothing to touch it with. What something carries is no such body."""
+
+    def warned(*parts, contact=None):
+        m = fb.Mechanism("fall", gravity=(0, 0, -9.81))
+        m.add(fb.Ground("floor", shape=fb.Plane()))
+        m.add(fb.Body("ball", shape=fb.Sphere(radius=0.1), density=1000, position=(1, 0, 0.1)))
+        m.add(fb.Body("b", mass=1, inertia=(1, 1, 1), position=(0, 0, 1)), *parts, contact or fb.Contact(friction=0.3))
+        return [w for w in m.simulate(0.01, outputs=2).health.warnings if "no shape" in w]
+
+    (said,) = warned()
+    assert "body 'b' has no shape" in said and "Contact 'contact'" in said
+    other = fb.Body("c", mass=1, inertia=(1, 1, 1), position=(0, 0, 2))
+    (said,) = warned(other, fb.Fixed("weld", "b", "c", at=(0, 0, 1)))
+    assert "bodies 'b', 'c' have no shape" in said
+    assert not warned(fb.Revolute("A", "ground", "b", at=(0, 0, 2), axis=(0, 1, 0)))
+    assert not warned(other, fb.Fixed("weld", "b", "c", at=(0, 0, 1)), fb.Spherical("S", "c", "ball", at=(1, 0, 0.1)))
+    spring = fb.SpringDamper("k", "ground", "b", at=((0, 0, 2), (0, 0, 1)), stiffness=100, length=1)
+    assert not warned(spring)
+    assert not warned(fb.CoordinateSpring("k", "b.z", stiffness=100, rest=1))
+    assert not warned(fb.Driver("D", "b.z", law="1"))
+    assert not warned(contact=fb.Contact(between=["ball"], others=["ground"], friction=0.3))

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -249,3 +253,55 @@ def test_many_contacts_are_thinned_out_to_those_that_differ():
 def test_what_is_no_field_is_refused(heights, d, told):
     with pytest.raises(ModelError, match=told):
         field(heights, *d)
+
+
+LENS = '''"""Two caps of a sphere, base to base: what is within the radius of both of two centres on the z axis."""
+
+from ....compiler.jit import formula
+from ....math.scalar import sqrt
+from ...tables import PAR
+
+KIND = 11
+
+
+@formula
+def support(G, i, d):
+    """Parameters: radius of the spheres, distance of either centre from the middle plane."""
+    r, c = G.shape_x[i, PAR], G.shape_x[i, PAR + 1]
+    s = sqrt(d[0] * d[0] + d[1] * d[1])
+    n = sqrt(s * s + d[2] * d[2])
+    z = -c if d[2] > 0.0 else c
+    if r * abs(d[2]) > abs(z) * n:
+        return (r * d[0] / n, r * d[1] / n, z + r * d[2] / n)
+    rim = sqrt(r * r - c * c) / s
+    return (rim * d[0], rim * d[1], 0.0)
+'''
+
+
+def test_a_convex_shape_that_is_added_rests_on_a_height_field(tmp_path):
+    """One file, as docs/architecture.md says; run without compiling. A plane of the same height finds the same gap."""
+    (tmp_path / "lens.py").write_text(LENS, encoding="utf-8")
+    script = f"""
+import json, numpy as np
+import flyball.contact.narrow.shapes as shapes
+shapes.__path__.append({str(tmp_path)!r})
+from flyball.contact.kinds import FIELD, PLANE
+from flyball.contact.narrow.collide import collide
+from flyball.contact.narrow.room import ROOM
+from flyball.contact.solids.field import field
+from flyball.contact.tables import Movers
+from tests.contact.scenes import geometry
+rows, par = field(np.zeros((5, 5)), 1.0, 1.0)
+out = []
+for ground, at in (((PLANE, []), (0, 0, 0)), ((FIELD, par, rows), (-2.2, -2.3, 0))):
+    pose = np.array([[*at, *np.eye(3).ravel()], [0, 0, 0.29, *np.eye(3).ravel()]])
+    G, room = geometry(ground, (11, [1.0, 0.7])), np.full((ROOM, 8), np.nan)
+    count = collide(G, Movers(pose, np.zeros((2, 6))), 0, 1, 0.1, room)
+    out.append(room[:count, :7].tolist())
+print(json.dumps(out))
+"""
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    on_plane, on_field = json.loads(ended.stdout)
+    want = [[0, 0, -0.005, 0, 0, 1, -0.01]]
+    np.testing.assert_allclose(on_plane, want, atol=1e-9)
+    np.testing.assert_allclose(on_field, want, atol=1e-9)

@@ -69,6 +69,44 @@ def test_friction_with_a_grain_turns_what_slides():
     assert got == pytest.approx(want, rel=5e-3)
 
 
+SKIS = {
+    "box": fb.Box(edges=(0.2, 0.2, 0.2)),
+    "sphere": fb.Sphere(radius=0.1),
+    "cylinder": fb.Cylinder(radius=0.1, length=0.2),
+    "capsule": fb.Capsule(radius=0.1, length=1e-6),
+}
+
+
+@pytest.mark.parametrize("sled", ["ground", "before", "behind"])
+@pytest.mark.parametrize("kind", SKIS)
+def test_the_grain_of_a_moving_body(kind, sled):
+    """mu = sqrt(0.01 0.5) along the grain, sqrt(0.5 0.5) across it, whichever body was added first; both may move."""
+    for along, mu in ((True, np.sqrt(0.005)), (False, 0.5)):
+        m = fb.Mechanism("ski", gravity=(0, 0, -G))
+        m.add(fb.Material("base", friction=(0.01, 0.5), grain=(0, 1, 0)), fb.Contact(friction=0.5))
+        velocity = (0, 1, 0) if along else (1, 0, 0)
+        ski = fb.Body("ski", mass=1, inertia=(1e6,) * 3, shape=SKIS[kind], position=(0, 0, 0.1), velocity=velocity,
+                      material="base")  # fmt: skip
+        snow = fb.Body("snow", mass=2, inertia=(1, 1, 1), shape=fb.Box(edges=(9, 9, 1)), position=(0, 0, -0.5))
+        m.add(*{"ground": (fb.Ground("snow", shape=fb.Plane()), ski), "before": (ski, snow), "behind": (snow, ski)}[sled])
+        if sled != "ground":
+            m.add(fb.Planar("ice", "ground", "snow", at=(0, 0, -1), axis=(0, 0, 1)))
+        run = m.simulate(0.1, outputs=2)
+        assert 1 - run["ski"].velocity[-1] @ velocity == pytest.approx(mu * G * 0.1, rel=1e-4)
+        if sled != "ground":
+            assert run["snow"].velocity[-1] @ velocity == pytest.approx(0.5 * mu * G * 0.1, rel=1e-4)
+
+
+def test_a_grain_square_on_the_surface():
+    """Then the second number holds in every direction."""
+    for velocity in ((1, 0, 0), (0, 1, 0), (0.6, 0.8, 0)):
+        m = fb.Mechanism("stubs", gravity=(0, 0, -G))
+        m.add(fb.Material("stubs", friction=(0.1, 0.4), grain=(0, 0, 1)), fb.Contact())
+        m.add(fb.Ground("floor", shape=fb.Plane(), material="stubs"))
+        m.add(fb.Body("b", mass=1, shape=BOX, position=(0, 0, 0.05), velocity=velocity))
+        assert 1 - np.linalg.norm(m.simulate(0.1, outputs=2)["b"].velocity[-1]) == pytest.approx(0.04 * G, rel=1e-4)
+
+
 @pytest.mark.parametrize("planar", [False, True])
 def test_a_belt_brings_a_block_to_speed(planar):
     """After v / (mu g), exactly; the belt gives twice what the block gets."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -12,8 +13,9 @@ from .bulk import Bodies
 from .contact import Contact
 from .element import Element, field_with
 from .ground import Ground
+from .joint import Joint
 from .material import Material, MaterialPair
-from .words import listing, suggest
+from .words import listing, shortened, suggest
 
 if TYPE_CHECKING:
     from .model import Model
@@ -39,14 +41,53 @@ def smooth_only(model: Model) -> list[Element]:
 
 
 def nothing_touches(model: Model) -> tuple[str, ...]:
-    """What to say where shapes stand on ground, or bodies lie in sets, and no contact lets anything touch."""
+    """What to say of shapes that nothing can touch, for want of a contact, and of bodies that can touch nothing."""
     there: list[Owner] = [*model.ground, *model.bulk]
     if model.contacts or not any(s.touches for e in there for s in e.shapes()):
-        return ()
+        return _shapeless(model)
     return (
         f"{there[0].title} touches nothing: {model.name!r} has no Contact; add Contact(friction=...), or give its "
         f"shapes looks=True",
     )
+
+
+def _shapeless(model: Model) -> tuple[str, ...]:
+    """Warns of bodies without a shape where a contact holds for everything: they fall through whatever is there.
+
+    No warning where a chain of joints, drivers or forces with two ends connects a body to ground or to a shape: these
+    carry it. A shape with ``looks=True`` says that a body is not to touch.
+    """
+    contact = next((c for c in model.contacts if c.between is None), None)
+    bare = [b.name for b in model.bodies if not b.shapes()] if contact else []
+    if not bare:
+        return ()
+    near: defaultdict[str, set[str]] = defaultdict(set)
+    for connected in _connections(model):
+        for name in connected:
+            near[name] |= connected
+    carried, ahead = set(), {GROUND} | {b.name for b in model.bodies} - set(bare)
+    while ahead:
+        carried |= ahead
+        ahead = set().union(*(near[name] for name in ahead)) - carried
+    lost = [repr(name) for name in bare if name not in carried]
+    if not lost:
+        return ()
+    who = f"bodies {shortened(lost)} have no shape" if len(lost) > 1 else f"body {lost[0]} has no shape"
+    return (
+        f"{who} and no connection to ground or to a body with one: {contact.title} does not stop them, they pass "  # type: ignore[union-attr]
+        f"through everything; give a shape (with looks=True if it is not to touch anything)",
+    )
+
+
+def _connections(model: Model) -> Iterator[set[str]]:
+    """Bodies, and ground, that a joint, a driver or a force with two ends connects."""
+    for e in (*model.joints, *model.forces, *model.limits):
+        yield {model.carrier(name, e) for name in e.ends().values()} if hasattr(e, "ends") else set()
+    along = ((e, text) for e in (*model.forces, *model.limits) for text in getattr(e, "along", tuple)())
+    for e, text in (*along, *((d, d.coordinate) for d in model.drivers)):
+        owner, _ = model.coordinate(text, e)
+        if not isinstance(owner, Joint):
+            yield {GROUND, getattr(owner, "body", owner.name)}
 
 
 def owners(model: Model) -> list[Owner]:

@@ -44,7 +44,8 @@ def tangents(G, M, C, P, L, c):
     i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
     a, b = G.shape_i[i, MOVER], G.shape_i[j, MOVER]
     law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
-    cross_frame(P.frame, c, direction(G, M, L, i, a, load3(P.frame, c, 0)), law[ACROSS])
+    tangent, square = direction(M, L, (i, a), (j, b), load3(P.frame, c, 0))
+    cross_frame(P.frame, c, tangent, law[ACROSS] if square else 1.0, law[ACROSS])
     P.bias[c, 1] = P.bias[c, 2] = 0.0
     if L.belt.shape[0] > 0:
         add_belt(M, L, P, c, i, a, -1.0)
@@ -65,15 +66,19 @@ def onward(G, M, C, D, N, P, L, pace, now):
 
 
 @formula
-def direction(G, M, L, i, a, n):
-    """A tangent: along the grain of shape i where anisotropic friction has one, any other where it has none."""
+def direction(M, L, first, second, n):
+    """A tangent along the grain of either shape, and whether there is none in the tangent plane: then it is any other.
+
+    ``first`` and ``second``: shape and mover. Of two surfaces with a grain, friction does not depend on the direction.
+    """
     if L.grain.shape[0] > 0:
-        g = along_world(M, a, load3(L.grain, i, 0))
-        g = sub(g, scale(dot(g, n), n))
-        s = dot(g, g)
-        if s > 1e-12:
-            return scale(1.0 / sqrt(s), g)
-    return axes_across(n)[0]
+        for shape, mover in (first, second):
+            g = along_world(M, mover, load3(L.grain, shape, 0))
+            g = sub(g, scale(dot(g, n), n))
+            s = dot(g, g)
+            if s > 1e-12:
+                return scale(1.0 / sqrt(s), g), False
+    return axes_across(n)[0], True
 
 
 @formula
@@ -83,10 +88,10 @@ def along_world(M, a, g):
 
 
 @formula
-def cross_frame(frame, c, t, ratio):
-    """Rows t1 = t and t2 = ratio n x t: in a circular cone, forces across are ``ratio`` times as large."""
-    put3(frame, c, 3, t)
-    put3(frame, c, 6, scale(ratio, cross(load3(frame, c, 0), t)))
+def cross_frame(frame, c, t, along, across):
+    """Rows t1 = along t and t2 = across n x t: in a circular cone, forces are so many times as large in either."""
+    put3(frame, c, 3, scale(along, t))
+    put3(frame, c, 6, scale(across, cross(load3(frame, c, 0), t)))
 
 
 @formula

@@ -123,11 +123,12 @@ def _carrier(scene: Touching, shape: int) -> str:
 
 def refuse_surfaces(scene: Touching) -> None:
     """Refuse what statics does not know."""
-    pair = np.nan_to_num(scene.surfaces.pair)
+    pair = scene.surfaces.pair
+    pair = pair[~np.isnan(pair[..., su.STATIC])]
     what = (
         ("a surface that moves (surface_velocity): what it drags along does not rest", bool(scene.surfaces.belt.any())),
         ("rolling or spinning friction", bool((pair[..., [su.ROLLING, su.SPINNING]] > 0.0).any())),
-        ("friction with a grain", bool((pair[..., su.ACROSS] > 1.0).any())),
+        ("friction with a grain", bool((pair[..., su.ACROSS] != 1.0).any())),
     )
     for text, there in what:
         if there:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from ....compiler.jit import formula
 from ....math.scalar import sqrt
 from ....math.vec import add, dot, load3, mm, mtv, mv, neg, put3, scale, sub, transpose
-from ...kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, HEMISPHERE, HULL, SPHERE
+from ...kinds import FIELD, POLYGON
 from ...tables import KIND
 from ..any_shape import face, radius, support
 from ..manifold import NEAREST_NAME, manifold
@@ -23,8 +23,10 @@ from ..patch import ALIKE, BENT, KEPT, gather, holds, lay, on_ridge, over, ridge
 from ..room import CORNERS, FACE_2, NEAREST, PIECE
 from ..separation import separation
 from ..shapes.field import grid, height
+from ..shapes.registry import SHAPES
 
-PAIRS = (*((k, FIELD) for k in (SPHERE, BOX, CAPSULE, CYLINDER, CONE, HULL)), (FIELD, ELLIPSOID), (FIELD, HEMISPHERE))
+SOLIDS = tuple(s.kind for s in SHAPES if s.kind not in (FIELD, POLYGON))  # every convex kind in space
+PAIRS = tuple((min(k, FIELD), max(k, FIELD)) for k in SOLIDS)
 ONE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 PLACES = 4.0 * CORNERS
 LATER = 2.0**45
