@@ -13,14 +13,17 @@ from typing import Any
 import numpy as np
 
 from ..equations.engine import MOTION
+from ..equations.rows import BY_TIME
 from ..equations.tree import column, rates, retract
+from ..equations.velocities import turned_angles
 from ..errors import AnalysisError, ModelError
+from ..laws.evaluation import evaluate_jet
 from ..laws.functions import fault
 from ..model.body import GROUND, Frame
 from ..results.result import Result
 from ..tables.names import velocity_names
 from ..tables.points import points
-from ..tables.system import EFFORT, F_APPLIED, G_VALUE, LAM, NU, NV, PARENT, V0, X_SOLVED
+from ..tables.system import BODY_LAW, EFFORT, F_APPLIED, G_VALUE, LAM, NU, NV, OFFSET, PARENT, Q0, V0, X_SOLVED
 from .assembly.start import Assembly
 from .compiled import Compiled, compiled
 from .motion.start import Start
@@ -29,8 +32,10 @@ from .motion.start import Start
 class Prepared:
     """A mechanism in one kind of coordinates, at one set of values of its parameters. It does not change.
 
-    Threads may share it. Answers depend on nothing but the arguments: turned angles that are no coordinates are those
-    within half a turn of the start's, followers of cams are where the profile is nearest.
+    Threads may share it. Answers depend on nothing but the arguments. Whole turns of angles count, as far as q knows
+    them: of tree joints that turn about one axis, and of everything in the plane. In space other angles (all of them in
+    absolute coordinates, where a quaternion is the same after a turn) are those within half a turn of the start's.
+    Followers of cams are where the profile is nearest.
 
     Attributes
     ----------
@@ -240,11 +245,40 @@ class Prepared:
         q, v = self._state(q, v)
         if not (isinstance(t, numbers.Real) and np.isfinite(t)):
             raise ModelError(f"t is a finite number of seconds, not {t!r}")
+        self._count_turns(c, float(t), q)
         if c.has_curves:
             c.at(float(t), q, v)
             c.find_places()
         c.at(float(t), q, v) if task is None else c.at(float(t), q, v, task)
         return c
+
+    def _count_turns(self, c: Compiled, t: float, q: np.ndarray) -> None:
+        """Turned angles as the coordinates have them: whole turns from the start to q count, where q knows them.
+
+        Angles that are coordinates of tree joints are these; in the plane all others follow from how far bodies have
+        turned. In space the pose of a body that hangs freely is the same after a whole turn.
+        """
+        S = c.values.system
+        if not len(S.angle_i):
+            return
+        q = q.copy()
+        for b in np.flatnonzero(S.body_i[:, BODY_LAW] >= 0).tolist():  # a driver says where these are
+            law = evaluate_jet(S.code, S.const, int(S.body_i[b, BODY_LAW]), c.work.stack, t, c.work.sensed, BY_TIME)
+            q[S.body_i[b, Q0]] = law[0] - S.body_x[b, OFFSET]
+        c.follow(c.turned(q))
+        if c.structure.model.planar:
+            before = getattr(self._here, "turned", None) or self._turned(c, 0.0, self.q)
+            self._here.turned, now = before, self._turned(c, t, q)
+            for first, second, state in S.angle_i.tolist():
+                i, j = S.frame_i[[first, second]].tolist()
+                c.z[state] = self._start.compiled.z[state] + (now[j] - before[j]) - (now[i] - before[i])
+
+    @staticmethod
+    def _turned(c: Compiled, t: float, q: np.ndarray) -> dict[int, float]:
+        """How far every body of a planar mechanism has turned, by its row of the body table; -1 is ground."""
+        c.at(t, q, np.zeros(c.structure.nv))
+        angles = turned_angles(c.values, c.work, q)
+        return {-1: 0.0} | {c.structure.place[name]: float(angle) for name, angle in angles.items()}
 
     def _state(self, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
         """Copies as floats, refused if there are more or less than there must be."""
