@@ -20,6 +20,7 @@ from ..errors import AnalysisError, ModelError
 from ..laws.evaluation import evaluate_jet
 from ..laws.functions import fault
 from ..model.body import GROUND, Frame
+from ..results.records import TURN
 from ..results.result import Result
 from ..tables.names import velocity_names
 from ..tables.points import points
@@ -253,32 +254,41 @@ class Prepared:
         return c
 
     def _count_turns(self, c: Compiled, t: float, q: np.ndarray) -> None:
-        """Turned angles as the coordinates have them: whole turns from the start to q count, where q knows them.
+        """Turned angles as the coordinates have them: whole turns from the start to q count, where q knows them."""
+        S = c.values.system
+        if not len(S.angle_i):
+            return
+        way = q - self.q
+        for b in np.flatnonzero(S.body_i[:, BODY_LAW] >= 0).tolist():  # a driver says where these are
+            law = evaluate_jet(S.code, S.const, int(S.body_i[b, BODY_LAW]), c.work.stack, t, c.work.sensed, BY_TIME)
+            way[S.body_i[b, Q0]] = law[0] - S.body_x[b, OFFSET] - self.q[S.body_i[b, Q0]]
+        at = S.angle_i[:, 2]
+        c.z[at] = self._start.compiled.z[at] + self._by_coordinates @ way
+
+    @property
+    def _by_coordinates(self) -> np.ndarray:
+        """How turned angles follow the coordinates, (angles, nq); found when first asked for.
 
         Angles that are coordinates of tree joints are these; in the plane all others follow from how far bodies have
         turned. In space the pose of a body that hangs freely is the same after a whole turn.
         """
-        S = c.values.system
-        if not len(S.angle_i):
-            return
-        q = q.copy()
-        for b in np.flatnonzero(S.body_i[:, BODY_LAW] >= 0).tolist():  # a driver says where these are
-            law = evaluate_jet(S.code, S.const, int(S.body_i[b, BODY_LAW]), c.work.stack, t, c.work.sensed, BY_TIME)
-            q[S.body_i[b, Q0]] = law[0] - S.body_x[b, OFFSET]
-        c.follow(c.turned(q))
-        if c.structure.model.planar:
-            before = getattr(self._here, "turned", None) or self._turned(c, 0.0, self.q)
-            self._here.turned, now = before, self._turned(c, t, q)
-            for first, second, state in S.angle_i.tolist():
-                i, j = S.frame_i[[first, second]].tolist()
-                c.z[state] = self._start.compiled.z[state] + (now[j] - before[j]) - (now[i] - before[i])
+        if "_turning" not in vars(self):
+            c = self._start.compiled.again()
+            before = self._turned(c, self.q)
+            columns = [(self._turned(c, self.q + TURN * e) - before) / TURN for e in np.eye(len(self.q))]
+            vars(self)["_turning"] = np.rint(np.array(columns)).T
+        return vars(self)["_turning"]  # type: ignore[no-any-return]
 
-    @staticmethod
-    def _turned(c: Compiled, t: float, q: np.ndarray) -> dict[int, float]:
-        """How far every body of a planar mechanism has turned, by its row of the body table; -1 is ground."""
-        c.at(t, q, np.zeros(c.structure.nv))
+    def _turned(self, c: Compiled, q: np.ndarray) -> np.ndarray:
+        """Turned angles as far as the coordinates tell them, (angles,); their differences are what counts."""
+        s, S = c.structure, c.values.system
+        if not s.model.planar:
+            known = {s.state_at[name]: angle for name, angle in c.turned(q).items() if name in s.state_at}
+            return np.array([known.get(state, 0.0) for state in S.angle_i[:, 2].tolist()])
+        c.at(0.0, q, np.zeros(s.nv))
         angles = turned_angles(c.values, c.work, q)
-        return {-1: 0.0} | {c.structure.place[name]: float(angle) for name, angle in angles.items()}
+        of = {-1: 0.0} | {s.place[name]: float(angle) for name, angle in angles.items()}
+        return np.array([of[int(S.frame_i[M])] - of[int(S.frame_i[F])] for F, M, _ in S.angle_i.tolist()])
 
     def _state(self, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
         """Copies as floats, refused if there are more or less than there must be."""
