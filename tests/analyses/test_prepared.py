@@ -187,3 +187,62 @@ def test_pickled_and_copied():
     for other in (pickle.loads(pickle.dumps(p)), deepcopy(p)):
         assert np.array_equal(other.acceleration(0.0, p.q, p.v), wanted)
         assert np.array_equal(other.mass_matrix(p.q), p.mass_matrix(p.q))
+
+
+def wound_spring():
+    m = fb.Mechanism("wound", planar=True, gravity=None)
+    m.add(fb.Body("a", mass=1, inertia=2), fb.Body("b", mass=1, inertia=0.5))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(0, 0)))
+    m.add(fb.TorsionalSpringDamper("s", "A", stiffness=2.0), fb.TorsionalSpringDamper("r", "B", stiffness=3.0))
+    return m
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+@pytest.mark.parametrize("first", [0.3, 3.2, 7.0, -40.0])
+@pytest.mark.parametrize("second", [-0.2, 3.2, -9.0])
+def test_whole_turns_count_in_the_plane(layer, first, second):
+    """Springs of 2 and 3 N m/rad about concentric hinges, wound up by any number of turns."""
+    p = wound_spring().prepare(coordinates=layer)
+    q, v = (np.array([first, second]), np.zeros(2)) if layer == "joint" else (p.q.copy(), np.zeros(6))
+    if layer == "absolute":
+        q[[2, 5]] = first, first + second
+    torque = np.array([-2 * first + 3 * second, -3 * second])
+    found = p.acceleration(0.0, q, v)
+    found = np.cumsum(found) if layer == "joint" else found[[2, 5]]
+    np.testing.assert_allclose(found, torque / (2, 0.5), rtol=1e-12)
+
+
+def test_whole_turns_count_where_a_joint_is_told_how_many_it_starts_with():
+    """The start is two turns on, and coordinates of bodies are not."""
+    for layer in LAYERS:
+        m = wound_spring()
+        m.add(fb.Initial("A.angle", value=4 * np.pi))
+        p = m.prepare(coordinates=layer)
+        more = 5.0 * np.ones(len(p.q)) if layer == "joint" else np.array([0, 0, 5.0, 0, 0, 10.0])
+        found = p.acceleration(0.0, p.q + more, np.zeros(len(p.v)))
+        found = np.cumsum(found) if layer == "joint" else found[[2, 5]]
+        torque = np.array([-2 * (4 * np.pi + 5.0) + 15, -15])
+        np.testing.assert_allclose(found, torque / (2, 0.5), rtol=1e-11)
+
+
+def test_whole_turns_count_in_space_where_they_are_coordinates():
+    m = fb.Mechanism("wound", gravity=None)
+    m.add(fb.Body("b", mass=1, inertia=(1, 1, 2)), fb.Revolute("A", "ground", "b", at=(0, 0, 0), axis=(0, 0, 1)))
+    m.add(fb.TorsionalSpringDamper("s", "A", stiffness=3.0))
+    p = m.prepare(coordinates="joint")
+    found = [p.acceleration(0.0, [x], [0.0])[0] for x in (3.0, 3.2, 7.0, -20.0)]
+    np.testing.assert_allclose(found, [-4.5, -4.8, -10.5, 30.0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_whole_turns_of_what_a_driver_prescribes(layer):
+    """The driver turns 2 t, and a spring of 3 N m/rad between it and ground wants 6 t of it."""
+    m = fb.Mechanism("driven", planar=True, gravity=None)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    m.add(fb.Driver("D", "A.angle", "2*t"), fb.TorsionalSpringDamper("s", "A", stiffness=3.0))
+    p = m.prepare(coordinates=layer)
+    for t in (1.0, 2.0, 10.0):
+        q = p.q.copy()
+        q[-1] = 2 * t
+        found = p.efforts(t, q, [2.0]) if layer == "joint" else p.multipliers(t, q, [0, 0, 2.0])
+        assert abs(found).max() == pytest.approx(6 * t)

@@ -184,3 +184,78 @@ def test_what_is_carried_from_the_start_has_not_become_so(kind):
     r = m.simulate(0.3, outputs=3)
     assert [h.name for h in r.events if h.kind == "event"] == ["begun"]
     assert np.abs(r["b.y"]).max() < 1e-12
+
+
+LOCKED = {
+    "revolute": lambda: fb.Revolute("J", "arm", "load", at=(0.3, 0.1, 0), axis=(0, 1, 1)),
+    "prismatic": lambda: fb.Prismatic("J", "arm", "load", at=(0.3, 0.1, 0), axis=(1, 2, 0)),
+    "cylindrical": lambda: fb.Cylindrical("J", "arm", "load", at=(0.3, 0.1, 0), axis=(1, 0, 1)),
+    "universal": lambda: fb.Universal("J", "arm", "load", at=(0.3, 0.1, 0), axes=((1, 0, 0), (0, 1, 0))),
+    "screw": lambda: fb.Screw("J", "arm", "load", at=(0.3, 0.1, 0), axis=(1, 0, 0), lead=0.02),
+    "planar": lambda: fb.Planar("J", "arm", "load", at=(0.3, 0.1, 0), axis=(0, 1, 1)),
+    "turned round": lambda: fb.Revolute("J", "load", "arm", at=(0.3, 0.1, 0), axis=(0, 1, 1)),
+}
+
+
+@pytest.mark.parametrize("named", [False, True])
+@pytest.mark.parametrize("kind", LOCKED)
+def test_a_locked_joint_carries_what_its_load_needs(kind, named):
+    """Newton and Euler: m (a - g), and I alpha + w x I w about the load's centre, through the joint."""
+    m = fb.Mechanism("locked", gravity=(0, 0, -G))
+    m.add(fb.Body("arm", mass=2, inertia=(0.1, 0.2, 0.3), angular_velocity=(0, 0, 0.7)))
+    about = {"velocity": (-0.14, 0.35, 0), "angular_velocity": (0, 0, 0.7)}
+    m.add(fb.Body("load", mass=3, inertia=(0.02, 0.05, 0.04), position=(0.5, 0.2, 0.1), **about))
+    m.add(fb.Revolute("R", "ground", "arm", at=(0, 0, 0), axis=(0, 0, 1)), LOCKED[kind]())
+    m.add(fb.Motor("M", "R", torque="3*t + 1"), fb.Event("lock", "start", do=[fb.Lock("J")]))
+    if named:
+        m.add(fb.Event("over", "J.force + J.torque > 1e6"))
+    r = m.simulate(0.4, outputs=5, **FINE)
+    load, inertia = r["load"], np.diag((0.02, 0.05, 0.04))
+    force, torque = r["J"].reaction(on="load")
+    at = r["arm"].position + np.einsum("nij,j->ni", r["arm"].rotation, (0.3, 0.1, 0.0))
+    for k in range(len(r.t)):
+        R, w = load.rotation[k], load.angular_velocity[k]
+        I = R @ inertia @ R.T
+        need = 3 * (load.acceleration[k] + (0, 0, G))
+        spin = I @ load.angular_acceleration[k] + np.cross(w, I @ w) + np.cross(load.position[k] - at[k], need)
+        np.testing.assert_allclose(force[k], need, rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(torque[k], spin, rtol=1e-7, atol=1e-7)
+
+
+def test_a_locked_hinge_shears():
+    """2 t N m turn 0.1 and 0.3 kg m^2: the lock bears 1.5 t, to 3 N m."""
+    for named in (True, False):
+        m = fb.Mechanism("pin", planar=True, gravity=(0, 0))
+        m.add(fb.Body("rotor", mass=1, inertia=0.1), fb.Body("load", mass=1, inertia=0.3))
+        m.add(fb.Revolute("R", "ground", "rotor", at=(0, 0)), fb.Revolute("H", "rotor", "load", at=(0, 0)))
+        m.add(fb.Motor("M", "R", torque="2*t"), fb.Event("lock", "start", do=[fb.Lock("H")]))
+        if named:
+            m.add(fb.Event("shears", "abs(H.torque) > 3 N*m", do=[fb.Release("H")]))
+        r = m.simulate(4, outputs=[0, 1, 1.5, 3, 4])
+        np.testing.assert_allclose(r["H.torque"], [0, 1.5, 2.25, *((0, 0) if named else (4.5, 6))], atol=1e-9)
+        assert [h.t for h in r.events["shears"]] == pytest.approx([2.0], abs=1e-9) if named else True
+
+
+def test_a_locked_slide_lets_go():
+    """A locked slide bears the weight that swings on it."""
+    m = fb.Mechanism("slide", planar=True, gravity=(0, -G))
+    m.add(fb.Body("b", mass=2, inertia=0.1), fb.Prismatic("P", "ground", "b", at=(0, 0), axis=(0, 1)))
+    m.add(fb.Actuator("pull", "P.displacement", force="-10*t"))
+    m.add(fb.Event("lock", "start", do=[fb.Lock("P")]), fb.Event("off", "P.fy > 30", do=[fb.Release("P")]))
+    r = m.simulate(1.5, outputs=[0.5, 1.0, 1.5])
+    assert r["P"].force[:2, 1] == pytest.approx([2 * G + 5, 2 * G + 10])
+    assert [h.t for h in r.events["off"]] == pytest.approx([(30 - 2 * G) / 10], abs=1e-9)
+
+
+def test_friction_is_pressed_by_what_a_lock_carries():
+    """A collar of 2 kg hangs on its locked displacement and turns: mu m g r slows it."""
+    m = fb.Mechanism("collar", gravity=(0, 0, -G))
+    m.add(fb.Body("b", mass=2, inertia=(0.1, 0.1, 0.2), angular_velocity=(0, 0, 5)))
+    m.add(fb.Cylindrical("C", "ground", "b", at=(0, 0, 0), axis=(0, 0, 1)))
+    m.add(fb.JointFriction("f", "C", static=0.1, radius=0.05, coordinate="angle"))
+    m.add(fb.Event("lock", "start", do=[fb.Lock("C.displacement")]))
+    r = m.simulate(1.0, outputs=3)
+    slower = 0.1 * 2 * G * 0.05 / 0.2
+    assert r["C.angle_rate"] == pytest.approx([5, 5 - slower / 2, 5 - slower], rel=1e-8)
+    assert r["C"].force[:, 2] == pytest.approx(2 * G)
+    assert r["C"].torque[:, 2] == pytest.approx(0.0, abs=1e-9)

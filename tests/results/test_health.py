@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.view.report import report
 from flyball.view.tables import health
 
 G = 9.81
@@ -135,3 +136,18 @@ def test_a_report_says_each_thing_of_a_run_once(coordinates):
     assert "max step" not in said  # there is none
     capped = dict(health(incline(0.4, 0.45, 0.1).simulate(0.1, outputs=2, max_step=0.01)).rows)
     assert capped["max step"] == "0.01"
+
+
+def test_an_energy_balance_that_was_not_measured_says_so():
+    """A motion that ends before its second output time has nothing to be compared."""
+    m = fb.Mechanism("p", planar=True, gravity=(0, -G))
+    m.add(fb.Body("b", mass=1, inertia=1, position=(0.5, 0)), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    m.add(fb.Event("low", "A.angle < -0.5", do=[fb.Stop()]))
+    short = m.simulate(2, outputs=[1.5, 2])
+    assert len(short.t) == 1
+    assert math.isnan(short.health.energy_drift)
+    assert dict(short.health.lines())["energy balance"].startswith("not measured: ")
+    assert "not measured" in report(short)
+    whole = m.simulate(2, outputs=[0, 2])
+    assert 0.0 < whole.health.energy_drift < 1e-6
+    assert dict(whole.health.lines())["energy balance"].endswith(" J largest deviation")

@@ -13,14 +13,18 @@ from typing import Any
 import numpy as np
 
 from ..equations.engine import MOTION
+from ..equations.rows import BY_TIME
 from ..equations.tree import column, rates, retract
+from ..equations.velocities import turned_angles
 from ..errors import AnalysisError, ModelError
+from ..laws.evaluation import evaluate_jet
 from ..laws.functions import fault
 from ..model.body import GROUND, Frame
+from ..results.records import TURN
 from ..results.result import Result
 from ..tables.names import velocity_names
 from ..tables.points import points
-from ..tables.system import EFFORT, F_APPLIED, G_VALUE, LAM, NU, NV, PARENT, V0, X_SOLVED
+from ..tables.system import BODY_LAW, EFFORT, F_APPLIED, G_VALUE, LAM, NU, NV, OFFSET, PARENT, Q0, V0, X_SOLVED
 from .assembly.start import Assembly
 from .compiled import Compiled, compiled
 from .motion.start import Start
@@ -29,8 +33,10 @@ from .motion.start import Start
 class Prepared:
     """A mechanism in one kind of coordinates, at one set of values of its parameters. It does not change.
 
-    Threads may share it. Answers depend on nothing but the arguments: turned angles that are no coordinates are those
-    within half a turn of the start's, followers of cams are where the profile is nearest.
+    Threads may share it. Answers depend on nothing but the arguments. Whole turns of angles count, as far as q knows
+    them: of tree joints that turn about one axis, and of everything in the plane. In space other angles (all of them in
+    absolute coordinates, where a quaternion is the same after a turn) are those within half a turn of the start's.
+    Followers of cams are where the profile is nearest.
 
     Attributes
     ----------
@@ -240,11 +246,49 @@ class Prepared:
         q, v = self._state(q, v)
         if not (isinstance(t, numbers.Real) and np.isfinite(t)):
             raise ModelError(f"t is a finite number of seconds, not {t!r}")
+        self._count_turns(c, float(t), q)
         if c.has_curves:
             c.at(float(t), q, v)
             c.find_places()
         c.at(float(t), q, v) if task is None else c.at(float(t), q, v, task)
         return c
+
+    def _count_turns(self, c: Compiled, t: float, q: np.ndarray) -> None:
+        """Turned angles as the coordinates have them: whole turns from the start to q count, where q knows them."""
+        S = c.values.system
+        if not len(S.angle_i):
+            return
+        way = q - self.q
+        for b in np.flatnonzero(S.body_i[:, BODY_LAW] >= 0).tolist():  # a driver says where these are
+            law = evaluate_jet(S.code, S.const, int(S.body_i[b, BODY_LAW]), c.work.stack, t, c.work.sensed, BY_TIME)
+            way[S.body_i[b, Q0]] = law[0] - S.body_x[b, OFFSET] - self.q[S.body_i[b, Q0]]
+        at = S.angle_i[:, 2]
+        c.z[at] = self._start.compiled.z[at] + self._by_coordinates @ way
+
+    @property
+    def _by_coordinates(self) -> np.ndarray:
+        """How turned angles follow the coordinates, (angles, nq); found when first asked for.
+
+        Angles that are coordinates of tree joints are these; in the plane all others follow from how far bodies have
+        turned. In space the pose of a body that hangs freely is the same after a whole turn.
+        """
+        if "_turning" not in vars(self):
+            c = self._start.compiled.again()
+            before = self._turned(c, self.q)
+            columns = [(self._turned(c, self.q + TURN * e) - before) / TURN for e in np.eye(len(self.q))]
+            vars(self)["_turning"] = np.rint(np.array(columns)).T
+        return vars(self)["_turning"]  # type: ignore[no-any-return]
+
+    def _turned(self, c: Compiled, q: np.ndarray) -> np.ndarray:
+        """Turned angles as far as the coordinates tell them, (angles,); their differences are what counts."""
+        s, S = c.structure, c.values.system
+        if not s.model.planar:
+            known = {s.state_at[name]: angle for name, angle in c.turned(q).items() if name in s.state_at}
+            return np.array([known.get(state, 0.0) for state in S.angle_i[:, 2].tolist()])
+        c.at(0.0, q, np.zeros(s.nv))
+        angles = turned_angles(c.values, c.work, q)
+        of = {-1: 0.0} | {s.place[name]: float(angle) for name, angle in angles.items()}
+        return np.array([of[int(S.frame_i[M])] - of[int(S.frame_i[F])] for F, M, _ in S.angle_i.tolist()])
 
     def _state(self, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
         """Copies as floats, refused if there are more or less than there must be."""

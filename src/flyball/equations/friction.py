@@ -41,7 +41,7 @@ from ..tables.system import (
 from .dispatch import effort
 from .loads import law, wide
 from .records import load
-from .rows import carried, measured
+from .rows import measured, on_second
 from .sliding import slides
 
 SUBSTITUTIONS = 80
@@ -78,8 +78,7 @@ def reaction_loads(S, W):
         torque = (o, o, o)
         for x in range(S.load_i.shape[0]):
             if S.load_i[x, 0] == n:
-                term = S.load_i[x, 1]
-                f, m = carried(S, W, term)
+                f, m = on_second(S, W, S.load_i[x, 1])
                 force, torque = add(force, f), add(torque, m)
         W.sensed[RETURNED, n] = pressed(wide(S.force_x, k), load(W.FK, S.force_i[k, FORCE_M]), force, torque)
 

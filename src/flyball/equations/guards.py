@@ -216,7 +216,7 @@ def named_before(S, at, i):
 
 
 @formula
-def astray(S, W, t, span, out):
+def astray(S, W, t, out):
     """How far below zero guards of laws' corners may be on the side that was taken, into ``out`` (ng,).
 
     Less is rounding of velocities that something holds. Farther off the side is wrong, whatever it was taken by.
@@ -226,11 +226,11 @@ def astray(S, W, t, span, out):
         if S.guard_i[g, GUARD_KIND] == G_CORNER:
             fastest = quickest(S, W) if fastest < 0.0 else fastest
             s = S.guard_i[g, GUARD_OF]
-            out[g] = OTHER * (terms(S, W, t, s, span, fastest) if W.switch[MODE, s] == OFF else 1.0)
+            out[g] = OTHER * (terms(S, W, t, s, fastest) if W.switch[MODE, s] == OFF else 1.0)
 
 
 @formula
-def terms(S, W, t, s, span, fastest):
+def terms(S, W, t, s, fastest):
     """Size of what the function u of a corner is the sum of: no input less than what it is told from."""
     nm, at = measured(S), S.switch_i[s, SWITCH_LAW]
     size = magnitude(t * evaluate_jet(S.code, S.const, at, W.stack, t, W.sensed, BY_TIME)[1])
@@ -241,7 +241,7 @@ def terms(S, W, t, s, span, fastest):
             if m < nm:
                 x = max(x, S.glob[UNIT + m])
             elif m < 2 * nm:
-                x = max(x, fastest, pace(S, m - nm), S.glob[UNIT + m - nm] / span)
+                x = max(x, fastest, pace(S, m - nm))
             size += x * magnitude(evaluate_jet(S.code, S.const, at, W.stack, t, W.sensed, m)[1])
     return size
 

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from ..compiler.jit import formula
 from ..math.scalar import sqrt
-from ..math.vec import add, cross, load3, neg, sub
-from ..tables.system import EFFORT, LAM, TERM_F, TERM_M, VALUE
+from ..tables.system import EFFORT, LAM, VALUE
 from .control import column_of
 from .friction import loads_end
 from .loads import effort_of
-from .rows import carried
+from .rows import on_second
 
 FORCE, TORQUE = 6, 7  # columns of their sizes, after those of their components
 
@@ -38,12 +37,7 @@ def readings(S, W, t):
 @formula
 def through(S, W, at, what):
     """Add what term ``what`` of a joint's rows does to the joint's wrench, on its second body, about M's origin."""
-    nt = S.term_i.shape[0]
-    k = what if what < nt else what - nt
-    force, torque = carried(S, W, k)
-    if what >= nt:  # told of the other body, at the other frame: the reverse of both, about this one
-        arm = sub(load3(W.FK, S.term_i[k, TERM_M], 0), load3(W.FK, S.term_i[k, TERM_F], 0))
-        force, torque = neg(force), neg(add(torque, cross(arm, force)))
+    force, torque = on_second(S, W, what)
     for i in range(3):
         W.sensed[VALUE, at + i] += force[i]
         W.sensed[VALUE, at + 3 + i] += torque[i]

@@ -12,7 +12,7 @@ from __future__ import annotations
 from ..compiler.jit import formula
 from ..laws.evaluation import evaluate_jet
 from ..math.scalar import atan2, cos, sin
-from ..math.vec import load3, neg, put3, scale
+from ..math.vec import add, cross, load3, neg, put3, scale, sub
 from ..tables.system import (
     BIAS,
     DIAGONAL,
@@ -66,6 +66,18 @@ def carried(S, W, k):
     """What the multiplier of term k's row does through it: (force, torque) on its second body, about M's origin."""
     c = W.row[LAM, S.term_i[k, TERM_ROW]] * S.term_x[k, COEFFICIENT]
     return scale(c, load3(W.T, k, 0)), scale(c, load3(W.T, k, 3))
+
+
+@formula
+def on_second(S, W, what):
+    """The same on the second body of the term's joint, about its point there; see `tables.terms.on_second`."""
+    nt = S.term_i.shape[0]
+    k = what if what < nt else what - nt
+    force, torque = carried(S, W, k)
+    if what >= nt:  # told of the other body, at the other frame: the reverse of both, about this one
+        arm = sub(load3(W.FK, S.term_i[k, TERM_M], 0), load3(W.FK, S.term_i[k, TERM_F], 0))
+        return neg(force), neg(add(torque, cross(arm, force)))
+    return force, torque
 
 
 @formula

@@ -50,9 +50,7 @@ def slides(S, W, s):
 def heading(S, W, sensed, s):
     """Direction of sliding along the tangents of slip s and of its partner, and the speed.
 
-    In the plane it is the way of the switch. In space it is that of the velocity, reversed where it is more against the
-    way than with it: what comes to rest would slide on smoothly, until the event is found. What has just begun to slide
-    goes its way, and that of its velocity as it gets faster: by itself the velocity turns infinitely fast there.
+    In the plane it is the way of the switch, in space `direction`.
     """
     way = sensed[VALUE, way_of(S, W, s)]
     u = sensed[RATE, S.switch_i[s, SWITCH_MEASURED]]
@@ -61,10 +59,22 @@ def heading(S, W, sensed, s):
         return way, 0.0 * way, u * way
     side = sensed[VALUE, way_of(S, W, other)]
     v = sensed[RATE, S.switch_i[other, SWITCH_MEASURED]]
+    return direction(own_speed(S), (way, side), (u, v))
+
+
+@formula
+def direction(pace, ways, velocity):
+    """Direction of sliding in space, and the speed along it; ``pace`` is the mechanism's own speed.
+
+    It is that of the velocity, reversed where it is more against the way than with it: what comes to rest would slide
+    on smoothly, until the event is found. What has just begun to slide goes its way, and that of its velocity as it
+    gets faster: by itself the velocity turns infinitely fast there.
+    """
+    (way, side), (u, v) = ways, velocity
     square = u * u + v * v
     if (way * way + side * side).real > FRESH:
-        return begins(S, (way, side), (u, v), square)
-    slow = SLOW * own_speed(S)
+        return begins(pace, ways, velocity, square)
+    slow = SLOW * pace
     if square.real <= slow.real * slow.real:
         return way, side, u * way + v * side
     speed = sqrt(square) if (u * way + v * side).real >= 0.0 else -sqrt(square)
@@ -72,9 +82,9 @@ def heading(S, W, sensed, s):
 
 
 @formula
-def begins(S, way, velocity, square):
+def begins(pace, way, velocity, square):
     """The same of what has just begun to slide: velocity + c exp(-(speed / c)^2) way, c = FIRST lengths at its rate."""
-    first = FIRST * own_speed(S)
+    first = FIRST * pace
     c = first * exp(-square / (first * first)) / FRESH
     a, b = velocity[0] + c * way[0], velocity[1] + c * way[1]
     size = sqrt(a * a + b * b)

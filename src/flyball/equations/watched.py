@@ -16,7 +16,7 @@ from ..compiler.bound import Bound, Moulded, Written
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..numerics.cone.shares import OPEN
-from ..numerics.integrators.clock import SPAN, Clock, T
+from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.expected import expect
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
@@ -129,7 +129,7 @@ def note(A, K, row):
     grain = GRAIN_START if row == START else GRAIN_END
     K.real[FASTEST] = max(K.real[FASTEST], quickest(S, W))
     grains(S, W, A[OWN].real[T], A[EXPECTED].sensed, K.real[FASTEST], K.g[grain])
-    astray(S, W, A[OWN].real[T], A[OWN].real[SPAN], K.g[ASTRAY])
+    astray(S, W, A[OWN].real[T], K.g[ASTRAY])
     last = K.grain.shape[0] - 1
     if S.guard_i[last, GUARD_KIND] == G_SHARED:
         K.g[grain, last] = GRAIN * A[GROUP].size[0]

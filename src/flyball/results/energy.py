@@ -161,5 +161,5 @@ class Energy(Named):
 
     @property
     def drift(self) -> float:
-        """Largest deviation from the balance [J]."""
-        return float(np.abs(self.balance).max(initial=0.0))
+        """Largest deviation from the balance [J]; nan where fewer than two output times leave nothing to compare."""
+        return float(np.abs(self.balance).max()) if len(self._result.t) > 1 else float("nan")

@@ -13,7 +13,7 @@ from ..errors import ModelError
 from ..model.words import listing, shortened, suggest
 from .kinds import HAPPENED
 from .moment import Moment
-from .struck import Struck
+from .struck import COMPONENTS, Struck, plain
 
 if TYPE_CHECKING:
     import pandas
@@ -40,7 +40,7 @@ class Happening:
     lost : float [J]
         Energy that impacts and sudden locking took.
     impulses : mapping
-        Joint or element -> impulse [N s] or [N m s]: a number along its coordinate, or components.
+        Element -> impulse [N s] or [N m s]: a number along its coordinate, or components; see `struck.Struck`.
     before, after : Moment, optional
         The motion just before and after: ``happening.after["block.vx"]``.
     """
@@ -57,7 +57,7 @@ class Happening:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, without the states."""
-        told = {k: np.asarray(v).tolist() for k, v in self.impulses.items()}
+        told = {k: plain(x) for k, x in self.impulses.items()}
         return {
             "t": float(self.t),
             "name": self.name,
@@ -151,13 +151,13 @@ class Events(Sequence):
         return f"{len(self)}: {told}{lost}"
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """One row each: t, name, kind, done, lost; impulses as columns ``"impulse A"`` where they are plain numbers."""
+        """One row each: t, name, kind, done, lost; columns of impulses: ``"impulse stop"``, ``"impulse A fx"``."""
         import pandas as pd
 
         rows: list[dict[str, Any]] = []
         for h in self._all:
             row = {"t": h.t, "name": h.name, "kind": h.kind, "done": "; ".join(h.done), "lost": h.lost}
-            rows.append(row | {f"impulse {k}": v for k, v in h.impulses.items() if np.ndim(v) == 0})
+            rows.append(row | dict(_columns(h.impulses)))
         return pd.DataFrame(rows, columns=None if rows else ["t", "name", "kind", "done", "lost"])
 
     def _table(self) -> tuple[list[tuple[str, ...]], str]:
@@ -187,6 +187,13 @@ class Events(Sequence):
         if left:
             body.insert(-1, f"<td colspan={len(HEAD)}>... {left}</td>")
         return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
+
+
+def _columns(impulses: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """Impulses by the names of their columns: a number, or each component."""
+    for name, x in impulses.items():
+        parts = dict(x) if isinstance(x, Mapping) else dict(zip(COMPONENTS, x, strict=True)) if np.ndim(x) else {"": x}
+        yield from ((f"impulse {name} {k}".rstrip(), float(v)) for k, v in parts.items())
 
 
 def bound(happened: list[Happening], result: Result) -> Iterator[Happening]:

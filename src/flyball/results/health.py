@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -85,8 +86,15 @@ class Health:
 
     @property
     def energy_drift(self) -> float:
-        """Largest deviation from the energy balance [J]; 0 where nothing was simulated."""
+        """Largest deviation from the energy balance [J]; 0 where nothing was simulated, nan where not measured."""
         return self._found("energy_drift") if self._simulated else 0.0
+
+    @property
+    def balance(self) -> str:
+        """How well the energy balance closes, in words."""
+        if math.isnan(self.energy_drift):
+            return "not measured: it compares the energy at output times, and there are fewer than two"
+        return f"{self.energy_drift:.2e} J largest deviation"
 
     @property
     def acceleration_violation(self) -> float:
@@ -131,7 +139,7 @@ class Health:
             *([("assembly", summary(self.departures))] if self.departures else []),
             ("freedoms", str(self.freedoms) + (f", and those of {self.crowd} bodies in sets" if self.crowd else "")),
             ("steps", f"{self.steps} accepted, {self.rejected} refused"),
-            ("energy balance", f"{self.energy_drift:.2e} J largest deviation"),
+            ("energy balance", self.balance),
             ("violation", f"{self.violation:.2e} of positions, {self.velocity_violation:.2e} of velocities"),
             ("time used", f"{self.seconds:.2f} s{self._compiled}"),
         ]

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..tables.values import Values, values
 from .events import Happening
+from .struck import Struck
 
 if TYPE_CHECKING:
     from .result import Result
@@ -24,7 +25,8 @@ def packed(result: Result) -> tuple[dict[str, str], dict[str, np.ndarray]]:
             every = [getattr(h, k) for h in result.events]
             told = [np.full(n, np.nan) if m is None else m.values.system.const[:n].real for m in every]
             states[f"events_{k}_parameters"] = np.array(told)
-    return {"events": json.dumps(result.events.as_dict())}, states
+    told = [h.as_dict() | ({"struck": x.plain()} if isinstance(x := h.impulses, Struck) else {}) for h in result.events]
+    return {"events": json.dumps(told)}, states
 
 
 SIDES = ("before", "after")
@@ -54,9 +56,17 @@ def unpack(stored: dict[str, Any], result: Result) -> None:
         sides = [[None if np.isnan(y).any() else y for y in x] for x in sides]
         tables = zip(*(_tables(stored, k, result) for k in SIDES), strict=True)
         result.events = [  # type: ignore[assignment]
-            Happening(**{**one, "done": tuple(one["done"]), "before": before, "after": after, "tables": both})
+            Happening(**_own(one, before is not None), before=before, after=after, tables=both)
             for one, before, after, both in zip(told, *sides, tables, strict=True)
         ]
+
+
+def _own(one: dict[str, Any], known: bool) -> dict[str, Any]:
+    """What an event is made of; ``known``: with its states, by which all impulses are found."""
+    struck = one.pop("struck", None)
+    if struck is not None and known:
+        one["impulses"] = Struck(struck["own"], np.array(struck["rows"]), tuple(map(tuple, struck["blows"])))
+    return one | {"done": tuple(one["done"])}
 
 
 def _tables(stored: dict[str, Any], side: str, result: Result) -> list[Values]:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..equations.pace import own_speed
+from ..equations.sliding import direction
 from ..math.vec import dot
 from ..model.body import GROUND
 from ..model.touch import Touch
@@ -82,9 +84,11 @@ class Touched:
     @cached_property
     def sliding(self) -> np.ndarray:
         """Friction of what slides, on the second side [N], (n, 3)."""
-        speed = np.sqrt((self.slip**2).sum(axis=0))
-        way = self._result.stretches.sigma[self._switches[1:]]  # type: ignore[union-attr]
-        d = np.where(speed > 0.0, self.slip / np.where(speed > 0.0, speed, 1.0), way)
+        d = self._result.stretches.sigma[self._switches[1:]] + 0.0 * self.slip  # type: ignore[union-attr]
+        if len(d) > 1:
+            pace = float(own_speed(self._result.values.system).real)
+            for i in np.flatnonzero(self.slides).tolist():
+                d[:, i] = direction(pace, tuple(d[:, i].tolist()), tuple(self.slip[:, i].tolist()))[:2]
         size = -self.element.friction[1] * self.pressure * self.slides
         return np.einsum("in,inc->nc", size * d, self.tangents)
 

@@ -19,11 +19,13 @@ from .joints import joined, joined_kernel
 from .march import march_kernel
 from .solvers import Solvers, solvers, told
 from .tables import (
+    ENOUGH_V,
     FREE_INERTIA,
     FREE_INVERSE,
     FREE_MASS,
     FREE_PER_MASS,
     FREE_ROUND,
+    GRAVITY,
     JOINTS,
     LEFT,
     SEARCHING,
@@ -40,6 +42,7 @@ SLICE = 0.05  # seconds that a call of the loop should take
 
 MANY = 100_000  # steps of a call at most
 HALVINGS = 6  # of a step that cannot be taken whole
+RESTING = 1e-2  # of the velocity that gravity makes in a step: a larger residual is not enough
 ROOMIER = 1.5  # times as much room as was needed, when there is none
 
 
@@ -176,6 +179,7 @@ class Stepper:
         self.rooms.X.v[:, :6] = velocity
         self.turning = turning
         self.quota = 1
+        self.enough = float(pace.real[ENOUGH_V])  # residual of velocities [m/s] in a step that is not very short
         self.halved = 0  # steps that were taken in shorter ones
         self._open(joints is not None)
 
@@ -206,7 +210,7 @@ class Stepper:
         while steps > 0:
             began = time.perf_counter()
             asked = count[LEFT] = min(steps, self.quota)
-            self.pace.real[STEP] = h
+            self._next(h)
             try:
                 self._march()
             except NoWay:
@@ -218,12 +222,22 @@ class Stepper:
             took = max(time.perf_counter() - began, 1e-6)
             self.quota = int(max(1, min(4 * self.quota, self.quota * SLICE / took, MANY)))
 
+    def _next(self, h: float) -> None:
+        """Length of the steps that follow, and the residual of their velocities that is enough.
+
+        In a step so short that gravity makes no more velocity than that, what rests would not be held.
+        """
+        real = self.pace.real
+        falls = RESTING * h * float(np.linalg.norm(real[GRAVITY : GRAVITY + 3]))
+        real[STEP], real[ENOUGH_V] = h, min(self.enough, falls) if falls > 0.0 else self.enough
+
     def _in_halves(self, h: float, depth: int) -> None:
         """Take a step of h, which cannot be taken, as two; at the last depth as best as it can be."""
         if depth == 0:
             raise NoWay
         for _ in range(2):
-            self.pace.real[STEP], self.pace.count[LEFT] = 0.5 * h, 1
+            self._next(0.5 * h)
+            self.pace.count[LEFT] = 1
             self.joints.count[ANYHOW] = depth == 1
             try:
                 self._march()

@@ -11,6 +11,7 @@ from ..numerics.ldl import analyse
 from .reads import entries
 from .specs import Structure, ints
 from .system import BODY_LAW, COUPLED, NV, SCHUR, SOLVER, V0
+from .terms import on_second
 
 
 def patterns(s: Structure, solved: bool = True) -> None:
@@ -57,7 +58,7 @@ def patterns(s: Structure, solved: bool = True) -> None:
 
 def _pressing(s: Structure, e: Any) -> list[int]:
     """Terms whose reactions are a load; -1 for the multiplier of the row that presses two sides together."""
-    return s.terms_of.get(e.joint, []) if hasattr(e, "joint") else [-1]
+    return [on_second(s, k) for k in s.terms_of.get(e.joint, [])] if hasattr(e, "joint") else [-1]
 
 
 def _touched(s: Structure, ways: list[tuple[list[int], list[int]]]) -> list[set[int]]:

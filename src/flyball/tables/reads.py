@@ -16,6 +16,7 @@ from ..model.model import Model
 from .events import names
 from .specs import Structure
 from .system import V0
+from .terms import on_second
 
 READS = -2_000_000_000
 """Place of the first column until it is known; below those of controllers' states."""
@@ -48,7 +49,7 @@ def entries(s: Structure) -> list[tuple[int, int]]:
 def _made_of(s: Structure, e: Element) -> list[int]:
     rows, forces = len(s.rows), len(s.forces)
     if isinstance(e, Joint):
-        return [k if s.frames[s.terms[k].M].role == "M" else len(s.terms) + k for k in s.terms_of.get(e.name, ())]
+        return [on_second(s, k) for k in s.terms_of.get(e.name, ())]
     if isinstance(e, Driver):
         if e.name in s.prescribed:
             return [-2 - rows - forces - int(s.tables["body_i"][s.prescribed[e.name], V0])]

@@ -11,6 +11,7 @@ from ..constraints.blocks import ANGLE, Row, point_coordinate
 from ..constraints.registry import KINDS
 from ..model.body import Driver, Initial
 from ..model.element import Element, LawOf
+from ..model.event import Event
 from ..model.expressions import Expression
 from ..model.force import Force
 from ..model.joint import Coordinate, Joint
@@ -142,6 +143,16 @@ def measured_term(s: Structure, m: int, F: int, M: int, formula: Row, sign: floa
         s.terms[-1].hint = s.state(f"{e.name}.place")
 
 
+def carrier(t: TermSpec) -> Element:
+    """The element that carries what the row of a term does: where an event locks a joint's coordinate, that joint."""
+    return t.owner if isinstance(t.element, Event) and isinstance(t.owner, Joint) else t.element
+
+
+def on_second(s: Structure, k: int) -> int:
+    """Number of a term of a joint's rows, and the number of terms more where it is seen from the joint's other side."""
+    return k if s.frames[s.terms[k].M].role == "M" else len(s.terms) + k
+
+
 def sort(s: Structure) -> None:
     """Terms by kind, frames on ground first, those that no loop asks for last; offsets of every kind."""
     used = _used(s)
@@ -156,7 +167,7 @@ def sort(s: Structure) -> None:
             t.row += len(s.rows)
     for k, t in enumerate(s.terms):
         if not t.measured:
-            s.terms_of.setdefault(t.element.name, []).append(k)
+            s.terms_of.setdefault(carrier(t).name, []).append(k)
     angles = ints(s.angles, 3)
     angles[:, :2] = new[angles[:, :2]]
     s.frame_at = {key: int(new[k]) for key, k in s.frame_at.items()}

@@ -120,11 +120,17 @@ def _cards(result: Result) -> str:
     """The figures that tell at a glance whether to trust the run; exact values in ``data-value``."""
     h = result.health
     largest = float(np.nanmax(np.abs(result.energy.total), initial=0.0))
-    relative = f"{h.energy_drift / largest:.1e} of the largest energy" if largest > 0.0 else ""
+    known = not np.isnan(h.energy_drift)
+    relative = f"{h.energy_drift / largest:.1e} of the largest energy" if known and largest > 0.0 else ""
     cards: list[tuple[str, str, float, str]] = [
         ("Freedoms", str(h.freedoms), h.freedoms, "by rank, at the start"),
         ("Redundant parts", str(len(h.redundant)), len(h.redundant), ", ".join(h.redundant) or "none too many"),
-        ("Energy balance", f"{number(h.energy_drift)} J", h.energy_drift, relative or "largest deviation"),
+        (
+            "Energy balance",
+            f"{number(h.energy_drift)} J" if known else "not measured",
+            h.energy_drift,
+            (relative or "largest deviation") if known else "fewer than two output times",
+        ),
         ("Violation", number(h.violation), h.violation, "largest gap of a constraint [m or rad]"),
         ("Velocity violation", number(h.velocity_violation), h.velocity_violation, "[m/s or rad/s]"),
         ("Steps", str(h.steps), h.steps, f"{h.rejected} refused, {_time(h)}"),

@@ -38,7 +38,7 @@ def derivative(x: np.ndarray) -> np.ndarray:
 def pressing(s: Structure) -> np.ndarray:
     """The rows whose multipliers some friction depends on."""
     terms = s.tables["load_i"][:, 1] if s.loads else np.zeros(0, int)
-    return np.unique(s.tables["term_i"][terms[terms >= 0], TERM_ROW])
+    return np.unique(s.tables["term_i"][terms[terms >= 0] % len(s.terms), TERM_ROW])
 
 
 def as_complex(system: System) -> System:

@@ -75,11 +75,17 @@ def start(callbacks, S, W, R, c, out):
 
 
 @formula
+def ending(c):
+    """Time at which the step in the making ends: T_END itself where it reaches that, as T + h may be less."""
+    h = c.real[TRIED]
+    return c.real[T_END] if h == c.real[T_END] - c.real[T] else c.real[T] + h
+
+
+@formula
 def write(callbacks, S, W, R, c, out, used):
     """Report every output time within the step, as far as the buffer reaches. Returns (status, used)."""
     ask, own, report = callbacks[:3]
-    t, h = c.real[T], c.real[TRIED]
-    end = t + h
+    t, h, end = c.real[T], c.real[TRIED], ending(c)
     while c.count[NEXT] < c.times.shape[0] and used < out.shape[0]:
         s = c.times[c.count[NEXT]]
         if s > end:
@@ -134,16 +140,9 @@ def unclear(c, h):
 
 
 @formula
-def ending(c):
-    """Time at which the step in the making ends."""
-    h = c.real[TRIED]
-    return c.real[T_END] if h == c.real[T_END] - c.real[T] else c.real[T] + h
-
-
-@formula
 def full(c):
     """Whether the buffer was full inside the step: it is taken again by the next call."""
-    return c.count[NEXT] < c.times.shape[0] and c.times[c.count[NEXT]] <= c.real[T] + c.real[TRIED]
+    return c.count[NEXT] < c.times.shape[0] and c.times[c.count[NEXT]] <= ending(c)
 
 
 @formula

@@ -18,6 +18,7 @@ from ....model.event_check import coordinate_of
 from ....model.held import held_by
 from ....numerics.integrators.clock import SPAN
 from ....results.events import Happening
+from ....results.struck import summed
 from ....tables.reads import read
 from ....tables.specs import Structure
 from ....tables.system import GUARD_WAY, HELD, MODE
@@ -72,7 +73,7 @@ class Acts:
             lost = sum(h.lost for h in mine) if e is cause else 0.0
             impulses: Any = {} if e is not cause or not mine else mine[0].impulses
             if e is cause and len(mine) > 1:
-                impulses = {k: x for h in mine for k, x in h.impulses.items()}
+                impulses = summed([h.impulses for h in mine])
             done = tuple(self.words.get(e.name, ()))
             both = None if self.tables is here.c.values else (self.tables, here.c.values)
             here.records.append(

@@ -35,7 +35,7 @@ def generalised(
     model = here.structure.model
     if not isinstance(model.find(a.on), (Body, Frame)):
         text = coordinate_of(model, e, a)
-        return force[0] * _gradient(here, text), ("along", here.structure.measured[text], force[0])
+        return force[0] * _gradient(here, text), ("along", here.structure.measured[text], force[0], e.name)
     plane = model.planar
     F = np.array([*force, 0.0, 0.0, 0.0])[:3] if len(force) < 3 else np.array(force)
     T = np.array([0.0, 0.0, *torque]) if plane and len(torque) == 1 else np.array(list(torque) or [0.0] * 3)
@@ -43,7 +43,7 @@ def generalised(
     if a.axes == "body":
         F, T = axes @ F, axes @ T
     about = T + np.cross(point - here.c.work.BK[body, :3], F)
-    return _along(here, body, point, F, T), ("body", body, tuple(F.tolist()), tuple(about.tolist()))
+    return _along(here, body, point, F, T), ("body", body, tuple(F.tolist()), tuple(about.tolist()), e.name)
 
 
 def _gradient(here: Here, text: str) -> np.ndarray:

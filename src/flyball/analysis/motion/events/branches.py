@@ -238,7 +238,7 @@ class Corners:
         which, sides, held = found.which, found.sides, found.held
         n.ways()[which] = sides
         at = [seen(n, s) for s in which]
-        slow = np.array([KEPT * x.still * x.rates for x in at]) / float(n.here.clock.real[ex.SPAN])
+        slow = np.array([KEPT * x.still * x.rates for x in at]) * n.pace
         flat = ~held & (np.abs(found.d + found.B @ sides) <= np.maximum(LEVEL * found.size, slow))
         if held.any():
             self._hold([s for s, h in zip(which, held, strict=True) if h], found)

@@ -142,6 +142,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
     """Jumps and modes at the instant, until nothing is against its rule; those that a motion begins in are no news."""
     here = n.here
     before, modes, ways = here.y.copy(), n.W.switch[MODE].copy(), n.ways().copy()
+    since = before  # the last jump that was recorded
     hits: dict[int, bool] = {}
     calm: list[int] = []
     gone: list[int] = []  # guards of what was held and could not hold
@@ -166,7 +167,8 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         pressed(n, fired, ways)
         found = decided(n, at, still, fired)
         if isinstance(found, Jump):  # no accelerations: velocities have jumped, all is looked at again
-            tell_jump(n, found, before)
+            tell_jump(n, found, since)
+            since = here.y.copy()
             n.look_again()
             fired, calm = unmoved(n, fired, rate), list(found.even)
             continue
@@ -174,7 +176,8 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         come_to_rest(n, found)
         n.arrive()
         if jumped is not None and (jumped.blows or jumped.given or not jumped.closing.keys() <= here.astray):
-            tell_jump(n, jumped, before)
+            tell_jump(n, jumped, since)
+            since = here.y.copy()
         guards = n.guards()
         if again < AGAIN and misled(n, guards):
             n.look_again()

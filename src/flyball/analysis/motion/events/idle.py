@@ -19,7 +19,7 @@ from ....numerics.cone.dense.problem import EVEN, FOUND, OUT, PUSHES
 from ....numerics.integrators.clock import SPAN, H, T
 from ....tables.system import BODY_LAW, G_BACK, G_LOWER, G_UPPER, ROW_WORK, UNIT, V0
 from .here import Here
-from .instant import Instant, instant_of
+from .instant import Instant, instant_of, slowest
 
 if TYPE_CHECKING:
     from .modes import Decided
@@ -114,10 +114,10 @@ def tie(here: Here, loop: Loop) -> None:
     """Have the loop know what is kept at its end by others: a rate is none by which nothing gets anywhere."""
     loop.desk.tied[:] = loop.desk.still[:] = 0.0
     if here.still:
-        at, span = list(here.still), here.clock.real[SPAN]
-        loop.desk.still[at] = here.c.system.glob[UNIT : UNIT + len(loop.desk.still)][at] / span
+        at = list(here.still)
+        loop.desk.still[at] = here.c.system.glob[UNIT : UNIT + len(loop.desk.still)][at] * slowest(here)
     if here.tied:
         n = instant_of(here)
         for g, (kind, s, _) in enumerate(n.guarded):
             if (kind, s) in here.tied:
-                loop.desk.tied[g] = n.unit[s] / (here.clock.real[SPAN] if kind == G_BACK else 1.0)
+                loop.desk.tied[g] = n.unit[s] * (n.pace if kind == G_BACK else 1.0)

@@ -38,7 +38,7 @@ from .here import Here
 from .holding import GONE
 
 NEAR = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
-REST = 1e-12  # of the length of the mechanism (or a radian) in the time of the motion: the same where all is at rest
+REST = 1e-12  # of the length of the mechanism (or a radian) at the rate `slowest`: the same where all is at rest
 NO_KIND = -1  # of what was released: it takes no part
 IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
 STOPS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
@@ -85,6 +85,10 @@ class Instant:
         Whether what holds may share it with others: the last guard is that of the group.
     over : float
         When a series of bounces is over that has become shorter than rounding here.
+    pace : float [1/s]
+        See `slowest`.
+    energy : float [J]
+        That of all mass at the mechanism's own speed.
     """
 
     def __init__(self, here: Here) -> None:
@@ -108,9 +112,11 @@ class Instant:
         mass, spin = S.body_x[:, MASS].sum(), np.trace(S.body_x[:, INERTIA : INERTIA + 9].reshape(-1, 3, 3).sum(axis=0))
         turning = mass * c.values.length**2 + spin
         self.inertia = np.array([mass if m else turning for m in metric])
-        fall = np.linalg.norm(S.glob[:3]) / c.values.length + 1.0 / here.clock.real[SPAN] ** 2
+        self.pace = slowest(here)
+        fall = np.linalg.norm(S.glob[:3]) / c.values.length + self.pace**2
+        self.energy = mass * c.values.length**2 * fall
         self.tiny = MOTIONLESS * self.unit * fall
-        self.near, self.least = NEAR * self.unit, REST * self.unit / here.clock.real[SPAN]
+        self.near, self.least = NEAR * self.unit, REST * self.unit * self.pace
         self.rooms: dict[int, Room] = {}
         self.guarded: list[list[int]] = S.guard_i.tolist()
         self.shares = bool(self.guarded) and self.guarded[-1][0] == G_SHARED
@@ -254,6 +260,15 @@ class Instant:
     def holds(self, s: int) -> bool:
         """Whether switch s held when it was looked at."""
         return bool(self.mode[s] == HELD)
+
+
+def slowest(here: Here) -> float:
+    """A rate [1/s] that per length is a speed, squared an acceleration, of which small parts are none.
+
+    That of the mechanism itself, or a change in the whole time of a motion where that is slower. A time that is short
+    makes nothing small: a force of the weight of a body at rest presses, however little it would move the body.
+    """
+    return min(float(here.c.system.glob[TEMPO].real), 1.0 / float(here.clock.real[SPAN]))
 
 
 def instant_of(here: Here) -> Instant:

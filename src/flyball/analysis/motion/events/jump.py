@@ -34,6 +34,8 @@ class Jump:
         Switch -> rate at which it closed, and that at which it goes on.
     lost, given : float
         Energy [J] that the impacts took, and that kicks gave.
+    passed : float
+        Energy [J] that the impulses took and gave back, in sum: ``lost`` is a difference of it.
     jammed : tuple of int
         Switches that stopped without a collision.
     rows, along : ndarray
@@ -44,6 +46,7 @@ class Jump:
     closing: dict[int, tuple[float, float]] = field(default_factory=dict)
     lost: float = 0.0
     given: float = 0.0
+    passed: float = 0.0
     rows: np.ndarray = field(default_factory=lambda: np.zeros(0))
     along: np.ndarray = field(default_factory=lambda: np.zeros(0))
     blows: tuple[Any, ...] = ()
@@ -94,6 +97,7 @@ def finish(
     B, P = solved
     before, x, u = found
     out.lost = -float(x @ (before + u)) / 2.0
+    out.passed = float(np.abs(x) @ (np.abs(before) + np.abs(u))) / 2.0
     out.rows += x @ B.L
     out.along += x @ B.Y
     drive += x @ B.E

@@ -14,7 +14,6 @@ import numpy as np
 from ....equations.instant import SILENT, STILL
 from ....equations.rows import measured
 from ....laws.evaluation import evaluate_jet
-from ....numerics.integrators.clock import SPAN
 from ....tables.system import SWITCH_LAW
 from .instant import REST, Instant
 from .rest import LOW
@@ -33,7 +32,7 @@ class Corner(NamedTuple):
     rates : bool
         Whether u depends on rates, so that ``row`` is of u itself, and du/dt of accelerations.
     size : float
-        The mechanism's length, or a radian, in units of u; with rates those in the time of the motion.
+        The mechanism's length, or a radian, in units of u; with rates those at the rate `instant.slowest`.
     still : float
         Rounding of what ``row`` is the slope of.
     grain : float
@@ -56,7 +55,7 @@ def jet(n: Instant, s: int, seed: int) -> tuple[float, float, float]:
 def seen(n: Instant, s: int) -> Corner:
     """The corner of switch s."""
     S, W, v = n.S, n.W, n.here.v
-    nm, nr, span = measured(S), len(S.row_i), float(n.here.clock.real[SPAN])
+    nm, nr = measured(S), len(S.row_i)
     terms, rows = n.here.structure.terms, len(n.here.structure.rows)
     measures = {x.row - rows: x.formula.measure for x in terms if x.measured}
     slopes = np.array([jet(n, s, m)[1] for m in range(2 * nm)])
@@ -70,8 +69,8 @@ def seen(n: Instant, s: int) -> Corner:
         row[S.col_i[at]] += slope * W.G[at]
         size += abs(slope) * unit
         rounding = STILL * (G @ np.abs(v[S.col_i[at]])) + SILENT * G.sum() * np.abs(v).max(initial=0.0)
-        still += abs(slope) * (REST * unit / span + rounding)
-    return Corner(row, rates, size / span if rates else size, still, still if rates else LOW * size)
+        still += abs(slope) * (REST * unit * n.pace + rounding)
+    return Corner(row, rates, size * n.pace if rates else size, still, still if rates else LOW * size)
 
 
 def note(n: Instant, s: int) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....constraints.modes import BY_RATE, ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, SLIP, STOP
+from ....model.joint import Joint
 from ....model.touch import Touch
 from ....numerics.integrators.clock import LEDGER
 from ....results.events import Happening
@@ -13,7 +14,7 @@ from ....tables.system import MODE, OFF, SWITCH_OTHER, SWITCH_PARTNER
 from .instant import Instant
 from .jump import Jump
 
-NOISE = 1e-14  # of the energy that a motion is about: as good as nothing lost
+NOISE = 1e-14  # of the energy that a motion is about, or that passes in an impact: as good as nothing lost
 HELD_WORDS = {
     STOP: ("close", "closes"),
     FRICTION: ("stick", "sticks"),
@@ -56,8 +57,8 @@ def tell_jump(n: Instant, jumped: Jump, before: np.ndarray) -> None:
         done.append(
             f"{n.name(s)} closes at {abs(u):.6g} {unit}/s, {goes}" if n.kind[s] != LOCK else f"{n.name(s)} locks"
         )
-    for s, x in jumped.impulse.items():
-        if x != 0.0:
+    for s, x in jumped.impulse.items():  # joints and places of contact have components, by their rows
+        if x != 0.0 and not isinstance(n.here.structure.switches[s].element, (Joint, Touch)):
             impulses[n.name(s)] = impulses.get(n.name(s), 0.0) + x
     if jumped.jammed:
         done.append("stops without a collision: no accelerations go with its friction (Painleve's paradox)")
@@ -117,6 +118,7 @@ def record(
 ) -> None:
     """Append a record."""
     t = n.over if kind == "rest" and not np.isnan(n.over) else n.here.t
-    lost = jumped.lost if jumped and abs(jumped.lost) > NOISE * n.here.clock.real[LEDGER] else 0.0
+    size = max(jumped.passed, min(n.energy, n.here.clock.real[LEDGER])) if jumped else 0.0
+    lost = jumped.lost if jumped and abs(jumped.lost) > NOISE * size else 0.0
     known = Struck(impulses, jumped.rows, jumped.blows) if jumped else impulses
     n.here.records.append(Happening(t, names, kind, done, lost, known, before.copy(), n.here.y.copy()))

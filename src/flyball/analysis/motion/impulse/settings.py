@@ -34,7 +34,7 @@ class Stepping:
     position_iterations : int, optional
         Most iterations of the solve for positions; the same.
     tolerance : float [m/s]
-        Residual of velocities that is enough.
+        Residual of velocities that is enough; less in steps so short that gravity makes less than a hundred times that.
     coulomb : bool
         Coulomb's law. If not, the convex problem that approximates it, in which what slides floats up by friction
         coefficient times sliding speed times step.
