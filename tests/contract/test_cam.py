@@ -135,3 +135,44 @@ def test_a_follower_drawn_beside_the_profile_is_brought_to_it():
     a = m.assemble()
     assert np.hypot(a.q[0] - OFF, a.q[1]) == pytest.approx(RADIUS + 0.02, abs=1e-7)
     assert a.moved["point"] < 0.2
+
+
+def beaded(**profile):
+    """A bead without weight on the half circle of radius 1 below its ends (-1, 0) and (1, 0), thrown along it at 2 m/s."""
+    u = np.linspace(-np.pi, 0, 41)
+    m = fb.Mechanism("bead", planar=True)
+    m.add(fb.Body("bead", mass=0.3, inertia=1e-3, position=(0, -1), velocity=(2, 0)))
+    points = np.column_stack([np.cos(u), np.sin(u)])
+    m.add(fb.Cam("wire", "ground", "bead", points=points, at=(0, -1), closed=False, **profile))
+    return m
+
+
+def test_a_profile_that_is_not_closed_has_ends():
+    """The motion stops at the end, after a quarter of the circle, and names it; all up to there is kept."""
+    with pytest.raises(
+        fb.SimulationError, match=r"the follower of Cam 'wire' is at an end of the profile, point 40 at"
+    ) as e:
+        beaded().simulate(2.0, outputs=21)
+    assert e.value.t == pytest.approx(np.pi / 4, rel=1e-5)
+    assert "beyond='line'" in str(e.value) and e.value.result.t[-1] == pytest.approx(0.7)
+    m = beaded()
+    m.add(fb.Driver("drive", "bead.x", "1.25*t"), fb.Driver("still", "bead.angle", "0"))
+    with pytest.raises(fb.FlyballError, match=r"at an end of the profile"):
+        m.simulate(1.0)
+
+
+def test_a_profile_goes_straight_on_beyond_its_ends_if_it_says_so():
+    r = beaded(beyond="line").simulate(2.0, outputs=21)
+    late = r.t > np.pi / 4
+    assert r["bead.x"][late] == pytest.approx(np.ones(late.sum()), abs=5e-4)
+    assert r["bead.y"][late] == pytest.approx(2 * (r.t[late] - np.pi / 4), abs=1e-4)
+
+
+def test_ends_of_profiles_are_checked():
+    closed = fb.Cam("wire", "ground", "bead", points=CIRCLE, at=(0.13, 0), beyond="line")
+    m = fb.Mechanism("m", planar=True)
+    m.add(fb.Body("bead", mass=1, inertia=1))
+    with pytest.raises(fb.ModelError, match=r"beyond= has no effect on a closed profile"):
+        m.add(closed)
+    with pytest.raises(fb.ModelError, match=r"its follower is drawn beyond an end of the profile"):
+        m.add(fb.Cam("wire", "ground", "bead", points=[(0, 0), (1, 0.1), (2, 0.1), (3, 0)], at=(3.2, 0), closed=False))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import flyball as fb
 from flyball import forces
 from flyball.constraints.modes import FROZEN, STATIC
 from flyball.math.rotation import log_gradient, rotation_vector
@@ -248,3 +249,41 @@ def test_rotation_vector_and_its_gradient(angle):
 def test_rotation_vector_says_nothing_at_half_a_turn():
     R = Rotation.from_rotvec((0.0, 0.0, np.pi - 1e-4)).as_matrix()
     assert np.isnan(rotation_vector(tuple(R.ravel()))).any()
+
+
+@pytest.mark.parametrize("specialize", [False, True])
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+def test_a_spring_without_free_length_at_its_anchor(coordinates, specialize):
+    """F = -k r - c dr/dt along the line of motion: oscillations about the anchor and about m g / k below it."""
+    w = np.sqrt(100.0 - 1.0)
+    for damping, v, g in ((0.0, 0.0, -9.81), (2.0, 0.0, -9.81), (2.0, 3.0, 0.0), (0.0, 3.0, 0.0), (2.0, 0.0, 0.0)):
+        m = fb.Mechanism("spring", planar=True, gravity=(0, g))
+        m.add(fb.Body("b", mass=1, inertia=1, velocity=(0, v)))
+        m.add(fb.SpringDamper("k", "ground", "b", at=((0, 0), (0, 0)), stiffness=100, length=0, damping=damping))
+        run = m.simulate(1.0, outputs=21, coordinates=coordinates, specialize=specialize)
+        t, d = run.t, damping / 2.0
+        w = np.sqrt(100.0 - d * d)
+        y = g / 100 * (1 - np.exp(-d * t) * (np.cos(w * t) + d / w * np.sin(w * t))) + v / w * np.exp(-d * t) * np.sin(
+            w * t
+        )
+        np.testing.assert_allclose(run["b.y"], y, atol=2e-7)
+        assert (run["k"].rate[0], run["k"].force[0]) == (v, damping * v)
+        assert np.abs(run.energy.balance).max() < 1e-5
+
+
+def test_small_oscillations_of_a_spring_without_free_length():
+    """In any direction the same: s = -d +- i sqrt(k - d^2), for the motion along a line through the anchor."""
+    m = fb.Mechanism("spring", planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1))
+    m.add(fb.SpringDamper("k", "ground", "b", at=((0, 0), (0, 0)), stiffness=100, length=0, damping=2))
+    found = np.sort_complex(m.linearize().eigenvalues)
+    w = 1j * np.sqrt(99)
+    np.testing.assert_allclose(found, [-1 - w, -1 - w, -1 + w, -1 + w, 0, 0], atol=1e-9)
+
+
+def test_a_spring_with_a_free_length_has_no_direction_at_its_anchor():
+    m = fb.Mechanism("spring", planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1))
+    m.add(fb.SpringDamper("k", "ground", "b", at=((0, 0), (0, 0)), stiffness=100, length=0.1))
+    with pytest.raises(fb.SimulationError, match=r"SpringDamper 'k'(?s:.*)points coincide(?s:.*)unless length is 0"):
+        m.simulate(1.0)

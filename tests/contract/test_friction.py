@@ -83,7 +83,7 @@ def test_wheel_in_a_plain_bearing(planar, law):
 
 
 def test_thrust_bending_and_twist_load_a_joint():
-    """An overhung slide: the moments about the joint's point on the moving body count over the lengths given."""
+    """An overhung slide in a guide of two points: |R/2 + M/L| + |R/2 - M/L|, as vectors; twist by a pair of forces."""
     m = fb.Mechanism("overhung", gravity=(0, 0, -G))
     m.add(fb.Body("arm", mass=2.0, inertia=(0.1, 0.2, 0.15), position=(0.4, 0.3, 0), velocity=(1.0, 0, 0)))
     m.add(fb.Prismatic("slide", "ground", "arm", at=(0.1, 0, 0), axis=(1, 0, 0)))
@@ -92,8 +92,10 @@ def test_thrust_bending_and_twist_load_a_joint():
     weight = 2.0 * G
     # the friction -F e_x acts at the joint's point; the arm's inertia pulls at its centre of mass, 0.3 beside
     F = -r["f"].friction
-    bending = np.hypot(weight * 0.3, F * 0.3)  # about y from the weight, about z from slowing the mass
-    expected = 0.05 * (weight + bending / 0.25 + weight * 0.3 / 0.2)
+    # about y from the weight, about z from slowing the mass: opposite forces at both points of the guide
+    up, aside = weight * 0.3 / 0.25, F * 0.3 / 0.25
+    pressed = np.hypot(aside, weight / 2 + up) + np.hypot(aside, weight / 2 - up)
+    expected = 0.05 * (pressed + 2 * weight * 0.3 / 0.2)
     assert expected == pytest.approx(F, rel=1e-9)
     assert r["slide"].acceleration == pytest.approx(-F / 2.0, rel=1e-9)
 
@@ -160,7 +162,7 @@ def drawer(ahead, arm, mu=0.3, length=0.1, **law):
 
 @pytest.mark.parametrize(("ahead", "arm"), [(-1.0, 1.0), (-0.1, 0.34), (0.2, 1.0)])
 def test_friction_that_outweighs_its_cause_jams(ahead, arm):
-    """F = mu (m g + |m g x - F h| / L) has no solution where mu h / L > 1, unless the weight tilts it back enough."""
+    """F = mu max(m g, 2 |m g x - F h| / L) has no solution where 2 mu h / L > 1, unless the weight tilts it back."""
     with pytest.raises(SimulationError, match="JointFriction 'rub' jams joint 'rail'") as caught:
         drawer(ahead, arm, stick_speed=1e-3).simulate(1.0)
     assert "bending_length" in str(caught.value)
@@ -177,13 +179,13 @@ def test_what_jams_and_can_stick_stops(ahead, arm):
     assert np.abs(r["rail"].displacement).max() < 1e-14
 
 
-@pytest.mark.parametrize(("ahead", "arm"), [(0.5, 0.1), (-0.5, 0.1), (1.0, 0.32), (-1.0, 0.32), (1.0, 0.5), (1.0, 1.0)])
+@pytest.mark.parametrize(("ahead", "arm"), [(0.5, 0.1), (-0.5, 0.1), (1.0, 0.32), (-1.0, 0.16), (1.0, 0.5), (1.0, 1.0)])
 def test_friction_that_eases_or_adds_to_its_own_load(ahead, arm):
     """The same with a solution; of two the smaller one holds, which grows from no friction at all."""
     r = drawer(ahead, arm).simulate(0.001, outputs=2)
     side = 1.0 if ahead > 0.0 else -1.0  # that the rail is pressed on
-    F = 0.3 * G * (1.0 + side * ahead / 0.1) / (1.0 + side * 0.3 * arm / 0.1)
-    assert side * (G * ahead - F * arm) > 0.0
+    F = 0.6 * G * side * ahead / 0.1 / (1.0 + side * 0.6 * arm / 0.1)
+    assert side * (G * ahead - F * arm) > 0.05 * G  # both points of the guide press, on opposite sides
     assert r["rub"].friction[0] == pytest.approx(-F, rel=1e-9)
     assert r["rail"].acceleration[0] == pytest.approx(-F, rel=1e-9)
 
@@ -209,7 +211,9 @@ def test_two_joints_that_load_one_another(law):
         load = np.linalg.norm(r[joint].force, axis=1)
         speed = arm * r[joint].rate
         assert r[name].friction == pytest.approx(-arm * 0.2 * load * way(law, speed), rel=1e-9)
-    load = np.abs(r["P"].force[:, 1]) + np.abs(r["P"].torque) / 0.1
+    load = np.maximum(
+        np.abs(r["P"].force[:, 1]), 2 * np.abs(r["P"].torque) / 0.1
+    )  # a guide of two points, in the plane
     assert r["fp"].friction == pytest.approx(-0.3 * load * way(law, r["P"].rate), rel=1e-9)
     assert r.health.energy_drift < 1e-6
     # Newton for the piston along the slide: rod's pull and friction
@@ -228,14 +232,15 @@ def test_frictions_that_load_one_another(seed, law):
         m.add(fb.Body(name, mass=1.0, inertia=(1, 2, 2.5), position=p, **more))
     m.add(fb.Prismatic("slide", "ground", "a", at=p, axis=n), fb.Revolute("hinge", "a", "b", at=p, axis=n))
     for name, radius in (("slide", None), ("hinge", 0.1)):
-        lengths = {"bending_length": 0.1, "twist_length": 0.1}
+        lengths = {"bending_length": 0.2, "twist_length": 0.2}
         m.add(fb.JointFriction(f"f {name}", joint=name, static=0.5, radius=radius, **lengths, **law))
     r = m.simulate(0.2, outputs=5)
     for name, radius in (("slide", 1.0), ("hinge", 0.1)):
         force, torque = r[name].reaction()
         thrust, twist = force @ n, torque @ n
-        load = np.linalg.norm(force - np.outer(thrust, n), axis=1) + np.abs(thrust)
-        load += np.linalg.norm(torque - np.outer(twist, n), axis=1) / 0.1 + np.abs(twist) / 0.1
+        radial, couple = force - np.outer(thrust, n), np.cross(torque, n) / 0.2
+        load = sum(np.linalg.norm(radial / 2 + side * couple, axis=1) for side in (1, -1))
+        load += np.abs(thrust) + 2 * np.abs(twist) / 0.2
         expected = -radius * 0.5 * load * way(law, radius * r[name].rate)
         assert r[f"f {name}"].friction == pytest.approx(expected, rel=1e-8, abs=1e-9)
     total = 2.0 * (r["a"].acceleration @ n)
@@ -274,3 +279,82 @@ def test_friction_that_counts_no_moments_does_not_mind_those_left_open():
         r = m.simulate(0.1, outputs=3, coordinates=coordinates)
         assert r["slide"].acceleration == pytest.approx(np.full(3, -0.1 * G), rel=1e-8)
         assert r.health.warnings == ()
+
+
+@pytest.mark.parametrize(("mu", "holds"), [(0.249, False), (0.251, True)])
+def test_a_guide_of_two_points_jams_at_half_its_length_over_the_arm(mu, holds):
+    """Textbook: a collar of length L pushed along its rod at the distance e jams from mu = L / (2 e) on, however hard."""
+    m = fb.Mechanism("collar", planar=True)
+    m.add(fb.Body("collar", mass=1.0, inertia=1e-3), fb.Prismatic("rod", "ground", "collar", at=(0, 0), axis=(1, 0)))
+    m.add(fb.JointFriction("rub", "rod", static=mu, bending_length=0.2), fb.Frame("arm", "collar", position=(0, 0.4)))
+    m.add(fb.PointForce("push", "arm", force=(100.0, 0)))
+    r = m.simulate(0.1, outputs=2)
+    assert r["rod"].acceleration[-1] == pytest.approx(0.0 if holds else 100.0 * (1 - 2 * mu * 0.4 / 0.2), abs=1e-6)
+
+
+def nut(torque, flank=1.0, **law):
+    """A nut of 100 N on a thread of 10 mm mean radius and 45 deg lead angle."""
+    m = fb.Mechanism("jack", gravity=(0, 0, -G))
+    m.add(fb.Body("nut", mass=100 / G, inertia=(1, 1, 1)))
+    m.add(fb.Screw("thread", "ground", "nut", at=(0, 0, 0), axis=(0, 0, 1), lead=2 * np.pi * 0.01))
+    m.add(fb.Motor("motor", "thread", torque=torque))
+    m.add(fb.JointFriction("rub", "thread", static=0.15, radius=0.01, thrust_factor=flank, **law))
+    return m
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+@pytest.mark.parametrize("flank", [1.0, 1 / np.cos(np.radians(15))])
+def test_friction_of_a_thread(coordinates, flank):
+    """It lifts from F r tan(a + phi) on, sinks below F r tan(a - phi), tan(phi) = mu / cos(flank angle); slides as
+    (I + m h r tan(a + phi)) dw/dt = T - F r tan(a + phi), h the lead for one radian."""
+    phi = np.arctan(0.15 * flank)
+    lift, sink = np.tan(np.pi / 4 + phi), np.tan(np.pi / 4 - phi)
+    assert flank != 1.0 or (round(lift, 3), round(sink, 3)) == (1.353, 0.739)
+    for torque, way in ((lift + 1e-3, 1), (lift - 1e-3, 0), (sink + 1e-3, 0), (sink - 1e-3, -1)):
+        r = nut(torque, flank).simulate(0.05, outputs=2, coordinates=coordinates)
+        assert np.sign(r["thread"].angle_acceleration[-1].round(9)) == way
+    r = nut(2.0, flank).simulate(0.05, outputs=2, coordinates=coordinates)
+    expected = (2.0 - lift) / (1 + 100 / G * 1e-4 * lift)
+    assert r["thread"].angle_acceleration == pytest.approx(np.full(2, expected), rel=1e-9)
+    assert r["rub"].value == pytest.approx(r["thread"].angle, abs=1e-12)
+    assert r["rub"].friction * r["rub"].rate == pytest.approx(r["rub"].power, rel=1e-9)
+    assert np.abs(r.energy.balance).max() < 1e-9
+
+
+def test_friction_of_a_thread_by_steps_of_impulses():
+    """It holds and slides at the same torques."""
+    for torque, rate in ((1.3, 0.0), (1.4, 2.35e-3), (0.78, 0.0), (0.7, -1.95e-3)):
+        r = nut(torque).simulate(0.05, outputs=2, method="impulse")
+        assert r["thread"].angle_rate[-1] == pytest.approx(rate, abs=6e-4)
+
+
+def test_a_second_friction_on_one_surface_is_refused():
+    """Friction of one surface is mu N against its whole slip, in whatever direction; two would be a box."""
+    block = fb.Body("block", mass=1, inertia=(1, 1, 1))
+    for joint, first, second in (
+        (fb.Planar, {"coordinate": "x"}, {"coordinate": "y"}),
+        (fb.PointInPlane, {"coordinate": "x"}, {"coordinate": "y"}),
+        (fb.Cylindrical, {}, {"radius": 0.01}),
+    ):
+        m = fb.Mechanism("table")
+        m.add(block, joint("table", "ground", "block", at=(0, 0, 0), axis=(0, 0, 1)))
+        m.add(fb.JointFriction("f", "table", static=0.3, **first))
+        with pytest.raises(
+            fb.ModelError, match=r"JointFriction 'g': JointFriction 'f' acts on the surface of \w+ 'table'"
+        ):
+            m.add(fb.JointFriction("g", "table", static=0.3, **second))
+        m.add(fb.JointFriction("seal", "table", static=0.1, preload=5, **first))
+        m.replace(fb.JointFriction("f", "table", static=0.2, **first))
+
+
+def test_friction_of_a_screw_says_what_it_needs():
+    m = nut(1.0)
+    with pytest.raises(fb.ModelError, match=r"needs the mean radius of the thread; give radius="):
+        m.add(fb.JointFriction("f", "thread", static=0.1))
+    with pytest.raises(fb.ModelError, match=r"twist_length has no effect on Screw 'thread'"):
+        m.add(fb.JointFriction("f", "thread", static=0.1, radius=0.01, twist_length=0.1))
+    m.add(fb.Body("b", mass=1, inertia=(1, 1, 1)), fb.Revolute("A", "ground", "b", at=(0, 0, 0), axis=(0, 0, 1)))
+    with pytest.raises(fb.ModelError, match=r"Revolute 'A' has no thread"):
+        m.add(fb.JointFriction("f", "A", coordinate="thread", static=0.1, radius=0.01))
+    plain = fb.JointFriction("rub", "thread", static=0.15, radius=0.01)
+    assert m.replace(plain).coordinate == m.changed({"rub": plain})["rub"].coordinate == "thread"

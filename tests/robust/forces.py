@@ -97,7 +97,9 @@ def _coordinate_spring(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: b
 def _friction(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: bool):
     joint, _, what = along.partition(".")
     static = d.size(0.01, 1.0)
-    turning = {"radius": d.size(0.005, 0.1)} if what == "angle" else {}
+    turning = {"radius": d.size(0.005, 0.1)} if what == "angle" or m[joint].thread else {}
+    if m[joint].one_surface and any(isinstance(f, fb.JointFriction) and f.joint == joint for f in m.forces):
+        return None
     return fb.JointFriction(
         name, joint, coordinate=what, static=static, kinetic=d.pick([None, 0.7 * static]), preload=d.pick([0, 5.0]),
         stick_speed=d.pick([None, d.size(1e-3, 0.1)]), bending_length=d.pick([None, 0.1]), viscous=d.pick([0, 0.1]), **turning,

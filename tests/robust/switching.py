@@ -72,7 +72,9 @@ def friction(d: Dice, m: fb.Mechanism, name: str):
         return None
     joint, _, what = c.partition(".")
     static = d.size(0.01, 1.0)
-    turning = {"radius": d.size(0.005, 0.2)} if what == "angle" else {}
+    turning = {"radius": d.size(0.005, 0.2)} if what == "angle" or m[joint].thread else {}
+    if m[joint].one_surface and any(isinstance(f, fb.JointFriction) and f.joint == joint for f in m.forces):
+        return None
     return fb.JointFriction(
         name, joint, coordinate=what, static=static, kinetic=d.pick([None, 0.6 * static]), preload=d.pick([0, 5.0]),
         stribeck_speed=d.pick([None, 0.1]), **turning,

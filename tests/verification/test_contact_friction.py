@@ -88,7 +88,9 @@ def test_the_grain_of_a_moving_body(kind, sled):
         ski = fb.Body("ski", mass=1, inertia=(1e6,) * 3, shape=SKIS[kind], position=(0, 0, 0.1), velocity=velocity,
                       material="base")  # fmt: skip
         snow = fb.Body("snow", mass=2, inertia=(1, 1, 1), shape=fb.Box(edges=(9, 9, 1)), position=(0, 0, -0.5))
-        m.add(*{"ground": (fb.Ground("snow", shape=fb.Plane()), ski), "before": (ski, snow), "behind": (snow, ski)}[sled])
+        m.add(
+            *{"ground": (fb.Ground("snow", shape=fb.Plane()), ski), "before": (ski, snow), "behind": (snow, ski)}[sled]
+        )
         if sled != "ground":
             m.add(fb.Planar("ice", "ground", "snow", at=(0, 0, -1), axis=(0, 0, 1)))
         run = m.simulate(0.1, outputs=2)

@@ -3,7 +3,8 @@
 With s the parameter of the curve point c(s) nearest to M's origin and n its normal there, delta = n.(p - c). The row is
 par[3] delta - par[6]: the side of the curve (+1 or -1) and the radius of the follower's roller. The gradient of delta
 is n, exactly, since the nearest point does not change it to first order. ``hint`` is a parameter nearby; par[1] and
-par[2] say where in ``data`` the splines x(s) and y(s) stand.
+par[2] say where in ``data`` the splines x(s) and y(s) stand. Where par[5] is greater than par[4], the curve ends at
+these parameters: beyond them the row is nan, while the search for the nearest point may pass them, straight on.
 
 For the curvature terms see Shigley and Uicker, *Theory of Machines and Mechanisms* (1995), chapter 6, or any text on
 offset curves.
@@ -11,9 +12,11 @@ offset curves.
 
 from __future__ import annotations
 
+import math
+
 from ..compiler.jit import formula
-from ..math.scalar import maximum, sqrt
-from ..math.spline import spline
+from ..math.scalar import choose, maximum, minimum, sqrt
+from ..math.spline import GRACE, spline
 from ..math.vec import cross, dot, mtv, mv, scale, sub
 
 KIND = 8
@@ -84,4 +87,7 @@ def row(par, F, M, hint, data):
     bias = dot(n, sub(M[5], F[5])) + dot(F[4], arm) + 2.0 * dot(n1, u) + dot(cross(F[2], n1), d)
     bias = bias + par[3] * curvature * along * along / (1.0 + curvature * delta)
     o = 0.0 * along
-    return par[3] * delta - par[6], n, (o, o, o), arm, bias
+    width = par[5] - par[4]
+    inside = choose(width, minimum(s - par[4], par[5] - s) + GRACE * width, o + 1.0)
+    ended = choose(inside, o, o + math.nan)
+    return par[3] * delta - par[6] + ended, n, (o, o, o), arm, bias + ended

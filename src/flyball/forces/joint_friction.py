@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import field
+from dataclasses import field, replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -11,7 +11,7 @@ from ..compiler.jit import formula
 from ..constraints.modes import FRICTION
 from ..errors import ModelError
 from ..math.scalar import absolute, choose, exp, sqrt, tanh
-from ..math.vec import col, dot, scale, sub
+from ..math.vec import add, col, cross, dot, norm, scale, sub
 from ..model.element import Length, Number, Unit, element, nonnegative, positive
 from ..model.force import CoordinateForce
 from ..model.joint import Joint
@@ -21,22 +21,28 @@ if TYPE_CHECKING:
     from ..model.model import Model
 
 KIND = 6
+TURN = 6.283185307179586  # rad
 SLIDING = 1.5  # ways of sliding are -1, 0 and 1; `constraints.modes.STATIC` is more, and asks for what holds at rest
 FALLS, CREEPS = 10, 11  # parameters that are 1 where there is a Stribeck speed, a stick speed; else 0
 STICKING = 3.0  # times the stick speed: slower than this counts as sticking (the law is then within 0.5 % of full)
 FALL = 0.01  # m/s: Stribeck speed of the regularised law
+THREAD = "thread"
+"""Coordinate of friction on a `Screw`: the angle, with the path along the helix as the sliding distance."""
 
 
 @formula
 def load(par, axes, force, torque):
-    """What presses the surfaces together [N], from the joint's reaction on body j; the axis is that frame's z."""
+    """What presses the surfaces together [N], from the joint's reaction on body j; the axis a is that frame's z.
+
+    A guide of two points at +-L/2 along the axis carries the radial force R and the moment M by the normal forces
+    R/2 + M x a / L and R/2 - M x a / L, whose magnitudes add up. Without a length L it is |R|.
+    """
     a = col(axes[1], 2)
     thrust = dot(a, force)
-    twist = dot(a, torque)
     radial = sub(force, scale(thrust, a))
-    bending = sub(torque, scale(twist, a))
-    pressed = sqrt(dot(radial, radial)) + par[7] * absolute(thrust)
-    return pressed + par[8] * sqrt(dot(bending, bending)) + par[9] * absolute(twist)
+    couple = scale(par[8], cross(torque, a))
+    pressed = 0.5 * (norm(add(radial, couple)) + norm(sub(radial, couple)))
+    return pressed + par[7] * absolute(thrust) + par[9] * absolute(dot(a, torque))
 
 
 @formula
@@ -62,9 +68,20 @@ def effort(par, x, rate, laws, load):
 class JointFriction(CoordinateForce):
     """Coulomb friction in a joint, proportional to the load that the joint carries: it sticks, or slips.
 
-    The load is N = |radial force| + thrust_factor |thrust| + |bending moment| / bending_length + |twist| /
-    twist_length, from the joint's actual reaction at every instant. What sticks is held by a constraint and does not
-    move at all, until that carries more than static (N + preload); then it slips, against kinetic (N + preload).
+    The load N is computed from the joint's actual reaction at every instant: the radial force R, thrust_factor |thrust|
+    and, where lengths are given, moments. Over ``bending_length`` L a bending moment M is carried as in a guide of two
+    points, one L/2 before and one L/2 behind the joint's point: these press with |R/2 + M x a / L| and
+    |R/2 - M x a / L| (a: the axis), so that a force F at the distance e from the axis presses with 2 F e / L. What
+    sticks is held by a constraint and does not move at all, until that carries more than static (N + preload); then it
+    slips, against kinetic (N + preload).
+
+    On a `Screw` the surface is the thread: friction acts along the helix of the given mean ``radius`` r, and the thrust
+    F presses with F / cos(lead angle), where tan(lead angle) = lead / (2 pi r). So the torque that lifts F is
+    F r tan(lead angle + arctan(mu)). Results tell it as a torque about the angle. A collar is another surface: give it
+    a joint of its own. For the flanks of a trapezoidal thread thrust_factor is 1 / cos(flank angle).
+
+    A surface has one friction force, against its whole slip. Where a joint's coordinates are slips of one surface
+    (`Cylindrical`, `Planar`, `PointInPlane`), friction along a second one is refused.
 
     With a ``stick_speed`` the law is regularised instead: friction is tanh(v / stick_speed) of the full one, and what
     would stick creeps at ``stick_speed`` times artanh(part of the full friction that holds it);
@@ -77,11 +94,12 @@ class JointFriction(CoordinateForce):
     joint : str
         Joint with a coordinate ``angle`` or ``displacement``.
     coordinate : str
-        Which one, if it has both; not given: ``angle`` if there is a radius, else ``displacement``.
+        Which one, if it has both; not given: ``angle`` if there is a radius, else ``displacement``; of a `Screw`,
+        ``thread``.
     static, kinetic : number
         Coefficients of friction at rest and in motion; the kinetic one equals the static one if not given.
     radius : number [m]
-        Radius of the bearing, where the friction acts; needed for an angle.
+        Radius of the bearing, or mean radius of the thread, where the friction acts; needed for an angle.
     stribeck_speed : number [m/s]
         Sliding speed over which the coefficient falls from static to kinetic. Not given: it falls as soon as the
         surfaces slide; of the regularised law, 0.01 m/s.
@@ -94,8 +112,11 @@ class JointFriction(CoordinateForce):
         Load that is there besides the reaction (seals, clamping).
     thrust_factor : number
         Weight of the force along the axis, for collars.
-    bending_length, twist_length : number [m]
-        Lengths over which bending moment and twist are carried as pairs of forces; moments count nothing if not given.
+    bending_length : number [m]
+        Distance of the two points of a guide that carry a bending moment; without it the moment counts nothing.
+    twist_length : number [m]
+        Distance at which two opposite forces carry the moment about the axis, 2 |twist| / twist_length in all; without
+        it that moment counts nothing.
     """
 
     joint: str = field(kw_only=False)
@@ -117,9 +138,37 @@ class JointFriction(CoordinateForce):
     single: ClassVar[str] = "friction"
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "friction": "effort"}
 
+    def bound(self, model: Model) -> JointFriction:
+        """On a `Screw` it is friction of the thread, whichever of the two coordinates is named."""
+        joint = model.find(self.joint)
+        if getattr(joint, "thread", False) and self.coordinate in (None, "angle", "displacement"):
+            return replace(self, coordinate=THREAD)
+        return self
+
     def coordinate_text(self) -> str:
-        """The joint's coordinate."""
-        return f"{self.joint}.{self._coordinate()}"
+        """The joint's coordinate; of a thread, which slides along two, none."""
+        return "" if self.coordinate == THREAD else f"{self.joint}.{self._coordinate()}"
+
+    def along(self) -> tuple[str, ...]:
+        """The coordinate; of a thread both, weighted."""
+        if self.coordinate == THREAD:
+            return f"{self.joint}.angle", f"{self.joint}.displacement"
+        return super().along()
+
+    def needs(self) -> str:
+        """Friction of a thread depends on its lead."""
+        return self.joint if self.coordinate == THREAD else ""
+
+    def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
+        """Of a thread: cos^2 and sin cos / r of the lead angle.
+
+        The sum is the angle, since displacement = r tan angle; a force along it acts along the helix.
+        """
+        if self.coordinate != THREAD:
+            return super().switch_weights(n, label)
+        pitch = n.of.lead / TURN
+        square = n.radius * n.radius + pitch * pitch
+        return n.radius * n.radius / square, pitch / square
 
     def _coordinate(self) -> str:
         return ("displacement" if self.radius is None else "angle") if self.coordinate is None else self.coordinate
@@ -129,16 +178,51 @@ class JointFriction(CoordinateForce):
         return () if self.stick_speed is not None else (Switch(FRICTION, along=self.along(), slides=True),)
 
     def examine(self, model: Model) -> None:
-        """It needs a joint that carries something, and the radius of a bearing that turns."""
+        """It needs a joint that carries something, the radius of a bearing that turns, and a surface of its own."""
         found = model.find(self.joint)
-        if isinstance(found, Joint) and self.radius is None and self.coordinate is None:
+        if isinstance(found, Joint) and self.radius is None:
             has = found.measured(model.planar)
-            if "angle" in has and "displacement" not in has:
+            if self.coordinate == THREAD or (self.coordinate is None and "angle" in has and "displacement" not in has):
+                what, radius = ("the thread", "mean radius of the thread") if self.coordinate == THREAD else (
+                    "the angle", "radius of the bearing"
+                )  # fmt: skip
                 raise ModelError(
-                    f"{self.title}: friction about the angle of {found.title} needs the radius of the bearing; give "
-                    f"radius="
+                    f"{self.title}: friction about {what} of {found.title} needs the {radius}; give radius="
                 )
-        model.joint(self.joint, self, self.coordinate_text().partition(".")[2])
+        if self.coordinate == THREAD:
+            self._examine_thread(model)
+            return
+        joint = model.joint(self.joint, self, self.coordinate_text().partition(".")[2])
+        if joint.one_surface:
+            self._refuse_second(model, joint)
+
+    def _examine_thread(self, model: Model) -> None:
+        """Only a screw has a thread, whose torque is counted by its normal force."""
+        joint = model.joint(self.joint, self, "angle")
+        if not getattr(joint, "thread", False):
+            raise ModelError(f"{self.title}: {joint.title} has no thread; coordinate='thread' is for a Screw")
+        if self.twist_length is not None:
+            raise ModelError(
+                f"{self.title}: twist_length has no effect on {joint.title}: the moment about its axis and the thrust "
+                f"are the normal force of the thread, which counts already; leave it out"
+            )
+
+    def _refuse_second(self, model: Model, joint: Joint) -> None:
+        """Refuse friction along two coordinates of one surface: it would hold within a box, not within a circle."""
+        for other in model.forces:
+            if (
+                isinstance(other, JointFriction)
+                and other.name != self.name
+                and other.joint == self.joint
+                and other._coordinate() != self._coordinate()
+            ):
+                raise ModelError(
+                    f"{self.title}: {other.title} acts on the surface of {joint.title} already, along "
+                    f"{other.coordinate_text()!r}. One surface has one friction force, mu N against its whole slip, "
+                    f"and two would be up to 1.4 mu N. Leave one out, give the bodies shapes and a "
+                    f"Contact(friction=...) in place of the joint, or put a body between them with a joint for each "
+                    f"motion, if these are two surfaces"
+                )
 
     def check(self, n: SimpleNamespace) -> None:
         """Coefficients and lengths make sense."""
@@ -165,11 +249,14 @@ class JointFriction(CoordinateForce):
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""
-        turning = self._coordinate().startswith("angle")
         kinetic = n.static if n.kinetic is None else n.kinetic
-        arm = n.radius if turning else 1.0
+        arm, thrust = (n.radius if self._coordinate().startswith("angle") else 1.0), n.thrust_factor
+        if self.coordinate == THREAD:
+            pitch = n.of.lead / TURN
+            arm = sqrt(n.radius * n.radius + pitch * pitch)
+            thrust = thrust * arm / n.radius
         fall = FALL if n.stribeck_speed is None and n.stick_speed is not None else n.stribeck_speed
-        bending, twist = (0.0 if x is None else 1.0 / x for x in (n.bending_length, n.twist_length))
+        bending, twist = (0.0 if x is None else 2.0 / x for x in (n.bending_length, n.twist_length))
         fall, falls, stick, creeps = (y for x in (fall, n.stick_speed) for y in ((1.0, 0.0) if x is None else (x, 1.0)))
-        laws = n.viscous, n.preload, n.thrust_factor, bending, twist
+        laws = n.viscous, n.preload, thrust, bending, twist
         return (arm, n.static, kinetic, fall, stick, *laws, falls, creeps)

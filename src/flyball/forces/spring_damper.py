@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Annotated, ClassVar
 
 from ..compiler.jit import formula
-from ..math.scalar import divide
-from ..math.vec import dot, neg, norm, scale, sub
+from ..math.scalar import absolute, choose, divide, unless_zero
+from ..math.vec import add, dot, neg, norm, scale, sub
 from ..model.element import Damping, Law, LawOf, Length, Stiffness, element, nonnegative
 from ..model.force import TwoPointForce
 from .coordinate_spring import refuse_idle
@@ -17,20 +18,30 @@ KIND = 0
 
 @formula
 def inputs(par, F, M):
-    """Length and its rate."""
-    d = sub(M[0], F[0])
+    """Length and its rate: where both points coincide, that with which the length begins to grow."""
+    d, u = sub(M[0], F[0]), sub(M[3], F[3])
     length = norm(d)
-    return length, divide(dot(d, sub(M[3], F[3])), length)
+    return length, unless_zero(length, divide(dot(d, u), length), norm(u))
 
 
 @formula
 def wrench(par, F, M, laws, values):
-    """Force on M that pulls it towards F: k (length - free length) + c rate + actuator force."""
+    """Force on M: -k d - (c rate + s) e with e = d / |d|, and s = F - k times free length.
+
+    Where both points coincide e has no direction: the damper acts against the velocity, along which it is about to
+    grow, and there is no force if s is not zero.
+    """
     length, rate = values
-    s = par[0] * (length - par[2]) + par[1] * rate + laws[0]
-    e = scale(divide(1.0, length), sub(M[0], F[0]))
+    d, u = sub(M[0], F[0]), sub(M[3], F[3])
     o = 0.0 * par[0]
-    return neg(scale(s, e)), (o, o, o)
+    s = laws[0] - par[0] * par[2]
+    e = scale(divide(1.0, length), d)
+    t = par[1] * rate + s
+    undefined = choose(absolute(s), o + math.nan, o)
+    x = unless_zero(length, t * e[0], par[1] * u[0] + undefined)
+    y = unless_zero(length, t * e[1], par[1] * u[1] + undefined)
+    z = unless_zero(length, t * e[2], par[1] * u[2] + undefined)
+    return neg(add(scale(par[0], d), (x, y, z))), (o, o, o)
 
 
 @formula
@@ -44,7 +55,8 @@ def energy(par, F, M):
 class SpringDamper(TwoPointForce):
     """Spring, damper and actuator between a point of one body and a point of another.
 
-    The tension k (l - l0) + c ldot + F pulls the two points together where it is positive.
+    The tension k (l - l0) + c ldot + F pulls the two points together where it is positive. Without a free length
+    (``length=0``) and F, both points may coincide: there the damper acts against the velocity.
 
     Parameters
     ----------
@@ -72,7 +84,10 @@ class SpringDamper(TwoPointForce):
     energy: ClassVar = staticmethod(energy)
     outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "force": "N"}
     drawn: ClassVar[str] = "spring"
-    fails: ClassVar[str] = "Its two points coincide, where a force along the line between them has no direction"
+    fails: ClassVar[str] = (
+        "Its two points coincide, where a force along the line between them has no direction, unless length is 0 and "
+        "there is no force="
+    )
 
     def check(self, n: SimpleNamespace) -> None:
         """Stiffness, damping and free length must not be negative."""

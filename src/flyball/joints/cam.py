@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from types import SimpleNamespace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator
@@ -14,11 +14,14 @@ from ..constraints.blocks import CURVE, Row
 from ..errors import ModelError
 from ..math.products import product
 from ..math.scalar import absolute
-from ..math.spline import complex_cubic, packed
+from ..math.spline import GRACE, complex_cubic, packed
 from ..model.element import Flag, Length, Numbers, Point, Unit, element, nonnegative
 from ..model.geometry import vector
 from ..model.joint import Joint, WorldFrame
 from ..model.table import Table
+
+NEAR = 1e-3  # part of the profile's length within which a motion that cannot go on is taken to have come to its end
+REMEDY = "give it more points, a Limit that stops the follower, beyond='line', or closed=True"
 
 
 def _list(value: Any) -> Any:
@@ -58,6 +61,9 @@ class Cam(Joint):
         In space: normal of the profile's plane, in world coordinates.
     closed : bool
         Whether the profile closes on itself.
+    beyond : ``"refuse"`` or ``"line"``
+        Beyond the ends of a profile that is not closed: there is none, and a motion that gets there stops; or it goes
+        straight on with the slope of the end.
     radius : number [m]
         Radius of the follower's roller.
     """
@@ -65,6 +71,7 @@ class Cam(Joint):
     points: Points
     centre: Point = (0.0, 0.0, 0.0)
     closed: Flag = True
+    beyond: Literal["refuse", "line"] = "refuse"
     radius: Length = 0.0
 
     blocks: ClassVar = (CURVE,)
@@ -74,6 +81,10 @@ class Cam(Joint):
     def check(self, n: SimpleNamespace) -> None:
         """Enough points, each with two coordinates, none twice running."""
         nonnegative(self, n, "radius")
+        if self.closed and self.beyond != "refuse":
+            raise ModelError(
+                f"{self.title}: beyond= has no effect on a closed profile; leave it out, or say closed=False"
+            )
         if len(n.points) < 4 or not all(len(p) == 2 for p in n.points):
             raise ModelError(f"{self.title}: a profile needs four points or more, each (x, y), got {len(n.points)}")
         for k, d in enumerate(np.sqrt((np.diff(_closing(n.points, self.closed), axis=0) ** 2).sum(axis=1))):
@@ -90,15 +101,41 @@ class Cam(Joint):
         return (centre, R), (vector(n.at, planar, f"'at' of {self.title}"), R)
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """The side of the curve that the roller is on, and its radius; where the splines stand is told later."""
-        _, side, gap = self.nearest(n, F, M)
+        """Side of the curve that the roller is on, parameters of the ends, its radius; places of the splines follow."""
+        at, side, gap = self.nearest(n, F, M)
+        first, last = self.extent(n)
+        if last.real > first.real and self.ended(at.real, first.real, last.real):
+            raise ModelError(
+                f"{self.title}: its follower is drawn beyond an end of the profile, which goes from "
+                f"{_written(n.points[0])} to {_written(n.points[-1])}; {REMEDY}"
+            )
         bend = max(0.0, -self.sharpest(n, side)) * n.radius.real
         if bend >= 1.0:
             raise ModelError(
                 f"{self.title}: its roller of {n.radius:g} m does not fit into the profile, which bends with a radius "
                 f"of {n.radius / bend:.4g} m; take a smaller roller or a smoother profile"
             )
-        return (0.0, 0.0, 0.0, side, 0.0, 0.0, n.radius)
+        return (0.0, 0.0, 0.0, side, first, last, n.radius)
+
+    def extent(self, n: SimpleNamespace) -> tuple[Any, Any]:
+        """Parameters at the ends of the profile; (0, 0) where it goes on beyond its points."""
+        return (0.0, 0.0) if self.closed or self.beyond == "line" else (0.0, _chords(n.points, False)[-1])
+
+    @staticmethod
+    def ended(at: float, first: float, last: float, near: float = GRACE) -> bool:
+        """Whether a parameter is beyond the ends, or nearer to them than ``-near`` times their distance."""
+        return max(first - at, at - last) > near * (last - first)
+
+    def end_message(self, n: SimpleNamespace, at: float) -> str:
+        """What to say where the follower has come to an end of the profile, near this parameter; else nothing."""
+        first, last = (x.real for x in self.extent(n))
+        if not last > first or not self.ended(at, first, last, -NEAR):
+            return ""
+        k = 0 if at < 0.5 * (first + last) else -1
+        return (
+            f"the follower of {self.title} is at an end of the profile, point {k % len(n.points)} at "
+            f"{_written(n.points[k])}, and there is none beyond; {REMEDY}"
+        )
 
     def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[Any, float, Any]:
         """Parameter of the point of the profile nearest to M, the side that M is on (+1, -1), and its distance."""
@@ -132,6 +169,10 @@ class Cam(Joint):
         return _splines(n.points, self.closed)
 
 
+def _written(point: tuple) -> str:
+    return f"({', '.join(f'{x.real:g}' for x in point)}) m"
+
+
 def _closing(points: tuple, closed: bool) -> np.ndarray:
     p = np.array(points)
     return np.vstack([p, p[:1]]) if closed else p
@@ -146,7 +187,7 @@ def _chords(points: tuple, closed: bool) -> np.ndarray:
 @lru_cache(maxsize=64)
 def _splines(points: tuple, closed: bool) -> tuple[list[float], list[float]]:
     s = tuple(_chords(points, closed).tolist())
-    beyond: Any = "repeat" if closed else "line"
+    beyond: Any = "repeat" if closed else "line"  # the row refuses what is beyond; the search may pass there
     if np.iscomplexobj(s):
         real = _splines(tuple(tuple(x.real for x in p) for p in points), closed)
         at, columns = np.array(s), _closing(points, closed).T

@@ -38,5 +38,6 @@ class Cylindrical(Joint):
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "cylindrical"
+    one_surface: ClassVar[bool] = True
     replaceable: ClassVar[bool] = True
     stand_in: ClassVar[float] = 1.0

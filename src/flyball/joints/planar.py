@@ -40,4 +40,5 @@ class Planar(Joint):
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "planar"
+    one_surface: ClassVar[bool] = True
     replaceable: ClassVar[bool] = True

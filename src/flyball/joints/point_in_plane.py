@@ -32,4 +32,5 @@ class PointInPlane(Joint):
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "point_in_plane"
+    one_surface: ClassVar[bool] = True
     stand_in: ClassVar[float] = 2.2

@@ -47,6 +47,7 @@ class Screw(Joint):
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "screw"
+    thread: ClassVar[bool] = True
     replaceable: ClassVar[bool] = True
 
     def check(self, n: SimpleNamespace) -> None:

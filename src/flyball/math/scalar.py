@@ -177,6 +177,13 @@ def choose(x, a, b):
     return _on_expressions("choose", x, a, b)
 
 
+def unless_zero(x, a, b):
+    """A where the real part of x is not zero, else b; both are computed. Of an expression, not zero is granted."""
+    if _has_array(x):
+        return _on_array(unless_zero, lambda x, a, b: np.where(np.real(x) != 0, a, b), x, a, b)
+    return a if nonzero(x) else b
+
+
 def magnitude(x):
     """|Re x|: sizes decide when to stop, they carry no derivative."""
     return x.apply("absolute", x) if hasattr(x, "apply") else x.real if x.real > 0.0 else -x.real
@@ -360,6 +367,10 @@ def _register() -> None:
     @overload(choose, jit_options=INSIDE)
     def choose_choose(x, a, b):
         return lambda x, a, b: a if x.real > 0 else b
+
+    @overload(unless_zero, jit_options=INSIDE)
+    def choose_unless_zero(x, a, b):
+        return lambda x, a, b: a if x.real != 0.0 else b
 
     def least(a, b):
         return a if a.real <= b.real or a != a else b

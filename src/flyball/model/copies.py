@@ -99,6 +99,8 @@ def changed(model: Model, parts: Mapping[str, Element | None]) -> Any:
             setattr(out, category, [e for e in kept if e is not None])
     left = {name: parts.get(name, e) for name, e in model.by_name.items()}
     out.by_name = {name: e for name, e in left.items() if e is not None}
+    out.forces = [e.bound(out) for e in out.forces]
+    out.by_name |= {e.name: e for e in out.forces}
     return out
 
 

@@ -239,6 +239,10 @@ class Element:
     def check(self, n: SimpleNamespace) -> None:
         """Refuse numbers that make no sense; ``n`` holds the resolved fields."""
 
+    def bound(self, model: Any) -> Element:
+        """This element as it is in a model whose other elements decide what it means; mostly itself."""
+        return self
+
     def acts(self) -> bool:
         """Whether its formula says what it does; if not, it is a row that holds at times (`switches`) and no more."""
         return True

@@ -60,6 +60,10 @@ class Force(Element):
         """Whether its energy is all that it ever takes or gives."""
         return False
 
+    def needs(self) -> str:
+        """Element whose numbers its own depend on too, which then are ``n.of``; none if empty."""
+        return ""
+
     def on_points(self) -> bool:
         """Whether it sees of its frames no more than where their origins are, and makes no torque about them."""
         return False

@@ -79,6 +79,8 @@ class Joint(Element):
     stand_in: ClassVar[float] = 0.0  # what it costs to put it in such a place; 0: it is never proposed
     omission: ClassVar[float] = 3.5  # what it costs to leave it out
     called: ClassVar[str] = ""  # by proposals, if not by its kind
+    one_surface: ClassVar[bool] = False  # whether its coordinates are slips of one and the same surface
+    thread: ClassVar[bool] = False  # whether its surface is a thread, along which all its coordinates slide together
 
     def ends(self) -> dict[str, str]:
         """Role of each of its frames -> body or frame that it is on."""

@@ -223,6 +223,7 @@ class Model:
                     f"condition, part of ground, material, contact, limit, controller or event"
                 )
             check_name(self, e)
+            e = e.bound(self)
             check_references(self, e)
             self.validate(e, self.environment())
             getattr(self, e.category).append(e)
@@ -243,11 +244,14 @@ class Model:
         old = self[e.name]
         if old.category != e.category:
             raise ModelError(f"{e.title} cannot take the place of {old.title}")
+        e = e.bound(self)
         check_references(self, e)
         self.validate(e, self.environment())
         parts = getattr(self, e.category)
         parts[parts.index(old)] = e
         self.by_name[e.name] = e
+        for force in [f for f in self.forces if f.bound(self) is not f]:
+            self.replace(force)
         return e
 
     def body(self, name: str, e: Element) -> Body:

@@ -127,7 +127,7 @@ def _acts(s: Structure, e: Force) -> bool:
 
 def _axis_frame(s: Structure, e: CoordinateForce) -> int:
     """The frame whose z is the axis of the coordinate that a force acts along."""
-    joint, what = s.model.coordinate(e.coordinate_text(), e)
+    joint, what = s.model.coordinate(e.along()[0], e)
     return coordinate_frames(s, joint, what)[0]
 
 

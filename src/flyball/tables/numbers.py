@@ -93,7 +93,7 @@ def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
     named = model.kept.get("named", None, 1, lambda: _named(model))
     other = {k for k, x in env.items() if not _same(x, first.env[k])}
     changed = [e for e in model.elements() if e.name in named and not other.isdisjoint(named[e.name])]
-    of = {**first.of, **{e.name: _checked(e, env) for e in changed}}
+    of = _linked(model, {**first.of, **{e.name: _checked(e, env) for e in changed}})
     bodies = {
         **first.bodies,
         **{e.name: _body(e, of[e.name], env, model.planar) for e in changed if isinstance(e, Body)},
@@ -104,11 +104,19 @@ def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
 
 
 def _all(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
-    of = {e.name: _checked(e, env) for e in model.elements()}
+    of = _linked(model, {e.name: _checked(e, env) for e in model.elements()})
     bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
     for b in model.bodies:
         bodies[b.name] = _body(b, of[b.name], env, model.planar)
     return Numbers(env, of, bodies, key, {}, Kept())
+
+
+def _linked(model: Model, of: dict[str, SimpleNamespace]) -> dict[str, SimpleNamespace]:
+    """The same, with the numbers of another element for the forces that depend on them."""
+    for e in model.forces:
+        if name := e.needs():
+            of[e.name] = SimpleNamespace(**{**vars(of[e.name]), "of": of[name]})
+    return of
 
 
 def _checked(e: Element, env: Mapping[str, Any]) -> SimpleNamespace:
@@ -127,6 +135,9 @@ def _same(a: Any, b: Any) -> bool:
 def _named(model: Model) -> dict[str, frozenset[str]]:
     """Element -> parameters that its numbers may depend on: all that some text in it names."""
     found = {e.name: frozenset(words(e)) & model.parameters.keys() for e in model.elements()}
+    for e in model.forces:
+        if name := e.needs():
+            found[e.name] |= found[name]
     return {name: frozenset(used) for name, used in found.items() if used}
 
 

@@ -85,7 +85,7 @@ def reason(
     found = fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
     if found is not None:
         return f"{name!r}: just after t = {t:.6g} s, {found.message}{after}", found.exception
-    text = of_drivers(a, clock) or _not_finite(a, clock, method)
+    text = of_drivers(a, clock) or _ended(a, clock) or _not_finite(a, clock, method)
     if not text and (text := _jammed(a, clock)):
         return f"{name!r}: {text}{after}", Unresolved(text, t=t)
     text = text or boundless(a, clock, _component) or _broken(a, clock) or escaping(a, clock, _component)
@@ -213,6 +213,18 @@ def _not_finite(a: Assembly, clock: ex.Clock, method: str) -> str:
         f"the equations of motion are not finite just after t = {t:.6g} s, first at "
         f"{_component(a, int(np.argmax(wrong)))}. Look for a law that divides by zero or leaves its range"
     )
+
+
+def _ended(a: Assembly, clock: ex.Clock) -> str:
+    """A curve at whose end its follower has come; else nothing."""
+    s, numbers = a.compiled.structure, a.compiled.values.numbers
+    for joint in s.model.joints:
+        at = s.state_at.get(f"{joint.name}.place")
+        if at is None or not math.isfinite(place := float(clock.y[0][s.nq + s.nv + at])):
+            continue
+        if text := joint.end_message(numbers[joint.name], place):  # type: ignore[attr-defined]
+            return f"at t = {float(clock.real[ex.T]):.6g} s {text}"
+    return ""
 
 
 def _held_on(a: Assembly) -> list[str]:

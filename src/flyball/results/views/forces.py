@@ -12,8 +12,8 @@ from ...errors import AnalysisError
 from ...laws.call import STACK_RESERVE
 from ...laws.evaluation import evaluate
 from ...laws.over_time import over_time, takes_arrays
-from ...math.scalar import sign
-from ...math.vec import dot, sub
+from ...math.scalar import divide, sign, unless_zero
+from ...math.vec import dot, norm, sub
 from ...model.force import CoordinateForce, JointForce
 from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD, SPARE
 from ..booked import basis
@@ -231,7 +231,8 @@ class ForceView(View):
         if k < 2:
             return inputs[k]
         F, M, _ = self._frames
-        return -dot(force, sub(M[0], F[0])) / inputs[0]
+        along = divide(-dot(force, sub(M[0], F[0])), inputs[0])
+        return unless_zero(inputs[0], along, norm(force))  # a damper between coinciding points: c times its rate
 
     def channels(self) -> Curves:
         """Its outputs; for others, the components of force and torque that are not zero all the time."""
