@@ -67,6 +67,9 @@ class Stepped:
             P.size[0] = n = len(found)
             for c, (a, b, point, normal, gap, mu) in enumerate(found):
                 P.at[c], P.frame[c], P.mu[c], P.bias[c] = (a, b), frame(normal), mu, (max(gap, 0.0) / h, 0.0, 0.0)
+                P.arm[c] = np.r_[
+                    [np.subtract(point, self.M.pose[k, :3]) if k >= 0 else np.zeros(3) for k in (a, b)]
+                ].ravel()
                 self.C.x[c, POINT : POINT + 3], self.C.x[c, NORMAL : NORMAL + 3], self.C.x[c, GAP] = point, normal, gap
             X.p[:] = Y.p[:] = 0.0
             X.line[:] = 0.0

@@ -36,7 +36,8 @@ def test_an_impact_by_hertz() -> None:
         assert R - run["ball"].z.min() == pytest.approx(deepest, rel=1e-4)
         assert np.abs(run.energy.balance).max() < 1e-10
         assert run.energy.contact_elastic.max() == pytest.approx(0.5, rel=1e-2)
-        assert run.energy.impact_loss[-1] == pytest.approx(-errors[-1], abs=1e-8)
+        assert run.energy.numerical_loss[-1] == pytest.approx(-errors[-1], abs=1e-8)
+        assert not run.energy.impact_loss.any()
     assert abs(errors[0]) < 1e-4 and abs(errors[1]) < 0.25 * abs(errors[0])
     # it has left when the height is R again: interpolated, as it flies freely then
     left = run.t[-1] - (run["ball"].z[-1] - R) / run["ball"].vz[-1]
@@ -56,7 +57,9 @@ def test_hunt_and_crossley_lose_what_their_law_says() -> None:
         e = run["ball"].vz[-1]
         assert side(-e, c) == pytest.approx(side(1.0, c), rel=1e-4)
         assert np.abs(run.energy.balance).max() < 1e-12
-        assert run.energy.impact_loss[-1] == pytest.approx(0.5 * (1 - e * e), rel=1e-9)
+        lost = run.energy.impact_loss[-1] + run.energy.numerical_loss[-1]
+        assert lost == pytest.approx(0.5 * (1 - e * e), rel=1e-9)
+        assert abs(run.energy.numerical_loss[-1]) < 1e-3 * lost
         if c == 0.01:
             assert e == pytest.approx(1 - 2 / 3 * c, abs=1e-4)
 

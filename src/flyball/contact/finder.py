@@ -170,6 +170,8 @@ class Finder:
     ----------
     now, before : Contacts
         Contacts of the last search and of the one before it.
+    midway : Contacts
+        As large; of searches between two of these.
     search : Search
     address : int
         Of the door. A compiled loop calls ``enter(address, held(geometry), held(movers), held(before), held(now),
@@ -181,7 +183,7 @@ class Finder:
     def __init__(self, geometry: Geometry, *, margin: float = 0.0, ahead: float = 0.0, skin: float = THICK) -> None:
         ns = len(geometry.shape_i)
         self.geometry = geometry
-        self.now, self.before = no_contacts(4 * ns + 64), no_contacts(4 * ns + 64)
+        self.now, self.before, self.midway = (no_contacts(4 * ns + 64) for _ in range(3))
         self.search = search_room(geometry, 8 * ns + 64, 4 * ns + 64)
         self.search.real[[MARGIN, SKIN, AHEAD]] = margin, skin, ahead
         self.address = self._door()
@@ -243,6 +245,7 @@ class Finder:
         if status == FULL_CONTACTS:
             capacity = int(1.5 * count[FOUND]) + 64
             self.now, self.before = _more_contacts(self.now, capacity), _more_contacts(self.before, capacity)
+            self.midway = no_contacts(capacity)
             self.search = self.search._replace(**_hashing(capacity))
         elif status == FULL_PAIRS:
             self._more_pairs()

@@ -149,7 +149,8 @@ def switching(model: Model) -> bool:
 
 def _of_energy(touching: bool, switches: bool) -> Table:
     listed = ["kinetic", "potential", "total", "balance"]
-    listed += ["friction_loss", "impact_loss", "surface_work", "contact_elastic"] if touching else []
+    losses = ["friction_loss", "impact_loss", "numerical_loss"]
+    listed += [*losses, "surface_work", "contact_elastic"] if touching else []
     listed += ["impact_loss"] if switches and not touching else []
     listed += ["event_work"] if switches else []
     return {k: Quantity("J", curve=k in listed, array=True) for k in (*listed, "gravity", "elastic")}

@@ -11,7 +11,7 @@ from ..tables.system import SPARE
 
 GIVEN = "event_work"
 """Energy that events gave: by kicks, and by changes of parameters that energy depends on."""
-ADDED = ("friction_loss", "impact_loss", "surface_work", GIVEN)
+ADDED = ("friction_loss", "impact_loss", "surface_work", "numerical_loss", GIVEN)
 """Energies in `Result.exchanged` that count on from one motion to the next."""
 ALL = ""
 

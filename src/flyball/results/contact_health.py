@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+PASSED = 0.5  # overlap, over the size of the smallest body, from which on bodies are pushed out on the other side
+
 
 @dataclass(frozen=True)
 class ContactHealth:
@@ -35,8 +37,9 @@ class ContactHealth:
         Time of the largest residual.
     size : float [m]
         Of the smallest body that touches, which overlaps are compared with.
-    halved, reduced, impacted : int
-        Steps that were taken in shorter ones; impacts that gave back less than their law says, of how many.
+    halved, reduced, impacted, endless : int
+        Steps that were taken in shorter ones; impacts that gave back less than their law says, of how many; steps in
+        which impacts followed one another without end.
     notes : tuple of str
         What else has to be said: a law of impacts that was softened, a position without unique forces (Painleve).
     """
@@ -58,6 +61,7 @@ class ContactHealth:
     halved: int = 0
     reduced: int = 0
     impacted: int = 0
+    endless: int = 0
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
@@ -72,6 +76,23 @@ class ContactHealth:
             left = f", {self.unconverged} not converged" if self.unconverged else ""
             out.append(("contact solves", f"{self.solves}, {self.iterations / self.solves:.3g} iterations each{left}"))
         return out
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Reasons to think that the motion is wrong."""
+        out = []
+        if self.endless:
+            out.append(
+                f"in {self.endless} of {self.solves} steps impacts followed one another without end: shorter steps, "
+                f"method=fb.Stepping(step=...), leave fewer of them to each"
+            )
+        if self.size > 0.0 and self.worst_overlap > max(PASSED * self.size, 1.01 * self.overlap_at_start):
+            out.append(
+                f"bodies overlap by up to {self.worst_overlap:.2g} m, more than half of the smallest body "
+                f"({self.size:.2g} m), and may have passed through each other: take shorter steps, "
+                f"method=fb.Stepping(step=...)"
+            )
+        return tuple(out)
 
     def warnings(self) -> tuple[str, ...]:
         """Reasons to look at the motion twice."""

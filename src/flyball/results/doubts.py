@@ -28,6 +28,7 @@ FEW, EACH = (
 FINE = 3e-2  # times the root of rtol, the same where rtol is so small that a digit more or less is no matter
 MOST, ROUGH = 1e-2, 5.0  # part of the energy moved that no number of steps excuses, or so many times a rough rtol
 ROUGHEST = 2e-2  # part of the energy moved that no tolerance excuses
+SLIGHT = 1e-6  # part of the energy present that the rounding of solves may take where hardly anything moves
 PIECES, ROWS = 64, 4  # stretches that the balance is judged by at most, and rows of output in each at least
 NEARLY = 0.99  # part of what is to be expected from which on a motion among many is looked at by itself
 LOOSE = 1e-5  # rtol above which each of many is
@@ -55,6 +56,23 @@ def doubtful(result: Result) -> tuple[str, ...]:
     """Reasons to think that a motion is not what its tolerance asks for; none for a sound one."""
     balance = _balance(result) or late(whole(result))
     return tuple(text for text in (balance, overturned(result), missed(result), _violation(result)) if text)
+
+
+def of_impulses(result: Result) -> tuple[str, ...]:
+    """The same of a motion by impulse time stepping: what the method itself took or gave, and contacts that failed."""
+    taken = result.energy.exchanged("numerical_loss")
+    lost = float(np.max(np.abs(taken), initial=0.0))
+    own = result.health.contact.doubts if result.health.contact else ()
+    present = np.max(np.abs(result.energy.kinetic) + np.abs(result.energy.potential), initial=0.0)
+    if not lost > max(MOST * energy_moved(result), SLIGHT * float(present)):
+        return own
+    what = "took" if taken[int(np.argmax(np.abs(taken)))] > 0.0 else "gave"
+    text = (
+        f"impulse time stepping itself {what} {lost:.2g} J (energy.numerical_loss), "
+        f"{100.0 * lost / energy_moved(result):.2g} per cent of the energy moved: take shorter steps, "
+        f"method=fb.Stepping(step=...)"
+    )
+    return (text, *own)
 
 
 def balanced(result: Result) -> Any:

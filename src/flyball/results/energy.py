@@ -20,8 +20,11 @@ if TYPE_CHECKING:
     from .result import Result
 
 
-EXCHANGED = {"friction_loss": -1.0, "impact_loss": -1.0, "surface_work": 1.0}
-"""Energies that contacts exchange, and by which sign the bodies have them."""
+EXCHANGED = {"friction_loss": -1.0, "impact_loss": -1.0, "surface_work": 1.0, "numerical_loss": -1.0}
+"""Energies that contacts exchange, and by which sign the bodies have them.
+
+The last is the error of impulse time stepping: what the method itself took.
+"""
 STORED = "contact_elastic"
 """Energy stored in contacts that give way, among what contacts exchange."""
 

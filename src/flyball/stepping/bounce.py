@@ -22,6 +22,7 @@ from ..math.scalar import sqrt
 from ..math.vec import add, dot, load3, put3, scale, sub
 from ..numerics.cone.operator import across, seen, seen_turning
 from ..numerics.cone.problem import ENOUGH, MOST, NONE
+from .motion import no_impact
 from .penalty import stiffness
 from .sequence import one_after_the_other
 from .tables import (
@@ -30,7 +31,6 @@ from .tables import (
     ENOUGH_V,
     FLAT,
     GIVEN,
-    GRAVITY,
     HIT,
     IMPACTS,
     KICK,
@@ -42,18 +42,16 @@ from .tables import (
     POISSON,
     REDUCED,
     SEQUENTIAL,
-    SLOWEST,
     STEP,
     SWEEPS,
     TURNED_BEFORE,
     YIELDING,
 )
 
-ROUNDS = 100  # of impacts in one step, after which what still closes comes to rest against what it meets
+ROUNDS = 1000  # of impacts in one step, after which what still closes comes to rest against what it meets
 NEAR = 1e3  # gaps up to so many times what is none are hit at once
 LESS = 1.0 - 1e-6  # part of an expansion below which it is told that it was reduced
 MORE = 4  # times as many iterations as for velocities that are warm started
-SHARE = 2.0  # times the speed that gravity makes in a step: what is slower rests
 
 
 @formula
@@ -146,8 +144,7 @@ def copy_velocities(X, E):
 def hits(G, C, at, bias, R, X, L, pace, now):
     """Whether there are impacts; biases of the contacts that are hit, and their velocities before in ``now``."""
     h = pace.real[STEP]
-    g0, g1, g2 = pace.real[GRAVITY], pace.real[GRAVITY + 1], pace.real[GRAVITY + 2]
-    slowest = max(pace.real[SLOWEST], SHARE * h * sqrt(g0 * g0 + g1 * g1 + g2 * g2))
+    slowest = no_impact(pace, h)
     found = False
     law = pace.count[LAW]
     for c in range(C.count[FOUND]):
@@ -258,13 +255,15 @@ def close(R, bias, Z, X, C, pace, now):
     """Impulses of the impacts, and what was lost in them."""
     for c in range(C.count[FOUND]):
         u = seen(R, X.v, X.wide, c)
+        worn = -power_of_turning(R, Z, X, c, now)
         for i in range(3):
             mean = 0.5 * (u[i] + now[c, BEFORE_KICK + i])
             if i == 0:
                 pace.real[LOST_IMPACT] -= Z.p[c, 0] * mean
             else:  # of a surface that moves the bias is its own motion
-                pace.real[LOST_FRICTION] -= Z.p[c, i] * (mean + bias[c, i])
+                worn -= Z.p[c, i] * (mean + bias[c, i])
                 pace.real[GIVEN] -= Z.p[c, i] * bias[c, i]
-        pace.real[LOST_FRICTION] -= power_of_turning(R, Z, X, c, now)
+        # the mean of an impact in which the slip reverses: friction gives no energy, the impact's sum is exact
+        pace.real[LOST_FRICTION if worn >= 0.0 else LOST_IMPACT] += worn
         put3(now, c, KICK, add(load3(now, c, KICK), across(R, c, Z.p[c, 0], Z.p[c, 1], Z.p[c, 2])))
     pace.count[IMPACTS] += 1

@@ -1,14 +1,13 @@
 """Rows of the contacts and lines of the mechanism, and what an impulse along them changes all of a group by.
 
-At half the step a contact acts where it is seen from the body: it goes along with it. What a row's impulse changes is
+A contact acts where ``P.arm`` has it from the body. What a row's impulse changes is
 one solve with the factor of the joints; groups know nothing of each other, so that one solve answers a row of each.
 """
 
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..contact.tables import POINT
-from ..math.vec import add, load3, sub
+from ..math.vec import add, load3
 from ..numerics.cone.problem import NONE
 from .implicit import climb, respond, stiffened
 from .joined import FIRST, IMPULSE, JOB_AT, JOB_NEXT, JOB_ROWS, JOBS, LINE_AT, LINE_GROUP, NEEDED, NO_ROOM, STRUCK
@@ -56,7 +55,7 @@ def contact_rows(A, M, C, P):
                 used += rows * n
                 queue(A, g, jobs, at, rows)
                 jobs += 1
-            point = add(load3(A.W.BK, b, 0), sub(load3(C.x, c, POINT), load3(M.pose, mover, 0)))
+            point = add(load3(A.W.BK, b, 0), load3(P.arm, c, 3 * side))
             side_rows(A, P, c, (b, at - A.group[g], n), point, rows)
             P.block[c, side], P.at[c, side] = at, -2 - g
             last = g

@@ -21,12 +21,12 @@ from ..tables.system import System, Work
 # impulses, from those before the step in State.wide (movers' twists follow); those put there; rows of contacts into the
 # problem; velocities found taken from State.wide, and put there as joints allow; the mean velocities put there, lines
 # being made those of the second solve; the way gone with these and others beside them in State.wide; velocities at its
-# end put there. Besides, impacts over before the step whose impulses stand in a state
-START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES, KICKED = range(9)
-# entries of Joined.real: time and step; energy lost at stops and by what impacts do to joints; by how far (< 0) a stop
+# end put there. Besides, impacts over before the step whose impulses stand in a state; poses as last evaluated
+START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES, KICKED, POSES = range(10)
+# entries of Joined.real: time and step; energy lost at stops; by how far (< 0) a stop
 # would be overrun; gravity's potential energy, and its work over the step at the mean velocities; kinetic energy before
-# the mechanism was put onto its joints, -1 where nothing is hit
-TIME, STEP, LOST, OVERRUN, POTENTIAL, WEIGHED, KINETIC = range(7)
+# the mechanism was put onto its joints, -1 where nothing is hit; energy that the method takes at joints
+TIME, STEP, LOST, OVERRUN, POTENTIAL, WEIGHED, KINETIC, ASTRAY = range(8)
 # entries of Joined.count: the first mover that is of the mechanism; springs taken implicitly; evaluations so far,
 # steps whose velocities did not settle; numbers that J and Y, and rows that ``job`` must hold; whether a step has
 # begun, and whether it is to be taken with velocities that did not settle
@@ -50,8 +50,9 @@ FRICTION, STOP, ROPE = range(3)
 LEAST, MOST_AT, REBOUND, ROPE_K, ROPE_C, SHORTEST, PRESSED, PULLED = range(8)
 # columns of Joined.active: line of the step, + 1 and negative for an upper stop; its group; where its row begins
 LINE_OF, LINE_GROUP, LINE_AT = range(3)
-# what ROWS may return; what the loop says where the engine has a status; velocities that do not settle
-NO_ROOM, NO_WAY, NOT_SETTLED = 100, 101, 102
+# what ROWS may return; what the loop says where the engine has a status; velocities that do not settle;
+# a step in which contacts that give way are not resolved
+NO_ROOM, NO_WAY, NOT_SETTLED, TOO_LONG = 100, 101, 102, 103
 
 
 class Joined(NamedTuple):

@@ -39,6 +39,7 @@ from .joined import (
     KICKED,
     KINETIC,
     MEAN,
+    POSES,
     ROWS,
     SMOOTH,
     SPRING_OF,
@@ -86,6 +87,9 @@ def ask(A, M, C, P, X, task):
         return 0
     if task == FINISH:
         return finish(A, M, X)
+    if task == POSES:
+        show(A, M, True)
+        return 0
     if task == KICKED:
         for d in range(A.wide.shape[1]):
             A.wide[IMPULSE, d] = 0.0

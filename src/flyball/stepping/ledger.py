@@ -1,8 +1,9 @@
-"""Where energy goes in impacts of the mechanism beside contacts: stops, reactions of joints, the end of the step.
+"""Where energy goes in impacts of the mechanism beside contacts: reactions of joints, the end of the step.
 
 Impulses are found where joints are at half the step, and bodies are then put onto them at its end: velocities by the
 nearest ones there are, measured by the masses, which takes energy and never gives any; positions likewise, by lifts
-and weights moved. All this is of the order of the step, is there only where something is hit, and is the impact's part.
+and weights moved. All this is of the order of the step, and is there only where something is hit or touches; impacts
+themselves take nothing at joints, so that it is the method's.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from ..compiler.jit import formula
 from ..equations.rows import row_times
 from ..math.vec import dot, load3, load9, mtv, mv
 from ..tables.system import INERTIA, MASS, NU
-from .joined import KINETIC, LOST, POTENTIAL, WEIGHED
+from .joined import ASTRAY, KINETIC, POTENTIAL, WEIGHED
 
 
 @formula
@@ -36,9 +37,9 @@ def weighed(A, column):
 
 @formula
 def reactions_work(A, lam, v):
-    """Work of joints' impulses of impacts at velocities v, beyond that of what is prescribed: a loss."""
+    """Work of joints' impulses of impacts at velocities v, beyond that of what is prescribed."""
     for r in range(A.S.row_i.shape[0]):
-        A.real[LOST] -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.row[NU, r])
+        A.real[ASTRAY] -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.row[NU, r])
 
 
 @formula
@@ -52,5 +53,5 @@ def settle_account(A):
     """At the end of the step, where something was hit: what putting onto the joints took."""
     now = -weighed(A, 0)
     if A.real[KINETIC] >= 0.0:
-        A.real[LOST] += A.real[KINETIC] - kinetic(A) - (now - A.real[POTENTIAL]) - A.real[WEIGHED]
+        A.real[ASTRAY] += A.real[KINETIC] - kinetic(A) - (now - A.real[POTENTIAL]) - A.real[WEIGHED]
     A.real[POTENTIAL] = now

@@ -5,35 +5,60 @@ from __future__ import annotations
 from ..compiler.door import enter
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
-from ..contact.tables import AHEAD, DONE, FOUND, GAP
+from ..contact.broad.search import FASTER, MIDWAY
+from ..contact.broad.search import STEP as STEP_ON
+from ..contact.tables import AHEAD, BEFORE, DONE, FOUND, GAP, NUMBER
 from ..numerics.cone.operator import seen
 from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
 from .bounce import ROUNDS, bounce, no_kicks
-from .joined import BEGIN, FINISH, FREE, KEEP, KICKED, LOST, MEAN, NO_ROOM, NO_WAY, OVERRUN, ROWS, V_BEFORE
+from .joined import (
+    ASTRAY,
+    BEGIN,
+    FINISH,
+    FIRST,
+    FREE,
+    KEEP,
+    KICKED,
+    LOST,
+    MEAN,
+    NO_ROOM,
+    NO_WAY,
+    OVERRUN,
+    POSES,
+    ROWS,
+    TOO_LONG,
+    V_BEFORE,
+)
 from .joined import STEP as JOINTS_STEP
 from .joined import TIME as JOINTS_TIME
 from .joined import VELOCITIES as VELOCITIES_AFTER
 from .lifts import PASSES as AGAIN
 from .lifts import sunk
 from .motion import begin, displace, fall, halfway, rest
+from .onward import begin_contacts, half_on, keep_start, lead, middle_rows, put_back_poses
 from .penalty import FEW, PASSES, aim, find_yielding, linearise, put_back, settled, start_rows, store
 from .record import book, book_turning
-from .rows import fill_rows, onward, static_where_stuck, warm
+from .rows import fill_rows, sides, static_where_stuck, warm
 from .tables import (
     CUTS,
+    ENDLESS,
     ENOUGH_V,
     ENOUGH_X,
     FIRST_OVERLAP,
     FLAT,
     GIVEN,
+    HIT,
+    IMPACTS,
     ITERATIONS,
     JOINTS,
+    KICK,
     LAST_STEP,
     LEFT,
     LIFTS,
     LOST_FRICTION,
     LOST_IMPACT,
     MOST_CONTACTS,
+    NUMERICAL,
     POSITIONS,
     ROUGH,
     SEARCHING,
@@ -49,8 +74,6 @@ from .tables import (
     WORST_RESIDUAL,
     YIELDING,
 )
-
-STEP_ON = 0  # the task of a search: go on from the pairs that are known
 
 
 @formula
@@ -80,14 +103,17 @@ def without_contact(A, M, C, P, X, N, pace):
 
 @formula
 def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
-    """Velocities at the end of the step: the cone problem, and its residual into the sums."""
+    """Velocities at the end of the step: the cone problem, and its residual into the sums.
+
+    Returns DONE, or TOO_LONG for contacts that give way, before anything is solved.
+    """
     warm(C, P, X, now, before)
     static_where_stuck(G, C, P, L, X, pace, now)
     yielding = pace.count[YIELDING] != 0 and find_yielding(G, C, P, L, X, pace, now, before)
     begin(N, M, X)
     held_by_joints(A, M, C, P, X, pace, BEGIN)
-    if yielding:
-        start_rows(G, C, P, L, X, pace, now)
+    if yielding and start_rows(G, C, P, L, X, pace, now, before):
+        return TOO_LONG
     ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
     for n in range(PASSES if yielding else 0):
         if settled(linearise(G, C, P, L, X, pace, now), O.real[RESIDUAL], pace) or (ended != CONVERGED and n == FEW):
@@ -102,6 +128,7 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
         pace.real[WORST_AT] = pace.real[TIME] + pace.real[STEP]
     pace.real[WORST_FORCE] = max(pace.real[WORST_FORCE], O.real[FORCE_RESIDUAL])
     held_by_joints(A, M, C, P, X, pace, KEEP)
+    return DONE
 
 
 @formula
@@ -136,7 +163,7 @@ def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
         Q.size[0] = C.count[FOUND]
         solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
     if pace.count[YIELDING] != 0:
-        store(G, C, P, L, Y, pace, now)
+        store(G, C, P, L, X, Y, pace, now)
 
 
 @formula
@@ -156,8 +183,9 @@ def onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace):
 
 @formula
 def ledger(A, pace):
-    """Energies that contacts, and stops and joints in impacts, exchanged so far."""
-    return pace.real[LOST_IMPACT], pace.real[LOST_FRICTION], pace.real[GIVEN], A.real[LOST]
+    """Energies that contacts, stops and joints exchanged so far, and those that the method took."""
+    real = pace.real
+    return real[LOST_IMPACT], real[LOST_FRICTION], real[GIVEN], real[NUMERICAL], A.real[LOST], A.real[ASTRAY]
 
 
 @formula
@@ -168,12 +196,101 @@ def back(N, A, X, pace, sums):
             X.v[k, i] = N.before[k, i]
     for d in range(X.wide.shape[0]):
         X.wide[d] = A.wide[V_BEFORE, d]
-    pace.real[LOST_IMPACT], pace.real[LOST_FRICTION], pace.real[GIVEN], A.real[LOST] = sums
+    real = pace.real
+    real[LOST_IMPACT], real[LOST_FRICTION], real[GIVEN], real[NUMERICAL], A.real[LOST], A.real[ASTRAY] = sums
 
 
 @formula
-def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
-    """One step of time; where a table is full, or there is NO_WAY, nothing is changed but by impacts."""
+def search_again(G, M, C, H, B, Z, pace, now):
+    """Contacts with the velocities after impacts, which may meet what nothing moved towards before. Returns a status.
+
+    What was hit, and is none any more, stays to be told of; impulses of impacts stay with their contacts.
+    """
+    status, most = enter(pace.door[SEARCHING], G, M, H, C, B, FASTER), H.at.shape[0]
+    n = H.count[FOUND]
+    if status != DONE:
+        C.count[FOUND] = n
+        return status
+    C.count[NUMBER] = H.count[NUMBER]
+    for k in range(n):
+        o = H.at[k, BEFORE]
+        for i in range(3):
+            Z.p[k, i] = now[o, KICK + i] if o >= 0 else 0.0
+        if o >= 0:
+            now[o, HIT] = -1.0
+            H.at[k, BEFORE] = C.at[o, BEFORE]
+    for o in range(C.count[FOUND]):
+        hit = now[o, KICK] != 0.0 or now[o, KICK + 1] != 0.0 or now[o, KICK + 2] != 0.0
+        if hit and now[o, HIT] >= 0.0 and n < most:
+            for i in range(3):
+                Z.p[n, i] = now[o, KICK + i]
+            copy_contact(C, o, H, n)
+            n += 1
+    for k in range(n):
+        copy_contact(H, k, C, k)
+        for i in range(3):
+            now[k, KICK + i] = Z.p[k, i]
+    C.count[FOUND] = n
+    return DONE
+
+
+@formula
+def copy_contact(C, c, H, k):
+    """Contact c of C becomes contact k of H."""
+    for i in range(C.at.shape[1]):
+        H.at[k, i] = C.at[c, i]
+    for i in range(C.x.shape[1]):
+        H.x[k, i] = C.x[c, i]
+
+
+@formula
+def impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, pace, now):
+    """Impacts until nothing more is hit: what is hit may hit what is near. Returns a status."""
+    no_kicks(C, now)
+    for _ in range(ROUNDS):
+        if not bounce(G, C, P.at, P.bias, R, Z, E, X, W, O, F, L, pace, now):
+            return DONE
+        held_by_joints(A, M, C, P, Z, pace, KICKED)
+        if without_contact(A, M, C, P, X, N, pace) != DONE:
+            return NO_WAY
+        status = search_again(G, M, C, H, B, Z, pace, now)
+        if status != DONE:
+            return status
+        fill_rows(G, M, C, P, L, pace)
+        if held_by_joints(A, M, C, P, X, pace, ROWS) != DONE:
+            return NO_ROOM
+    pace.count[ENDLESS] += 1
+    return DONE
+
+
+@formula
+def onward(G, A, M, C, D, H, B, N, P, X, L, pace, now, before, hit):
+    """Contacts that go on, with their rows in the middle of the step; see ``onward.py``. Returns a status.
+
+    hit: whether there were impacts.
+    """
+    if not begin_contacts(G, M, C, D, N, P, X, L, pace, now, before, (A.count[FIRST], hit)):
+        return DONE
+    half_on(N, M, X, pace.real[STEP])
+    held_by_joints(A, M, C, P, X, pace, POSES)
+    status = enter(pace.door[SEARCHING], G, M, H, C, B, MIDWAY)
+    found = status == DONE and middle_rows(G, M, C, H, P, L, now)
+    put_back_poses(N, M)
+    if status != DONE:
+        C.count[FOUND] = H.count[FOUND]
+        return status
+    if found:
+        for c in range(C.count[FOUND]):
+            P.at[c, 0], P.at[c, 1] = sides(G, C, c)
+        held_by_joints(A, M, C, P, X, pace, ROWS)
+        lead(G, M, C, P, X, now, before)
+    return DONE
+
+
+@formula
+def step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
+    """One step of time; where it cannot be taken, for what is returned, only impacts have changed anything."""
+    keep_start(N, M)
     if without_contact(A, M, C, P, X, N, pace) != DONE:
         return NO_WAY
     B.real[AHEAD] = pace.real[STEP]
@@ -183,22 +300,21 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
     fill_rows(G, M, C, P, L, pace)
     if held_by_joints(A, M, C, P, X, pace, ROWS) != DONE:
         return NO_ROOM
-    no_kicks(C, now)
-    for _ in range(ROUNDS):  # what is hit may hit what is near
-        if not bounce(G, C, P.at, P.bias, R, Z, E, X, W, O, F, L, pace, now):
-            break
-        held_by_joints(A, M, C, P, Z, pace, KICKED)
-        if without_contact(A, M, C, P, X, N, pace) != DONE:
-            return NO_WAY
-        if pace.door[JOINTS] != 0:
-            fill_rows(G, M, C, P, L, pace)
-            held_by_joints(A, M, C, P, X, pace, ROWS)
-    lost, worn, given, stops = ledger(A, pace)
-    onward(G, M, C, D, N, P, L, pace, now)
-    velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before)
+    before_impacts = pace.count[IMPACTS]
+    status = impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, pace, now)
+    if status != DONE:
+        return status
+    sums = ledger(A, pace)
+    status = onward(G, A, M, C, D, H, B, N, P, X, L, pace, now, before, pace.count[IMPACTS] > before_impacts)
+    if status != DONE:
+        return status
+    status = velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before)
+    if status != DONE:
+        back(N, A, X, pace, sums)
+        return status
     positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now)
     if onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace) != DONE:
-        back(N, A, X, pace, (lost, worn, given, stops))
+        back(N, A, X, pace, sums)
         return NO_WAY
     displace(N, M, X, Y.v, pace)
     held_by_joints(A, M, C, P, X, pace, VELOCITIES_AFTER)
@@ -211,22 +327,22 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
 
 
 @formula
-def march(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
+def march(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
     """See `march_kernel`."""
     while pace.count[LEFT] > 0:
         if pace.count[TAKEN] % 2 == 0:
-            status = step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T.kept, U.kept)
+            status = step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T.kept, U.kept)
         else:
-            status = step(G, A, M, D, C, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, U.kept, T.kept)
+            status = step(G, A, M, D, C, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, U.kept, T.kept)
         if status != DONE:
             return status
     return DONE
 
 
 @kernel
-def march_kernel(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
-    """Take ``pace.count[LEFT]`` steps. Returns what the search said last, NO_ROOM, or NO_WAY."""
+def march_kernel(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
+    """Take ``pace.count[LEFT]`` steps. Returns what the search said last, NO_ROOM, NO_WAY, or TOO_LONG."""
     return march(
-        held(G), held(A), held(M), held(C), held(D), held(B), held(P), held(Q), held(R), held(X), held(Y), held(Z),
-        held(E), held(W), held(O), held(F), held(N), held(L), held(pace), held(T), held(U),
+        held(G), held(A), held(M), held(C), held(D), held(H), held(B), held(P), held(Q), held(R), held(X), held(Y),
+        held(Z), held(E), held(W), held(O), held(F), held(N), held(L), held(pace), held(T), held(U),
     )  # fmt: skip

@@ -3,12 +3,38 @@
 from __future__ import annotations
 
 from ..compiler.jit import formula
+from ..math.scalar import sqrt
 from ..math.vec import add, dot, load3, load9, mtv, mv, put3, put9, quaternion_matrix, symmetric
 from ..numerics.cone.operator import block_at
 from .free import inverse_in_world, middle, spun, turned
-from .tables import ANGLE, FREE_INERTIA, FREE_INVERSE, FREE_MASS, FREE_PER_MASS, FREE_ROUND, GRAVITY, LOST_IMPACT, STEP
+from .tables import (
+    ANGLE,
+    FREE_INERTIA,
+    FREE_INVERSE,
+    FREE_MASS,
+    FREE_PER_MASS,
+    FREE_ROUND,
+    GRAVITY,
+    NUMERICAL,
+    SLOWEST,
+    STEP,
+)
 
 EPS = 1e-300
+REST = 2.0  # times the speed that gravity makes in a step: what is slower rests
+
+
+@formula
+def speed_of_fall(pace, h):
+    """Speed that gravity makes in h seconds."""
+    g0, g1, g2 = pace.real[GRAVITY], pace.real[GRAVITY + 1], pace.real[GRAVITY + 2]
+    return h * sqrt(g0 * g0 + g1 * g1 + g2 * g2)
+
+
+@formula
+def no_impact(pace, h):
+    """Speed up to which what closes rests, or comes to rest, and is not hit, in steps of h seconds."""
+    return max(pace.real[SLOWEST], REST * speed_of_fall(pace, h))
 
 
 @formula
@@ -58,13 +84,12 @@ def displace(N, M, X, lifts, pace):
 
     By the velocities at its end, and then by what displaces bodies beside these: x += h v + h d, d = ``N.move`` and
     the velocities of ``lifts``. Turns by v keep energy and angular momentum; d takes the velocities along, so that it
-    changes no energy. What the lifts change the energy of gravity by is an impact's part.
+    changes no energy. What the lifts change the energy of gravity by is the method's.
     """
     h = pace.real[STEP]
     for k in range(N.body.shape[0]):
-        put3(N.past, k, 0, load3(M.pose, k, 0))
         for i in range(3):
-            pace.real[LOST_IMPACT] += h * N.body[k, FREE_MASS] * pace.real[GRAVITY + i] * lifts[k, i]
+            pace.real[NUMERICAL] += h * N.body[k, FREE_MASS] * pace.real[GRAVITY + i] * lifts[k, i]
             M.pose[k, i] += h * (X.v[k, i] + N.move[k, i] + lifts[k, i])
         w, d = load3(X.v, k, 3), add(load3(N.move, k, 3), load3(lifts, k, 3))
         if dot(w, w) + dot(d, d) < EPS:

@@ -48,7 +48,7 @@ def needed(geometry: Geometry, solver: str, small: bool, mechanism: bool) -> Nee
     A = no_mechanism()
     none, long = np.zeros((0, 0)), np.zeros(0, np.int64)
     tail = Free(none, none, none, none, none), Surfaces(np.zeros((0, 0, 0)), none, none), Pace(np.zeros(0), long, long)
-    args = G, A, M, C, C, B, P, P, P, X, X, X, X, W, O, Solvers(F, F, F), *tail, Tracks(none), Tracks(none)
+    args = G, A, M, C, C, C, B, P, P, P, X, X, X, X, W, O, Solvers(F, F, F), *tail, Tracks(none), Tracks(none)
     behind: list[Wanted] = [(joined, (A, M, C, P, X)), (joined_kernel, (0, A, M, C, P, X, 0))]
     rest: list[Wanted] = [*search, *solvers, (march_kernel, args)]
     if not mechanism:

@@ -1,120 +1,211 @@
-"""Contacts half a step on: a contact that was there before goes on as it came.
+"""Contacts that go on: rows in the middle of the step, and velocities that are means over it.
 
-Impulses act along rows at the middle of the step, where the mean velocities do their work; contacts are closed at its
-end. What is seen there differs from what is at the middle by as much as this does from what is at the start: this part
-of the velocities, which are nearly the same, is a bias. So where mass centres are off the middle, where normals turn
-and where corners go round, steps are of second order and need no lifts.
+A contact that pressed in the step before, and neither opens nor is hit, takes no energy if its impulse p acts along the
+row D along which the mean velocity of the step vanishes: its work is p . D (v- + v+) / 2. So D v+ = -D v-, with rows in
+the middle of the step, where bodies are after half of it with the velocities of its start. This is the midpoint rule
+of constraints; what is left of the energy's error is what displacements out of overlaps do, of the second order in the
+step and nearly without a trend.
 
-It is for free bodies and what stands still; the mechanism's rows are at the middle of the step anyway. Impacts are over
-before the step begins, and have the rows of its start.
+The rule returns a velocity that the contact has at the start of the step with the opposite sign, so that what blows and
+solvers leave would never go. It is used where this velocity is less than what the rows change by in half a step, which
+is of a lower order in smooth motion; else what was at the start is left out, and the contact has no velocity at the end
+of the step but for what its rows change by. The same holds along the tangents of what slides or has just come to stick.
 """
 
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..contact.tables import BEFORE, FEATURE, NORMAL, POINT
-from ..math.vec import add, cross, dot, load3, norm, put3, scale, sub
-from .tables import LAST_STEP, STEP
+from ..contact.tables import BEFORE, FEATURE, FOUND, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
+from ..math.scalar import cos, sin
+from ..math.vec import add, cross, dot, load3, load9, mm, norm, put3, put9, quaternion_matrix, scale, sub
+from ..numerics.cone.operator import along, seen
+from .motion import no_impact
+from .penalty import stiffness
+from .rows import arm, sides, tangents
+from .tables import (
+    ENOUGH_V,
+    GOES_ON,
+    KICK,
+    LEAD,
+    MIDDLE,
+    PRESSES,
+    SEEN_FIRST,
+    SLIDES,
+    STEP,
+    WANTED,
+    YIELDING,
+)
 
-NEAR = 0.95  # cosine between normals of a step and the next from which on a contact is none that goes on
-SMOOTH = 0.3  # part of the velocities by which they may change in a step: after a blow all goes elsewhere
-JUMP = 2.0  # times as far as velocities lead: what went further in the step before has jumped
+NEAR = 0.95  # cosine between normals of a step's start and its middle from which on a contact is none that goes on
+SMOOTH = 0.3  # part of the velocities by which rows may change in half a step: a contact that jumps does not go on
+STILL = 1e-9  # change of a normal, or turn of a body, in a step that is none
 STRAIGHT = 1e-10  # part of an arm across the normal that is none: as in balls
 
-ZERO = (0.0, 0.0, 0.0)
-
 
 @formula
-def arm(M, a, point):
-    """From the origin of mover a to a point; 0 for what stands still."""
-    return sub(point, load3(M.pose, a, 0)) if a >= 0 else ZERO
-
-
-@formula
-def turning(M, a, r):
-    """Velocity, beside that of its origin, of the point at r from mover a."""
-    return cross(load3(M.twist, a, 3), r) if a >= 0 else ZERO
-
-
-@formula
-def travelling(M, a):
-    """Velocity of the origin of mover a."""
-    return load3(M.twist, a, 0) if a >= 0 else ZERO
-
-
-@formula
-def across(r, n):
-    """The part of an arm across the normal."""
+def of_side(P, M, G, C, c, side):
+    """Mover of a side of contact c, its arm, and the part of that across the normal, 0 where nothing moves."""
+    a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+    n, r = load3(P.frame, c, 0), load3(P.arm, c, 3 * side)
     s = sub(r, scale(dot(r, n), n))
-    return s if dot(s, s) > STRAIGHT * STRAIGHT * dot(r, r) else ZERO
+    if dot(s, s) <= STRAIGHT * STRAIGHT * dot(r, r):
+        s = (0.0, 0.0, 0.0)
+    return a, r, s
 
 
 @formula
-def further(r, n, before, old, part, on):
-    """An arm that goes on: its length along the normal, and what it has across, each by a part of its change.
+def straight(P, M, G, C, c):
+    """Whether both arms are along the normal."""
+    s, t = of_side(P, M, G, C, c, 0)[2], of_side(P, M, G, C, c, 1)[2]
+    return dot(s, s) + dot(t, t) == 0.0
 
-    ``on``: the normal there. So what is along the normal stays so to rounding.
+
+@formula
+def changes(G, M, C, D, P, c, h):
+    """Whether the rows of contact c change within the step: normals turn, or bodies whose arms are across them."""
+    change = norm(sub(load3(C.x, c, NORMAL), load3(D.x, C.at[c, BEFORE], NORMAL)))
+    for side in range(2):
+        a, _, s = of_side(P, M, G, C, c, side)
+        if a >= 0 and dot(s, s) > 0.0:
+            change += h * norm(load3(M.twist, a, 3))
+    return change > STILL
+
+
+@formula
+def velocity(M, a, r):
+    """Velocity of the point at r from the origin of mover a."""
+    return add(load3(M.twist, a, 0), cross(load3(M.twist, a, 3), r)) if a >= 0 else (0.0, 0.0, 0.0)
+
+
+@formula
+def jumps(M, P, c, movers, arms):
+    """Whether contact c with other arms is elsewhere: where bodies move otherwise by a part of their speeds."""
+    fast, way = 0.0, (0.0, 0.0, 0.0)
+    for side in range(2):
+        a, r = movers[side], load3(P.arm, c, 3 * side)
+        v = velocity(M, a, r)
+        way = add(way, scale(2.0 * side - 1.0, sub(velocity(M, a, arms[side]), v)))
+        fast += norm(v) + (norm(sub(v, load3(M.twist, a, 0))) if a >= 0 else 0.0)
+    return norm(way) > SMOOTH * fast
+
+
+@formula
+def keep_start(N, M):
+    """Keep poses, and twists, which at the start of a step are those of the mechanism's bodies there."""
+    for k in range(M.pose.shape[0]):
+        for i in range(12):
+            N.start[k, i] = M.pose[k, i]
+        for i in range(6):
+            N.start[k, 12 + i] = M.twist[k, i]
+
+
+@formula
+def seen_first(G, C, N, P, X, c):
+    """Relative velocity of contact c at the start of the step, in the world."""
+    u = (0.0, 0.0, 0.0)
+    for side in range(2):
+        a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+        if a >= 0:
+            free = a < N.body.shape[0]
+            v, w = (load3(X.v, a, 0), load3(X.v, a, 3)) if free else (load3(N.start, a, 12), load3(N.start, a, 15))
+            u = add(u, scale(2.0 * side - 1.0, add(v, cross(w, load3(P.arm, c, 3 * side)))))
+    return u
+
+
+@formula
+def was_hit(G, C, now, c, impacts):
+    """Whether contact c was hit before the step, or a mechanism that it is on.
+
+    impacts: first mover of the mechanism, and whether there were any.
     """
-    s, was = across(r, n), across(before, old)
-    along_it = dot(r, n) + part * (dot(r, n) - dot(before, old))
-    return add(scale(along_it, on), add(s, scale(part, sub(s, was))))
+    first, any_ = impacts
+    a, b = sides(G, C, c)
+    kicked = now[c, KICK] != 0.0 or now[c, KICK + 1] != 0.0 or now[c, KICK + 2] != 0.0
+    return kicked or (any_ and max(a, b) >= first)
 
 
 @formula
-def change(M, N, a, r):
-    """By how much the velocity of the point at r from mover a changed in the step before, turning counted apart."""
-    if a < 0:
-        return 0.0
-    spin = sub(load3(M.twist, a, 3), load3(N.before, a, 3))
-    return norm(sub(load3(M.twist, a, 0), load3(N.before, a, 0))) + norm(cross(spin, r))
+def begin_contacts(G, M, C, D, N, P, X, L, pace, now, before, impacts):
+    """Which contacts go on, and the relative velocities at the start. Returns whether rows are wanted in the middle."""
+    h, wanted = pace.real[STEP], False
+    slow = no_impact(pace, h)
+    for c in range(C.count[FOUND]):
+        o, u = C.at[c, BEFORE], seen_first(G, C, N, P, X, c)
+        put3(now, c, LEAD, (0.0, 0.0, 0.0))
+        put3(now, c, SEEN_FIRST, u)
+        now[c, GOES_ON] = 0.0
+        if o < 0 or not before[o, SLIDES] >= 0.0:
+            continue
+        soft = pace.count[YIELDING] != 0 and stiffness(G, C, L, c) > 0.0
+        closing = -dot(load3(C.x, c, NORMAL), u)
+        if soft or closing <= pace.real[ENOUGH_V]:
+            now[c, GOES_ON] = PRESSES
+        if not soft and closing <= slow and not was_hit(G, C, now, c, impacts) and changes(G, M, C, D, P, c, h):
+            now[c, GOES_ON] = WANTED
+            wanted = True
+    return wanted
 
 
 @formula
-def carry_on(M, C, D, N, P, c, pace):
-    """Take the normal and arms of contact c, which are those of the start of the step, half a step on.
-
-    By as much as they changed since the contacts ``D`` of the step before, if it is the same contact: one with the same
-    feature, and where the bodies' velocities, which have not changed much, can have brought it. Returns whether it is.
-    """
-    o, last = C.at[c, BEFORE], pace.real[LAST_STEP]
-    a, b = P.at[c, 0], P.at[c, 1]
-    if o < 0 or last == 0.0 or min(a, b) < -1 or C.at[c, FEATURE] != D.at[o, FEATURE]:
-        return False
-    n, old = load3(C.x, c, NORMAL), load3(D.x, o, NORMAL)
-    if dot(n, old) < NEAR:
-        return False
-    at_a, at_b = load3(P.arm, c, 0), load3(P.arm, c, 3)
-    fast = norm(sub(travelling(M, b), travelling(M, a))) + norm(turning(M, a, at_a)) + norm(turning(M, b, at_b))
-    if change(M, N, a, at_a) + change(M, N, b, at_b) > SMOOTH * fast:
-        return False
-    went = sub(load3(C.x, c, POINT), load3(D.x, o, POINT))
-    from_a = sub(went, sub(load3(M.pose, a, 0), load3(N.past, a, 0))) if a >= 0 else ZERO
-    from_b = sub(went, sub(load3(M.pose, b, 0), load3(N.past, b, 0))) if b >= 0 else ZERO
-    if max(dot(from_a, from_a), dot(from_b, from_b)) > (JUMP * last * fast) ** 2:
-        return False
-    part = 0.5 * pace.real[STEP] / last
-    on = add(n, scale(part, sub(n, old)))
-    on = scale(1.0 / norm(on), on)
-    put3(P.frame, c, 0, on)
-    if a >= 0:
-        put3(P.arm, c, 0, further(at_a, n, sub(at_a, from_a), old, part, on))
-    if b >= 0:
-        put3(P.arm, c, 3, further(at_b, n, sub(at_b, from_b), old, part, on))
-    return True
+def half_on(N, M, X, h):
+    """Free bodies where they are after half the step with the velocities of its start."""
+    for k in range(N.body.shape[0]):
+        w = load3(X.v, k, 3)
+        put3(M.pose, k, 0, add(load3(M.pose, k, 0), scale(0.5 * h, load3(X.v, k, 0))))
+        turn = 0.25 * h * norm(w)
+        if turn > 0.0:
+            e = scale(0.25 * h * sin(turn) / turn, w)
+            put9(M.pose, k, 3, mm(quaternion_matrix(cos(turn), e[0], e[1], e[2]), load9(N.start, k, 3)))
 
 
 @formula
-def lead(M, C, P, c):
-    """What is seen at the end of the step beyond what is at its middle, along the frame of contact c.
+def put_back_poses(N, M):
+    """Poses of the start of the step again."""
+    for k in range(M.pose.shape[0]):
+        for i in range(12):
+            M.pose[k, i] = N.start[k, i]
 
-    Along tangents only where an arm is not along the normal: balls among balls are solved without biases there.
-    """
-    a, b = P.at[c, 0], P.at[c, 1]
-    n, on, point = load3(C.x, c, NORMAL), load3(P.frame, c, 0), load3(C.x, c, POINT)
-    to_a, to_b = load3(P.arm, c, 0), load3(P.arm, c, 3)
-    before = sub(turning(M, b, arm(M, b, point)), turning(M, a, arm(M, a, point)))
-    more = sub(sub(turning(M, b, to_b), turning(M, a, to_a)), before)
-    up = dot(on, more) + dot(sub(on, n), add(before, sub(travelling(M, b), travelling(M, a))))
-    if across(to_a, on) == ZERO and across(to_b, on) == ZERO:
-        return (up, 0.0, 0.0)
-    return (up, dot(load3(P.frame, c, 3), more), dot(load3(P.frame, c, 6), more))
+
+@formula
+def middle_rows(G, M, C, H, P, L, now):
+    """Rows of the contacts that go on, with poses and contacts ``H`` of the middle. Returns whether there are any."""
+    found = False
+    for k in range(H.count[FOUND]):
+        c = H.at[k, BEFORE]
+        if c < 0 or now[c, GOES_ON] != WANTED or C.at[c, FEATURE] != H.at[k, FEATURE]:
+            continue
+        n, point = load3(H.x, k, NORMAL), load3(H.x, k, POINT)
+        a, b = sides(G, C, c)
+        r, s = arm(M, a, point), arm(M, b, point)
+        if dot(n, load3(P.frame, c, 0)) < NEAR or jumps(M, P, c, (a, b), (r, s)):
+            continue
+        if straight(P, M, G, C, c):  # it stays so to rounding
+            r, s = scale(dot(r, n), n), scale(dot(s, n), n)
+        put3(P.frame, c, 0, n)
+        put3(P.arm, c, 0, r)
+        put3(P.arm, c, 3, s)
+        tangents(G, M, C, P, L, c)
+        now[c, GOES_ON] = MIDDLE
+        found = True
+    return found
+
+
+@formula
+def lead(G, M, C, P, X, now, before):
+    """Biases of the contacts whose rows are in the middle; see above."""
+    for c in range(C.count[FOUND]):
+        if now[c, GOES_ON] != MIDDLE:
+            continue
+        u = seen(P, X.v, X.wide, c)
+        first = along(P, c, load3(now, c, SEEN_FIRST))
+        more = sub(u, first)
+        ahead = (u[0] if abs(first[0]) <= abs(more[0]) else more[0], 0.0, 0.0)
+        if not straight(P, M, G, C, c):
+            s, t = more[1], more[2]
+            own = P.bias[c, 1], P.bias[c, 2]
+            a, b = first[1] + own[0], first[2] + own[1]
+            if before[C.at[c, BEFORE], SLIDES] == 0.0 and a * a + b * b <= s * s + t * t:
+                s, t = u[1] + own[0], u[2] + own[1]
+            ahead = (ahead[0], s, t)
+        put3(P.bias, c, 0, add(load3(P.bias, c, 0), ahead))
+        put3(now, c, LEAD, ahead)

@@ -21,11 +21,16 @@ from ..contact.tables import BEFORE, FOUND, GAP, KIND, MATERIAL, PAR, SHAPE_1, S
 from ..math.scalar import sqrt
 from ..numerics.cone.diagonal import diagonal
 from ..numerics.cone.operator import seen
+from .motion import no_impact
 from .tables import (
+    DIVIDES,
     END_GAP,
     ENOUGH_V,
     KEPT,
+    LAST_STEP,
+    LONGEST,
     LOST_IMPACT,
+    NUMERICAL,
     OVERLAP,
     RATE,
     SHARE,
@@ -43,6 +48,7 @@ EXACT = 1e-2  # of the residual that is enough: what the law may differ by from 
 PART = 0.1  # of the residual that is left: the same
 NEAR = 1e-3  # change of the overlap, relative to it, over which a mean force is that in its middle, and a correction
 SOFTEST = 1e6  # times the mobility: compliance of what does not touch
+RESOLVED = 0.01  # h^2 k' / 4 m of a step that resolves an impact: 20 steps of one by Hertz
 
 
 @formula
@@ -135,7 +141,7 @@ def find_yielding(G, C, P, L, X, pace, now, before):
                 gone -= energy(k, law_of(G, C, L, c)[0], before[o, KEPT])
             elif pace.count[TAKEN] > 0:
                 now[c, KEPT] = 0.0
-    pace.real[LOST_IMPACT] += gone
+    pace.real[NUMERICAL] += gone
     if pace.count[TAKEN] == 0:
         pace.real[STORED_FIRST] = 0.0
         for c in range(C.count[FOUND]):
@@ -164,12 +170,23 @@ def begin_with(now, c, k, n, new):
 
 
 @formula
-def start_rows(G, C, P, L, X, pace, now):
+def speed_ahead(C, now, before, c, pace):
+    """Speed of contact c along its normal, and what it may change by in the step: as it did in the one before."""
+    o = C.at[c, BEFORE]
+    change = now[c, RATE] - before[o, RATE] if o >= 0 and before[o, STIFF] > 0.0 else 0.0
+    part = pace.real[STEP] / pace.real[LAST_STEP] if pace.real[LAST_STEP] > 0.0 else 0.0
+    return abs(now[c, RATE]) + part * abs(change)
+
+
+@formula
+def start_rows(G, C, P, L, X, pace, now, before):
     """Choose shares, by how stiff the contacts are, and the first rows; ``X``: velocities without contact.
 
-    Rows are tangent to the law at the overlap that there was, or at that with these velocities.
+    Rows are tangent to the law at the overlap that there was, or at that with these velocities. Returns whether the
+    step is to be divided: too long for an impact.
     """
-    h = pace.real[STEP]
+    h, too_long = pace.real[STEP], False
+    slow = no_impact(pace, pace.real[LONGEST])
     for c in range(C.count[FOUND]):
         k = now[c, STIFF]
         if k > 0.0:
@@ -178,11 +195,13 @@ def start_rows(G, C, P, L, X, pace, now):
             z = max(now[c, OVERLAP], now[c, OVERLAP] - h * u)
             z = 0.25 * h * h * force(k, n, z)[1] * diagonal(P, c)[0]
             s = now[c, SHARE] = z * z / (1.0 + z * z)
+            too_long = too_long or (z > RESOLVED and speed_ahead(C, now, before, c, pace) > slow)
             if pace.count[TAKEN] > 0:
-                pace.real[LOST_IMPACT] -= begin_with(now, c, k, n, C.at[c, BEFORE] < 0)
+                pace.real[NUMERICAL] -= begin_with(now, c, k, n, C.at[c, BEFORE] < 0)
             if now[c, TARGET] > 0.0:
                 u = (now[c, OVERLAP] - now[c, TARGET] - 0.5 * h * (1.0 - s) * now[c, RATE]) / (0.5 * h * (1.0 + s))
             tangent_row(G, C, P, L, pace, now, c, u)
+    return too_long and pace.count[DIVIDES] != 0
 
 
 @formula
@@ -229,8 +248,23 @@ def aim(now, c, gap):
 
 
 @formula
-def store(G, C, P, L, Y, pace, now):
-    """Energy in contacts at the end of the step, and what of the work done on them was not stored."""
+def dissipated(k, law, now, c, h, pressed):
+    """Energy that the law itself takes in the step; all that was stored where it would pull."""
+    n, dissipation, damping, _, _ = law
+    a, b = now[c, OVERLAP], now[c, TARGET]
+    if dissipation == 0.0 and damping == 0.0:
+        return 0.0
+    if not pressed:
+        return max(0.0, energy(k, n, a) - energy(k, n, b))
+    return (mean_force(k, n, a, b)[0] * dissipation * (b - a) + damping * (max(b, 0.0) - max(a, 0.0))) * (b - a) / h
+
+
+@formula
+def store(G, C, P, L, X, Y, pace, now):
+    """Energy in contacts at the end of the step, and what of the work done on them was not stored.
+
+    What the law does not take of that is the method's.
+    """
     h = pace.real[STEP]
     pace.real[STORED] = 0.0
     for c in range(C.count[FOUND]):
@@ -240,7 +274,9 @@ def store(G, C, P, L, Y, pace, now):
             now[c, KEPT] = elastic(now[c, SHARE], overlap, now[c, TARGET])
             after = energy(k, n, now[c, KEPT])
             pace.real[STORED] += after
-            pace.real[LOST_IMPACT] -= after - energy(k, n, now[c, OVERLAP])
+            lost = dissipated(k, law_of(G, C, L, c), now, c, h, X.p[c, 0] > 0.0)
+            pace.real[LOST_IMPACT] += lost
+            pace.real[NUMERICAL] -= after - energy(k, n, now[c, OVERLAP]) + lost
 
 
 @formula

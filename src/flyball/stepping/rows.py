@@ -6,11 +6,10 @@ from ..compiler.jit import formula
 from ..contact.surfaces import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
 from ..contact.tables import BEFORE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
-from ..math.vec import add, axes_across, cross, dot, load3, load9, mv, put3, scale, sub
+from ..math.vec import axes_across, cross, dot, load3, load9, mv, put3, scale, sub
 from ..numerics.cone.operator import along, seen
-from .onward import arm, carry_on, lead
-from .penalty import stiffness
-from .tables import GRAVITY, IMPULSE, LEAD, SLIDES, STEP, TORQUE, YIELDING
+from .motion import speed_of_fall
+from .tables import IMPULSE, SLIDES, STEP, TORQUE
 
 
 @formula
@@ -22,8 +21,7 @@ def fill_rows(G, M, C, P, L, pace):
     turns = P.turn.shape[0] > 0
     for c in range(C.count[FOUND]):
         i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
-        a, b = G.shape_i[i, MOVER], G.shape_i[j, MOVER]
-        P.at[c, 0], P.at[c, 1] = a, b
+        a, b = P.at[c, 0], P.at[c, 1] = sides(G, C, c)
         point = load3(C.x, c, POINT)
         put3(P.frame, c, 0, load3(C.x, c, NORMAL))
         put3(P.arm, c, 0, arm(M, a, point))
@@ -39,6 +37,18 @@ def fill_rows(G, M, C, P, L, pace):
 
 
 @formula
+def sides(G, C, c):
+    """Movers of contact c."""
+    return G.shape_i[C.at[c, SHAPE_1], MOVER], G.shape_i[C.at[c, SHAPE_2], MOVER]
+
+
+@formula
+def arm(M, a, point):
+    """From the origin of mover a to a point; 0 for what stands still."""
+    return sub(point, load3(M.pose, a, 0)) if a >= 0 else (0.0, 0.0, 0.0)
+
+
+@formula
 def tangents(G, M, C, P, L, c):
     """Tangents of contact c, and how its surfaces move along these by themselves."""
     i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
@@ -50,19 +60,6 @@ def tangents(G, M, C, P, L, c):
     if L.belt.shape[0] > 0:
         add_belt(M, L, P, c, i, a, -1.0)
         add_belt(M, L, P, c, j, b, 1.0)
-
-
-@formula
-def onward(G, M, C, D, N, P, L, pace, now):
-    """Rows from the start of the step to its middle; of what gives way they stay, as its law is of the way."""
-    for c in range(C.count[FOUND]):
-        hard = pace.count[YIELDING] == 0 or stiffness(G, C, L, c) == 0.0
-        ahead = (0.0, 0.0, 0.0)
-        if hard and carry_on(M, C, D, N, P, c, pace):
-            tangents(G, M, C, P, L, c)
-            ahead = lead(M, C, P, c)
-            put3(P.bias, c, 0, add(load3(P.bias, c, 0), ahead))
-        put3(now, c, LEAD, ahead)
 
 
 @formula
@@ -126,9 +123,7 @@ def again(P, c, before, o, first):
 @formula
 def static_where_stuck(G, C, P, L, X, pace, now):
     """The static coefficient for contacts that stuck before, and for new ones that hardly slide."""
-    h = pace.real[STEP]
-    g0, g1, g2 = pace.real[GRAVITY], pace.real[GRAVITY + 1], pace.real[GRAVITY + 2]
-    slow = h * sqrt(g0 * g0 + g1 * g1 + g2 * g2)
+    slow = speed_of_fall(pace, pace.real[STEP])
     for c in range(C.count[FOUND]):
         law = L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]]
         if law[STATIC] > law[KINETIC] and now[c, SLIDES] < 0.5:

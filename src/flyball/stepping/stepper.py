@@ -14,11 +14,12 @@ from ..equations.engine import engine
 from ..numerics.cone.problem import Choices, Problem, Scratch, State
 from ..numerics.cone.rooms import rooms, unfilled
 from .free import rotation_matrices
-from .joined import ANYHOW, JOBS, NEEDED, NO_ROOM, NO_WAY, START, Joined, no_mechanism
+from .joined import ANYHOW, JOBS, NEEDED, NO_ROOM, NO_WAY, START, TOO_LONG, Joined, no_mechanism
 from .joints import joined, joined_kernel
 from .march import march_kernel
 from .solvers import Solvers, solvers, told
 from .tables import (
+    DIVIDES,
     ENOUGH_V,
     FREE_INERTIA,
     FREE_INVERSE,
@@ -28,6 +29,7 @@ from .tables import (
     GRAVITY,
     JOINTS,
     LEFT,
+    LONGEST,
     SEARCHING,
     STEP,
     TAKEN,
@@ -42,12 +44,17 @@ SLICE = 0.05  # seconds that a call of the loop should take
 
 MANY = 100_000  # steps of a call at most
 HALVINGS = 6  # of a step that cannot be taken whole
+FINEST = 12  # halvings of a step that is too long for the impacts of contacts that give way
 RESTING = 1e-2  # of the velocity that gravity makes in a step: a larger residual is not enough
 ROOMIER = 1.5  # times as much room as was needed, when there is none
 
 
 class NoWay(Exception):
     """The mechanism cannot go on: its equations have no solution, or its joints cannot be closed."""
+
+
+class TooLong(Exception):
+    """The step does not resolve an impact of contacts that give way."""
 
 
 @dataclass
@@ -117,7 +124,7 @@ def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar:
     size = np.trace(inertia, axis1=1, axis2=2) / 3.0
     odd = np.abs(inertia - size[:, None, None] * np.eye(3)).max(axis=(1, 2), initial=0.0)
     body[:, FREE_ROUND] = odd <= 1e-12 * size
-    return Free(body, turn.copy(), np.zeros((n, 8)), np.zeros((n, 8)), np.zeros((n, 3)))
+    return Free(body, turn.copy(), np.zeros((n, 8)), np.zeros((n, 8)), np.zeros((n, 18)))
 
 
 def nodes(free: Free) -> np.ndarray:
@@ -165,9 +172,10 @@ class Stepper:
         joints: Joined | None = None,
     ) -> None:
         n = len(free.body)
-        self.geometry, self.free, self.laws, self.pace = geometry, free, laws, pace
+        self.geometry, self.laws, self.pace = geometry, laws, pace
         self.joints = no_mechanism() if joints is None else joints
         count = n + len(self.joints.mover)
+        self.free = free._replace(start=np.zeros((count, 18)))
         self.movers = Movers(np.zeros((count, 12)), np.zeros((count, 6)))
         self.movers.pose[:n, :3] = position
         self.movers.pose[:n, 3:] = rotation_matrices(free.turn)
@@ -210,13 +218,15 @@ class Stepper:
         while steps > 0:
             began = time.perf_counter()
             asked = count[LEFT] = min(steps, self.quota)
+            self.pace.real[LONGEST] = h
             self._next(h)
             try:
                 self._march()
-            except NoWay:
+            except (NoWay, TooLong) as reason:
                 left = int(count[LEFT])
-                self._in_halves(h, HALVINGS)
-                self.halved += 1
+                stuck = isinstance(reason, NoWay)
+                self._in_halves(h, HALVINGS if stuck else FINEST)
+                self.halved += stuck
                 count[LEFT] = left - 1
             steps -= int(asked - count[LEFT])
             took = max(time.perf_counter() - began, 1e-6)
@@ -235,15 +245,18 @@ class Stepper:
         """Take a step of h, which cannot be taken, as two; at the last depth as best as it can be."""
         if depth == 0:
             raise NoWay
+        divides = int(self.pace.count[DIVIDES])
         for _ in range(2):
             self._next(0.5 * h)
             self.pace.count[LEFT] = 1
             self.joints.count[ANYHOW] = depth == 1
+            self.pace.count[DIVIDES] = divides and depth > 1
             try:
                 self._march()
-            except NoWay:
+            except (NoWay, TooLong):
                 self._in_halves(0.5 * h, depth - 1)
         self.joints.count[ANYHOW] = 0
+        self.pace.count[DIVIDES] = divides
 
     def _march(self) -> None:
         """Take ``pace.count[LEFT]`` steps, enlarging tables that are full."""
@@ -252,13 +265,15 @@ class Stepper:
             r, f = self.rooms, self.finder
             a, b = f.now, f.before
             status = march_kernel(
-                self.geometry, self.joints, self.movers, a, b, f.search, r.P, r.Q, r.R, r.X, r.Y, r.Z, r.E, r.W, r.O,
-                r.F, self.free, self.laws, self.pace, r.T, r.U,
+                self.geometry, self.joints, self.movers, a, b, f.midway, f.search, r.P, r.Q, r.R, r.X, r.Y, r.Z, r.E,
+                r.W, r.O, r.F, self.free, self.laws, self.pace, r.T, r.U,
             )  # fmt: skip
             if status == DONE:
                 return
             if status == NO_WAY:
                 raise NoWay
+            if status == TOO_LONG:
+                raise TooLong
             if status == NO_ROOM:
                 self._roomier()
                 continue

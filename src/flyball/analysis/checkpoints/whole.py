@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import partial
 
 from ...results import doubts
 from ...results.result import Result
-from ..motion.impulse.ending import made_energy
 from ..motion.residual import acceleration_violation
 
 
@@ -19,7 +17,10 @@ def finished(result: Result, parts: Sequence[Result]) -> Result:
     health = result.health
     health.late = {"mobility": parts[0].health.late["mobility"], "energy_drift": lambda: result.energy.drift}
     if isinstance(health.options.get("method"), Mapping):  # accelerations of steps by impulses are means
-        health.contact = health.contact and dataclasses.replace(health.contact, notes=made_energy(result))
+        health.late |= {
+            "doubtful": partial(doubts.of_impulses, result),
+            "warnings": lambda: (*health.remarks, *health.doubtful),
+        }
         return result
     health.late |= {
         "acceleration_violation": partial(acceleration_violation, result),

@@ -17,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 # entries of Search.real, after MARGIN, SKIN, AHEAD of `tables`: where the frame is, by how much it goes on with the
-# next search, its velocity, how far it lags behind; a usual radius; largest gap that the narrow phase is asked about
-FRAME, STRIDE, DRIFT, LAG, USUAL, REACH = 3, 6, 9, 12, 15, 16
+# next search, its velocity, how far it lags behind; a usual radius; largest gap that the narrow phase is asked about;
+# sum of the displacements that searches midway have seen since the last search
+FRAME, STRIDE, DRIFT, LAG, USUAL, REACH, PASSED = 3, 6, 9, 12, 15, 16, 17
 REALS = 20
 # entries of Search.count: bounded and wide slots; whether the list of pairs is true; which half of `seen` is read;
 # number of the search whose contacts it speaks of; pairs, pairs when all were looked for; levels; address of the narrow

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from ...compiler.door import door
 from ...compiler.jit import formula
-from ..tables import DONE, FOUND, FULL_CONTACTS, FULL_PAIRS, NOT_FINITE, NUMBER, PAIRS, REBUILT, STATUS
+from ..tables import AHEAD, DONE, FOUND, FULL_CONTACTS, FULL_PAIRS, NOT_FINITE, NUMBER, PAIRS, REBUILT, STATUS
 from .desk import (
     AFRESH_SO_FAR,
     BOUNDED,
@@ -26,6 +26,7 @@ from .desk import (
     LOOKED_AT,
     MOVED,
     MOVES,
+    PASSED,
     SEARCHES,
     SHAPE,
     STRIDE,
@@ -39,8 +40,10 @@ from .sorting import sort_all
 from .unbounded import place_wide
 from .watch import census, follow, look
 
-STEP, AFRESH = range(2)
-"""Tasks: contacts at new poses, with the list of pairs mended where it must be; the same, all pairs looked for anew."""
+STEP, AFRESH, FASTER, MIDWAY = range(4)
+"""Tasks: contacts at new poses, with the list of pairs mended where it must be; the same, all pairs looked for anew;
+contacts at the poses of the last search with other velocities; contacts of the known pairs within the margin, at poses
+between those of this search and of the next one. Of the last two, `O` are the contacts of the last search."""
 MANY = 0.3  # where more shapes than this part have left their envelopes, all pairs are looked for anew
 
 
@@ -81,13 +84,21 @@ def mend(G, B):
 
 
 @formula
+def pass_on(B, way):
+    """Add displacements to those that were seen since the frame went on."""
+    for c in range(3):
+        B.real[PASSED + c] += way[c]
+
+
+@formula
 def pairs(G, M, O, B, task):
     """Bring the list of pairs up to now: whether there was room."""
-    for c in range(3):
+    for c in range(3 if task != FASTER else 0):
         B.real[FRAME + c] += B.real[STRIDE + c]
     if B.count[TRUE] == 0:
         return anew(G, M, O, B)
     n, way = look(G, M, B)
+    pass_on(B, way)
     mended = 1
     if task == AFRESH or O.count[NUMBER] != B.count[SEARCHES] or B.count[LISTED] > 2 * B.count[LISTED_ALL] + 64:
         mended = -1
@@ -95,13 +106,31 @@ def pairs(G, M, O, B, task):
         mended = mend(G, B)
     if mended < 0:
         return anew(G, M, O, B)
-    follow(B, n, way)
+    if task != FASTER:
+        follow(B, n, (B.real[PASSED], B.real[PASSED + 1], B.real[PASSED + 2]))
+        for c in range(3):
+            B.real[PASSED + c] = 0.0
     return mended == 1
+
+
+@formula
+def midway(G, M, C, O, B):
+    """Contacts of the listed pairs at these poses: what is remembered of the last search stays as it was."""
+    ahead = B.real[AHEAD]
+    B.real[AHEAD] = 0.0
+    _, way = look(G, M, B)
+    pass_on(B, way)
+    n = touch(G, M, C, O, B)
+    B.real[AHEAD] = ahead
+    C.count[FOUND] = n
+    return DONE if n <= C.x.shape[0] else FULL_CONTACTS
 
 
 @formula
 def find(G, M, C, O, B, task):
     """See `search`."""
+    if task == MIDWAY:
+        return midway(G, M, C, O, B)
     bad = census(M, B)
     if bad >= 0:
         C.count[FOUND] = bad

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from ....contact.tables import FOUND, GAP, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
+from ....contact.tables import FOUND, GAP, MOVER, POINT, SHAPE_1, SHAPE_2
 from ....math.vec import mtv, quaternion_matrix
 from ....model.model import Model
 from ....results.bulk import Bulk
 from ....results.contacts import Contacts
 from ....results.sides import OPEN, SLIP, STICK, Sides
-from ....stepping.joined import LOST
+from ....stepping.joined import ASTRAY, LOST
 from ....stepping.stepper import Stepper
 from ....stepping.tables import (
     ANGLE,
@@ -21,6 +21,7 @@ from ....stepping.tables import (
     KICK,
     LOST_FRICTION,
     LOST_IMPACT,
+    NUMERICAL,
     SLIDES,
     STEP,
     STORED,
@@ -32,7 +33,7 @@ from ....tables.system import NV, Q0, V0
 from ...assembly.start import Assembly
 from .held import Held
 
-SUMS = (LOST_FRICTION, LOST_IMPACT, GIVEN, STORED)
+SUMS = (LOST_FRICTION, LOST_IMPACT, GIVEN, NUMERICAL, STORED)
 
 
 class Collected:
@@ -70,6 +71,7 @@ class Collected:
         self.twist.append(s.rooms.X.v[:, :6].copy())
         sums = s.pace.real[list(SUMS)]
         sums[SUMS.index(LOST_IMPACT)] += s.joints.real[LOST]
+        sums[SUMS.index(NUMERICAL)] += s.joints.real[ASTRAY]
         self.sums.append(sums)
         if self.held:
             self.held.add(s.joints, moved)
@@ -88,7 +90,7 @@ class Collected:
         self.acceleration.append((s.rooms.X.v[:, :6] - s.free.before[:, :6]) / s.pace.real[STEP])
 
     def _touching(self) -> dict[str, np.ndarray]:
-        """Contacts with a force."""
+        """Contacts with a force, and the normals along which these were found: those of the middle of the step."""
         s = self.stepper
         C, kept = s.last()
         n = int(C.count[FOUND])
@@ -98,7 +100,7 @@ class Collected:
         return {
             "pair": self.side_of[mover],
             "point": C.x[k, POINT : POINT + 3],
-            "normal": C.x[k, NORMAL : NORMAL + 3],
+            "normal": s.rooms.P.frame[k, :3].copy(),
             "gap": C.x[k, GAP],
             "force": impulse[k] / s.pace.real[STEP],
             "state": np.where(kept[k, SLIDES] > 0.5, SLIP, np.where(kept[k, SLIDES] < -0.5, OPEN, STICK)),

@@ -10,6 +10,7 @@ import numpy as np
 
 from ....model.touching import nothing_touches
 from ....numerics.cone.choose import BY_ONE, BY_OTHER, HANDED_ON
+from ....results import doubts
 from ....results.contact_health import ContactHealth
 from ....results.energy import EXCHANGED, STORED
 from ....results.health import Health
@@ -19,6 +20,7 @@ from ....stepping.solvers import told
 from ....stepping.stepper import Stepper
 from ....stepping.tables import (
     CUTS,
+    ENDLESS,
     FIRST_OVERLAP,
     IMPACTS,
     ITERATIONS,
@@ -40,9 +42,6 @@ from .settings import Stepping
 
 INTERRUPTED = "interrupted by the user at t = {:.6g} s; what was computed is kept"
 REACHED = "reached the end"
-ROUNDING = 1e-9
-SLIGHT = 1e-6  # part of the potential energy that is no reason to say anything
-NOTABLE = 0.01  # part of the largest kinetic energy
 
 
 def result_of(
@@ -81,6 +80,8 @@ def result_of(
     health.late = {
         "mobility": partial(mobility, model, base),
         "energy_drift": lambda: result.energy.drift,
+        "doubtful": lambda: doubts.of_impulses(result),
+        "warnings": lambda: (*result.health.remarks, *result.health.doubtful),
     }
     states = np.zeros((len(t), len(values.structure.states)))
     lam = np.zeros((len(t), len(values.system.row_i)))
@@ -93,23 +94,7 @@ def result_of(
     result.exchanged = dict(zip((*EXCHANGED, STORED), sums.T, strict=True))
     result.contacts = kept.as_contacts(sides, model.planar)
     result.bulk = sets(model, scene, kept)
-    health.contact = dataclasses.replace(contact, notes=made_energy(result))
     return result
-
-
-def made_energy(result: Result) -> tuple[str, ...]:
-    """A note where contacts gave energy, which what rolls or turns on them gets from long steps."""
-    lost = result.exchanged["friction_loss"] + result.exchanged["impact_loss"]
-    made = float(np.max(np.maximum.accumulate(lost) - lost, initial=0.0))
-    if made <= ROUNDING * float(np.max(np.abs(lost), initial=0.0)):
-        return ()
-    moving = float(np.max(result.energy.kinetic, initial=0.0))
-    held = float(np.max(np.abs(result.energy.potential), initial=0.0))
-    if made <= NOTABLE * moving or made <= SLIGHT * held:  # what rests has no kinetic energy to compare with
-        return ()
-    return (
-        f"contacts gave {made:.2g} J that they have not, {made / moving:.2g} of the kinetic energy: take shorter steps",
-    )
 
 
 def _picked(stepper: Stepper, solver: str) -> str:
@@ -142,4 +127,5 @@ def _contact_health(scene: Touching, stepper: Stepper, o: Stepping, size: float)
         halved=int(stepper.halved),
         reduced=int(count[REDUCED]),
         impacted=int(count[IMPACTS]),
+        endless=int(count[ENDLESS]),
     )

@@ -13,6 +13,7 @@ from ....numerics.cone.problem import COULOMB, MOST_STEPS
 from ....stepping.stepper import Stepper, free_bodies
 from ....stepping.tables import (
     COUNTS,
+    DIVIDES,
     ENOUGH_V,
     ENOUGH_X,
     FLAT,
@@ -82,6 +83,7 @@ def begin(scene: Touching, M: Movers, values: Values, o: Stepping, held: Held | 
     n = len(M.pose) - (len(held.joints.mover) if held else 0)
     turn = matrix_to_quaternion(M.pose[:n, 3:].reshape(-1, 3, 3))
     free = free_bodies(scene.carriers.mass[:n], scene.carriers.inertia[:n], turn, planar)
+    count[DIVIDES] = o.step is None
     count[SEQUENTIAL] = o.impacts == "sequential"
     count[YIELDING] = (np.nan_to_num(scene.surfaces.pair[..., [su.STIFFNESS, su.MODULUS]]) > 0.0).any()
     pace = Pace(real, count, np.zeros(8, np.int64))

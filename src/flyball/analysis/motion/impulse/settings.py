@@ -13,6 +13,8 @@ from ...options import count, positive, seconds
 RESTITUTION = ("poisson", "newton", "moreau")
 CONVEX_ONLY = ("barzilai-borwein",)
 IMPACTS = ("simultaneous", "sequential")
+USUAL = 5e-3
+"""Longest step [s] where none is given."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,8 +26,9 @@ class Stepping:
 
     Parameters
     ----------
-    step : float or str [s]
-        Longest step; shorter where an output time asks for it.
+    step : float or str [s], optional
+        Longest step; shorter where an output time asks for it. If not given, 5 ms, and where contacts that give way
+        collide as short as resolves that.
     solver : str
         Of the cone problem: ``auto`` (chosen for each island of bodies that touch), or one by name: see
         ``docs/contact_solvers.md``.
@@ -45,7 +48,7 @@ class Stepping:
         cradle.
     """
 
-    step: float | str = 5e-3
+    step: float | str | None = None
     solver: str = "auto"
     iterations: int | None = None
     position_iterations: int | None = None
@@ -58,6 +61,8 @@ class Stepping:
         if isinstance(self.step, str):
             object.__setattr__(self, "step", seconds(self.step, "step"))
         for name in ("step", "tolerance"):
+            if getattr(self, name) is None:
+                continue
             positive(getattr(self, name), name)
             if not math.isfinite(getattr(self, name)):
                 raise ModelError(f"{name} of Stepping must be finite")
@@ -83,8 +88,8 @@ class Stepping:
     @property
     def longest(self) -> float:
         """The longest step [s]."""
-        return float(self.step)
+        return USUAL if self.step is None else float(self.step)
 
     def bounded(self, longest: float) -> Stepping:
         """With steps of at most ``longest`` seconds."""
-        return dataclasses.replace(self, step=min(self.longest, longest))
+        return self if longest >= self.longest else dataclasses.replace(self, step=longest)
