@@ -99,6 +99,17 @@ def chained():
     return m
 
 
+def clutched():
+    """A clutch brings a wheel up to speed, and play behind it closes with a blow."""
+    m = fb.Mechanism("clutched", planar=True, gravity=None)
+    for k, x in enumerate("ABC"):
+        m.add(fb.Body(f"w{k}", mass=1, inertia=0.1 + 0.1 * k, position=(k, 0), angular_velocity=4.0 * (k == 0)))
+        m.add(fb.Revolute(x, "ground", f"w{k}", at=(k, 0)))
+    m.add(fb.Clutch("clutch", "A.angle", "B.angle", capacity=5.0))
+    m.add(fb.Backlash("play", ("B.angle", "C.angle"), gap=0.2, restitution=0.2))
+    return m
+
+
 def heavier():
     """Mass comes at the very instant of the blow."""
     m = fb.Mechanism("heavier", planar=True, gravity=None, parameters={"m": 1.0})
@@ -118,7 +129,7 @@ def parting():
     return m
 
 
-MADE = [sliding_box, tumbling_box, driven_piston, geared, racked, following, rough, chained, heavier, parting]
+MADE = [sliding_box, tumbling_box, driven_piston, geared, racked, following, rough, chained, clutched, heavier, parting]
 
 
 def momentum(moment, body, tables):

@@ -165,7 +165,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
             still = at_rest(n, fired)
             still[list(jumped.even)] = True
         pressed(n, fired, ways)
-        found = decided(n, at, still, fired)
+        found = decided(n, at, still, fired, jumped)
         if isinstance(found, Jump):  # no accelerations: velocities have jumped, all is looked at again
             tell_jump(n, found, since)
             since = here.y.copy()
@@ -226,7 +226,9 @@ def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Ju
     return jumped
 
 
-def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided | Jump:
+def decided(
+    n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray, jumped: Jump | None
+) -> Decided | Jump:
     """Modes; a series of bounces that has become shorter than rounding is over.
 
     Where there are no accelerations velocities may jump without a collision.
@@ -234,7 +236,7 @@ def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fir
     found = decide(n, at, still, fired)
     if found.ended == FOUND and (over := coming_to_rest(n, at, still)).any():
         still |= over
-        settle_down(n, np.flatnonzero(over).tolist(), still)
+        settle_down(n, np.flatnonzero(over).tolist(), still, jumped)
         found = decide(n, at, still, fired)
     if found.ended == FOUND:
         doubt(n, found)

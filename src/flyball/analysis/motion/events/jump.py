@@ -112,6 +112,16 @@ def finish(
     return out
 
 
+def add(n: Instant, out: Jump, B: Bench, x: np.ndarray) -> None:
+    """Count further impulses along the rows of a problem to those of a jump; velocities have them already."""
+    S, nr = n.S, len(n.S.row_i)
+    out.rows[:nr] += x @ B.L
+    out.rows[nr:] += (x @ B.E)[S.body_i[S.body_i[:, BODY_LAW] >= 0, V0]]
+    for s, more in zip(B.which.tolist(), x.tolist(), strict=True):
+        out.rows[S.switch_i[s, SWITCH_ROW]] += more
+        out.impulse[s] = out.impulse.get(s, 0.0) + more
+
+
 def nothing(n: Instant) -> Jump:
     """No jump."""
     return Jump(rows=np.zeros(len(n.S.row_i)), along=np.zeros(n.here.structure.nv))

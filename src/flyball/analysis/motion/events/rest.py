@@ -14,7 +14,7 @@ from ....equations.tasks import MOTION
 from ....numerics.cone.dense.problem import HOLDS
 from ....tables.system import BIAS, COORDINATES
 from .instant import Instant, Part
-from .jump import Jump
+from .jump import Jump, add
 
 LOW = 1e-13  # of the mechanism's length or a radian: a flight that is none
 ROUNDED = 2e-14  # of how far the mechanism is from the origin: the same, since places there are known no better
@@ -62,9 +62,15 @@ def coming_to_rest(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarr
     return over
 
 
-def settle_down(n: Instant, over: list[int], still: np.ndarray) -> None:
-    """Take their rates from what bounces no more; friction that moved by these alone is at rest, into ``still``."""
+def settle_down(n: Instant, over: list[int], still: np.ndarray, jumped: Jump | None) -> None:
+    """Take their rates from what bounces no more; friction that moved by these alone is at rest, into ``still``.
+
+    ``jumped`` is the impact of the instant, if there was one: it was the last.
+    """
     B, P, _ = n.problem([Part(s, HOLDS) for s in over])
-    n.here.v[:] -= np.linalg.lstsq(P.A, n.rate[over], rcond=1e-12)[0] @ B.Y
+    x = -np.linalg.lstsq(P.A, n.rate[over], rcond=1e-12)[0]
+    n.here.v[:] += x @ B.Y
+    if jumped is not None:
+        add(n, jumped, B, x)
     n.look_again()
     still |= np.abs(n.rate) <= n.still
