@@ -13,6 +13,7 @@ from ..tables.system import FORCE_F
 from .energy import gained
 from .lag import late, perhaps_late
 from .ledger import Ledger, apart, whole
+from .one_sided import pulls
 from .overturned import overturned, perhaps_overturned
 from .residue import missed
 
@@ -47,6 +48,7 @@ def warnings(result: Result) -> tuple[str, ...]:
         *_open_loads(result),
         *_open_forces(result),
         *_creep(result),
+        *pulls(result),
     ]
     return tuple(text for text in texts if text)
 

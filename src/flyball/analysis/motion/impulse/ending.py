@@ -13,6 +13,7 @@ from ....numerics.cone.choose import BY_ONE, BY_OTHER, HANDED_ON
 from ....results.contact_health import ContactHealth
 from ....results.energy import EXCHANGED, STORED
 from ....results.health import Health
+from ....results.one_sided import pulls
 from ....results.result import Result
 from ....results.sides import Sides
 from ....stepping.solvers import told
@@ -81,6 +82,7 @@ def result_of(
     health.late = {
         "mobility": partial(mobility, model, base),
         "energy_drift": lambda: result.energy.drift,
+        "warnings": lambda: (*health.remarks, *pulls(result)),
     }
     states = np.zeros((len(t), len(values.structure.states)))
     lam = np.zeros((len(t), len(values.system.row_i)))
