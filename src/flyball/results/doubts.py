@@ -190,10 +190,14 @@ def _unseen(x: Ledger) -> np.ndarray:
 def _rest(x: Ledger) -> Any:
     """Energy [J] below which nothing is said to move: rounding of the potential energy, and a creep of all bodies.
 
+    The potential energy is that stored and that of the weight at the mechanism's length: where it is counted from is
+    arbitrary.
+
     Where works are done, some of it perhaps between two rows, also what moves all bodies in the time there is to where
     rows have them.
     """
     rounding = 1e-12 * np.abs(x.stored[0] + x.stored[1]).max(axis=-1, initial=0.0)
+    rounding = rounding + 1e-12 * x.weight * x.result.values.length
     t = x.result.t
     least = rounding + sum(x.mass) * (AT_REST * x.result.values.length) ** 2
     span = float(np.ptp(t)) if len(t) else 0.0

@@ -13,6 +13,7 @@ from ....numerics.cone.choose import BY_ONE, BY_OTHER, HANDED_ON
 from ....results.contact_health import ContactHealth
 from ....results.energy import EXCHANGED, STORED
 from ....results.health import Health
+from ....results.ledger import whole
 from ....results.one_sided import pulls
 from ....results.result import Result
 from ....results.sides import Sides
@@ -42,7 +43,7 @@ from .settings import Stepping
 INTERRUPTED = "interrupted by the user at t = {:.6g} s; what was computed is kept"
 REACHED = "reached the end"
 ROUNDING = 1e-9
-SLIGHT = 1e-6  # part of the potential energy that is no reason to say anything
+SLIGHT = 1e-6  # part of the potential energy, or of the weight times the length, that is no reason to say anything
 NOTABLE = 0.01  # part of the largest kinetic energy
 
 
@@ -106,7 +107,9 @@ def made_energy(result: Result) -> tuple[str, ...]:
     if made <= ROUNDING * float(np.max(np.abs(lost), initial=0.0)):
         return ()
     moving = float(np.max(result.energy.kinetic, initial=0.0))
-    held = float(np.max(np.abs(result.energy.potential), initial=0.0))
+    held = max(
+        float(np.max(np.abs(result.energy.potential), initial=0.0)), float(whole(result).weight * result.values.length)
+    )
     if made <= NOTABLE * moving or made <= SLIGHT * held:  # what rests has no kinetic energy to compare with
         return ()
     return (
