@@ -248,3 +248,17 @@ def test_parts_of_massless_links_have_names():
             fb.Body(n, mass=1, inertia=(1, 1, 1)), fb.Cylindrical(n.upper(), "ground", n, at=(0, 0, 0), axis=(0, 0, 1))
         )
     assert [x.of for x in apart(m.simulate(0.1, outputs=3, coordinates="joint"))] == [" of 'a'", " of 'b'"]
+
+
+@pytest.mark.parametrize("mass", [10.0, 1000.0])
+@pytest.mark.parametrize("method", ["auto", "impulse"])
+def test_a_self_locked_screw_at_rest_is_not_doubtful(mass, method):
+    """All that is lost is rounding of its weight's energy, which is counted from where the nut is: 3e-13 J of 540 J."""
+    for inertia, torque in ((1e-5 * mass, 0.0), (1.0, 0.0), (1.0, 0.3)):
+        m = fb.Mechanism("jack", gravity=(0, 0, -9.81))
+        m.add(fb.Body("nut", mass=mass, inertia=(inertia,) * 3))
+        m.add(fb.Screw("thread", "ground", "nut", at=(0, 0, 0), axis=(0, 0, 1), lead=0.002))
+        m.add(fb.JointFriction("rub", "thread", static=1.5, radius=0.01))
+        m.add(fb.Motor("motor", "thread", torque=torque * mass * 9.81 * 0.002 / 6.28))
+        run = m.simulate(5.0, outputs=3, method=method)
+        assert not run.health.doubtful and not run.health.warnings

@@ -151,3 +151,52 @@ def test_an_energy_balance_that_was_not_measured_says_so():
     whole = m.simulate(2, outputs=[0, 2])
     assert 0.0 < whole.health.energy_drift < 1e-6
     assert dict(whole.health.lines())["energy balance"].endswith(" J largest deviation")
+
+
+def follower(speed, **cam):
+    """An eccentric disk, e = 30 mm, lifts a follower of 0.5 kg: m (g - e w^2 sin(w t)) presses it on, about."""
+    u = np.linspace(0, 2 * np.pi, 80, endpoint=False)
+    m = fb.Mechanism("cam", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("cam", mass=1, inertia=0.01), fb.Body("follower", mass=0.5, inertia=0.01, position=(0, 0.5)))
+    m.add(fb.Revolute("axle", "ground", "cam", at=(0, 0)), fb.Driver("motor", "axle.angle", f"{speed}*t"))
+    m.add(fb.Translational("guide", "ground", "follower", at=(0, 0.5), axis=(0, 1)))
+    points = np.column_stack([0.03 + 0.1 * np.cos(u), 0.1 * np.sin(u)])
+    top = np.sqrt((0.1 + cam.get("radius", 0.0)) ** 2 - 0.03**2)
+    m.add(fb.Cam("touch", "cam", "follower", points=points, at=(0, top), **cam))
+    return m
+
+
+@pytest.mark.parametrize("method", ["auto", "impulse"])
+def test_a_follower_that_pulls_is_named(method):
+    """A real one lifts off, from about e w^2 = g on. In a groove it may pull; nothing is said where it only pushes."""
+
+    def warned(speed, **cam):
+        run = follower(speed, **cam).simulate(0.5, outputs=51, method=method)
+        return run, [w for w in run.health.warnings if "Cam 'touch'" in w]
+
+    assert not warned(8.0, radius=0.02)[1] and not warned(8.0)[1] and not warned(30.0, radius=0.02, groove=True)[1]
+    run, (said,) = warned(30.0, radius=0.02)
+    least = np.linalg.norm(run["touch"].force[run["touch"].force[:, 1] < 0], axis=1).max()
+    assert least > 10.0 and f"pulls with up to {least:.4g} N" in said
+    (said,) = warned(30.0)[1]
+    assert "pushes to both sides" in said and "groove=True" in said
+
+
+def test_wheels_that_pull_are_named():
+    """Held down by the joint where something lifts them; a weightless one presses with nothing, and pulls with nothing."""
+    wheels = {
+        "line": (True, lambda: fb.WheelOnLine("roll", "ground", "w", at=(0, 0), axis=(1, 0), centre=(0, 0.5))),
+        "disk": (False, lambda: fb.RollingDisk("roll", "ground", "w", at=(0, 0, 0.5), axis=(0, 1, 0), radius=0.5)),
+        "ball": (False, lambda: fb.RollingBall("roll", "ground", "w", at=(0, 0, 0.5), radius=0.5)),
+    }
+    for planar, joint in wheels.values():
+        for lift in (0.0, 9.0, 9.81, 15.0):
+            up = (0, 1) if planar else (0, 0, 1)
+            m = fb.Mechanism("wheel", planar=planar, gravity=[-9.81 * x for x in up])
+            start = {"position": [0.5 * x for x in up], "velocity": (1, 0) if planar else (1, 0, 0)}
+            spin = {"inertia": 0.1, "angular_velocity": -2} if planar else {
+                "inertia": (0.1, 0.1, 0.1), "angular_velocity": (0, 2, 0)
+            }  # fmt: skip
+            m.add(fb.Body("w", mass=1, **spin, **start), joint(), fb.PointForce("F", "w", force=[lift * x for x in up]))
+            said = [w for w in m.simulate(0.2, outputs=3).health.warnings if "roll" in w]
+            assert len(said) == (lift == 15.0) and all("pulls with up to 5.19 N" in w for w in said)

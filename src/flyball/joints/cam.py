@@ -42,7 +42,8 @@ class Cam(Joint):
 
     The curve is the C2 spline through ``points``, run through by their chord length. In space it is the profile of a
     cylinder along ``axis``: one row, which holds the distance from the profile and nothing along the axis. It pulls
-    as well as pushes; see that the reaction keeps pushing.
+    as well as pushes; where a follower pulls that is not in a groove, ``health.warnings`` of a motion says so. A point
+    (no ``radius``) on a profile that is not closed is taken for a pin in a slot, which is held on both sides.
 
     Parameters
     ----------
@@ -66,6 +67,8 @@ class Cam(Joint):
         straight on with the slope of the end.
     radius : number [m]
         Radius of the follower's roller.
+    groove : bool
+        Whether the follower runs in a groove, which holds it on both sides.
     """
 
     points: Points
@@ -73,10 +76,13 @@ class Cam(Joint):
     closed: Flag = True
     beyond: Literal["refuse", "line"] = "refuse"
     radius: Length = 0.0
+    groove: Flag = False
 
     blocks: ClassVar = (CURVE,)
     needs_axis: ClassVar[bool] = True
     drawn: ClassVar[str] = "cam"
+    one_sided: ClassVar[bool] = True
+    both_sides: ClassVar[str] = ", or say groove=True if the follower is held on both sides"
 
     def check(self, n: SimpleNamespace) -> None:
         """Enough points, each with two coordinates, none twice running."""
@@ -116,6 +122,12 @@ class Cam(Joint):
                 f"of {n.radius / bend:.4g} m; take a smaller roller or a smoother profile"
             )
         return (0.0, 0.0, 0.0, side, first, last, n.radius)
+
+    def pushing_sign(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> float | None:
+        """The row counts from the profile towards the roller; nothing tells the side of a point on a closed one."""
+        if self.groove or (n.radius.real == 0.0 and not self.closed):
+            return None
+        return 1.0 if n.radius.real > 0.0 else 0.0
 
     def extent(self, n: SimpleNamespace) -> tuple[Any, Any]:
         """Parameters at the ends of the profile; (0, 0) where it goes on beyond its points."""

@@ -22,8 +22,8 @@ class RollingDisk(Joint):
     """``body_j`` is a wheel that touches a plane fixed in ``body_i`` and rolls on it without slip.
 
     The plane lies where the wheel touches it as drawn: ``radius + tread`` below the centre of an upright wheel.
-    Two of its three rows restrain velocities only (non-holonomic). It carries pull as well as push: see that
-    the reaction along the normal keeps pushing.
+    Two of its three rows restrain velocities only (non-holonomic). It carries pull as well as push; where it pulls,
+    ``health.warnings`` of a motion says so.
 
     Parameters
     ----------
@@ -50,6 +50,7 @@ class RollingDisk(Joint):
     planar_normal: ClassVar[str] = ""
     needs_axis: ClassVar[bool] = True
     drawn: ClassVar[str] = "rolling"
+    one_sided: ClassVar[bool] = True
 
     def check(self, n: SimpleNamespace) -> None:
         """Radii must make a wheel."""
@@ -98,6 +99,7 @@ class RollingBall(Joint):
     planar_normal: ClassVar[str] = ""
     axisless: ClassVar[bool] = True
     drawn: ClassVar[str] = "rolling"
+    one_sided: ClassVar[bool] = True
 
     def check(self, n: SimpleNamespace) -> None:
         """A ball has a radius."""

@@ -48,6 +48,7 @@ class WheelOnLine(Joint):
     spatial: ClassVar[bool] = False
     in_space: ClassVar[str] = "RollingDisk, or a RackAndPinion between two joints"
     drawn: ClassVar[str] = "rolling"
+    one_sided: ClassVar[bool] = True
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
         """F on the line where the wheel touches it, M in the wheel's centre."""
@@ -67,6 +68,10 @@ class WheelOnLine(Joint):
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
         """The centre keeps its height over the line."""
         return (*row.par[:6], 0.0 if row.plus else _height(F, M))
+
+    def pushing_sign(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> float | None:
+        """Towards the centre of the wheel."""
+        return 1.0 if _height(F, M).real > 0.0 else -1.0
 
     def weight(self, n: SimpleNamespace, coordinate: str, F: WorldFrame, M: WorldFrame) -> float:
         """Displacement + height * angle = 0, the height counted to the left of the line."""

@@ -79,6 +79,8 @@ class Joint(Element):
     stand_in: ClassVar[float] = 0.0  # what it costs to put it in such a place; 0: it is never proposed
     omission: ClassVar[float] = 3.5  # what it costs to leave it out
     called: ClassVar[str] = ""  # by proposals, if not by its kind
+    one_sided: ClassVar[bool] = False  # whether its first row stands for a contact that can push only
+    both_sides: ClassVar[str] = ""  # what says that such a contact is held on both sides after all, for messages
     one_surface: ClassVar[bool] = False  # whether its coordinates are slips of one and the same surface
     thread: ClassVar[bool] = False  # whether its surface is a thread, along which all its coordinates slide together
 
@@ -145,6 +147,10 @@ class Joint(Element):
     def weight(self, n: SimpleNamespace, coordinate: str, F: WorldFrame, M: WorldFrame) -> float:
         """Coefficient of a coordinate that is added to a row (``Row.plus``)."""
         raise NotImplementedError
+
+    def pushing_sign(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> float | None:
+        """Sign of the first row's force while a one-sided contact pushes; 0 if unknown, None if both sides hold."""
+        return 1.0
 
     def curves(self, n: SimpleNamespace) -> tuple[list[float], ...]:
         """Splines that its rows read, as flat lists of numbers (see ``math.spline``)."""

@@ -13,6 +13,7 @@ from ..tables.system import FORCE_F
 from .energy import gained
 from .lag import late, perhaps_late
 from .ledger import Ledger, apart, whole
+from .one_sided import pulls
 from .overturned import overturned, perhaps_overturned
 from .residue import missed
 
@@ -48,6 +49,7 @@ def warnings(result: Result) -> tuple[str, ...]:
         *_open_loads(result),
         *_open_forces(result),
         *_creep(result),
+        *pulls(result),
     ]
     return tuple(text for text in texts if text)
 
@@ -64,7 +66,8 @@ def of_impulses(result: Result) -> tuple[str, ...]:
     lost = float(np.max(np.abs(taken), initial=0.0))
     own = result.health.contact.doubts if result.health.contact else ()
     present = np.max(np.abs(result.energy.kinetic) + np.abs(result.energy.potential), initial=0.0)
-    if not lost > max(MOST * energy_moved(result), SLIGHT * float(present)):
+    held = max(float(present), float(whole(result).weight * result.values.length))
+    if not lost > max(MOST * energy_moved(result), SLIGHT * held):
         return own
     what = "took" if taken[int(np.argmax(np.abs(taken)))] > 0.0 else "gave"
     text = (
@@ -206,10 +209,14 @@ def _unseen(x: Ledger) -> np.ndarray:
 def _rest(x: Ledger) -> Any:
     """Energy [J] below which nothing is said to move: rounding of the potential energy, and a creep of all bodies.
 
+    The potential energy is that stored and that of the weight at the mechanism's length: where it is counted from is
+    arbitrary.
+
     Where works are done, some of it perhaps between two rows, also what moves all bodies in the time there is to where
     rows have them.
     """
     rounding = 1e-12 * np.abs(x.stored[0] + x.stored[1]).max(axis=-1, initial=0.0)
+    rounding = rounding + 1e-12 * x.weight * x.result.values.length
     t = x.result.t
     least = rounding + sum(x.mass) * (AT_REST * x.result.values.length) ** 2
     span = float(np.ptp(t)) if len(t) else 0.0

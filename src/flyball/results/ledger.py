@@ -53,6 +53,15 @@ class Ledger:
         return [self._rows(m)[..., 0] if isinstance(m, np.ndarray) else m for m in every]
 
     @property
+    def weight(self) -> Any:
+        """Of all of the bodies [N]."""
+        g = [
+            self._rows(a)[..., 0] if isinstance(a, np.ndarray) else a
+            for a in self.result.values.system.glob[:3].tolist()
+        ]
+        return sum(self.mass) * sum(a * a for a in g) ** 0.5
+
+    @property
     def went(self) -> list[Any]:
         """Square of how far each of the bodies came about [m^2]."""
         r = self.result.records

@@ -127,7 +127,10 @@ def _forest(a: Assembly, parameters: Mapping[str, float] | None, most: float = n
         if bad is None:
             return c, ""
         if bad not in c.structure.tree_joints:
-            return None, f"{bad} has no inertia, and no joint that could be a tree joint"
+            return None, (
+                f"{bad} has no inertia, or less than {THIN:g} of that of the whole mass at the mechanism's length, "
+                f"and no joint that could be a tree joint"
+            )
         avoided.append(bad)
     return None, f"along {', '.join(avoided)} hardly any inertia moves"
 
