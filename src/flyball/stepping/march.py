@@ -8,7 +8,7 @@ from ..compiler.jit import formula, kernel
 from ..contact.broad.search import FASTER, MIDWAY
 from ..contact.broad.search import STEP as STEP_ON
 from ..contact.tables import AHEAD, BEFORE, DONE, FOUND, GAP, NUMBER
-from ..numerics.cone.operator import seen
+from ..numerics.cone.operator import push, seen
 from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
 from .bounce import ROUNDS, bounce, no_kicks
 from .joined import (
@@ -47,6 +47,7 @@ from .tables import (
     FIRST_OVERLAP,
     FLAT,
     GIVEN,
+    GOES_ON,
     HIT,
     IMPACTS,
     ITERATIONS,
@@ -54,9 +55,11 @@ from .tables import (
     KICK,
     LAST_STEP,
     LEFT,
+    LEFT_OVER,
     LIFTS,
     LOST_FRICTION,
     LOST_IMPACT,
+    MIDDLE,
     MOST_CONTACTS,
     NUMERICAL,
     POSITIONS,
@@ -123,6 +126,7 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
         ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
     if ended != CONVERGED and O.real[RESIDUAL] > pace.real[ROUGH] * pace.real[STEP]:
         pace.count[CUTS] += 1
+    pace.real[LEFT_OVER] = O.real[RESIDUAL]
     if O.real[RESIDUAL] > pace.real[WORST_RESIDUAL]:
         pace.real[WORST_RESIDUAL] = O.real[RESIDUAL]
         pace.real[WORST_AT] = pace.real[TIME] + pace.real[STEP]
@@ -133,7 +137,9 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
 
 @formula
 def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
-    """Displacements that leave no overlap, from those of the mean velocities; see ``motion.displace``.
+    """Displacements that leave no overlap, and no gap of what goes on, from those of the mean velocities.
+
+    See ``motion.displace``.
 
     min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. On the way
     impulses are booked, since the mean velocities are at hand.
@@ -149,7 +155,7 @@ def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
             gap = aim(now, c, gap)
         else:
             pace.real[WORST_OVERLAP] = min(pace.real[WORST_OVERLAP], C.x[c, GAP])
-        deepest = min(deepest, gap)
+        deepest = min(deepest, -abs(gap) if now[c, GOES_ON] == MIDDLE else gap)
         Q.bias[c, 0] = R.bias[c, 0] = gap / h
         book(P, X, c, u, pace, now)
         if P.turn.shape[0] > 0:
@@ -160,6 +166,7 @@ def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
         pace.real[FIRST_OVERLAP] = pace.real[WORST_OVERLAP]
     rest(Y)
     if deepest < -pace.real[FLAT]:
+        hold_down(C, P, X, Y, now)
         Q.size[0] = C.count[FOUND]
         solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
     if pace.count[YIELDING] != 0:
@@ -167,7 +174,16 @@ def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
 
 
 @formula
-def onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace):
+def hold_down(C, P, X, Y, now):
+    """Let displacements close gaps of the contacts that go on: as far as these press, which is what they start from."""
+    for c in range(C.count[FOUND]):
+        if now[c, GOES_ON] == MIDDLE:
+            push(P, Y.v, Y.wide, c, (-X.p[c, 0], 0.0, 0.0))
+            Y.p[c, 0] = X.p[c, 0]
+
+
+@formula
+def onto_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, pace, now):
     """End the mechanism's step on its joints, and lift again where that made contacts overlap. Returns a status."""
     for n in range(AGAIN + 1):
         if held_by_joints(A, M, C, P, Y, pace, FINISH) != DONE:
@@ -177,6 +193,7 @@ def onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace):
         if not sunk(G, A, M, C, P, Q, Y, R.bias, pace):
             break
         rest(Y)
+        hold_down(C, P, X, Y, now)
         solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
     return DONE
 
@@ -313,7 +330,7 @@ def step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, bef
         back(N, A, X, pace, sums)
         return status
     positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now)
-    if onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace) != DONE:
+    if onto_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, pace, now) != DONE:
         back(N, A, X, pace, sums)
         return NO_WAY
     displace(N, M, X, Y.v, pace)
