@@ -7,7 +7,8 @@ from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..contact.broad.search import FASTER, MIDWAY
 from ..contact.broad.search import STEP as STEP_ON
-from ..contact.tables import AHEAD, BEFORE, DONE, FOUND, GAP, NUMBER
+from ..contact.tables import AHEAD, BEFORE, DONE, FOUND, GAP, NORMAL, NUMBER
+from ..math.vec import load3, put3
 from ..numerics.cone.operator import push, seen
 from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
 from .bounce import ROUNDS, bounce, no_kicks
@@ -35,7 +36,7 @@ from .joined import VELOCITIES as VELOCITIES_AFTER
 from .lifts import PASSES as AGAIN
 from .lifts import sunk
 from .motion import begin, displace, fall, halfway, rest
-from .onward import begin_contacts, half_on, keep_start, lead, middle_rows, put_back_poses
+from .onward import begin_contacts, half_on, keep_start, kicked, lead, middle_rows, put_back_poses
 from .penalty import FEW, PASSES, aim, find_yielding, linearise, put_back, settled, start_rows, store
 from .record import book, book_turning
 from .rows import fill_rows, sides, static_where_stuck, warm
@@ -221,7 +222,7 @@ def back(N, A, X, pace, sums):
 def search_again(G, M, C, H, B, Z, pace, now):
     """Contacts with the velocities after impacts, which may meet what nothing moved towards before. Returns a status.
 
-    What was hit, and is none any more, stays to be told of; impulses of impacts stay with their contacts.
+    What was hit, and is none any more or has another normal, stays a contact: its impulse is along the normal it had.
     """
     status, most = enter(pace.door[SEARCHING], G, M, H, C, B, FASTER), H.at.shape[0]
     n = H.count[FOUND]
@@ -231,22 +232,21 @@ def search_again(G, M, C, H, B, Z, pace, now):
     C.count[NUMBER] = H.count[NUMBER]
     for k in range(n):
         o = H.at[k, BEFORE]
-        for i in range(3):
-            Z.p[k, i] = now[o, KICK + i] if o >= 0 else 0.0
-        if o >= 0:
+        same = o >= 0 and not (kicked(now, o) and load3(C.x, o, NORMAL) != load3(H.x, k, NORMAL))
+        put3(Z.p, k, 0, load3(now, o, KICK) if same else (0.0, 0.0, 0.0))
+        if same:
             now[o, HIT] = -1.0
+        if o >= 0:
             H.at[k, BEFORE] = C.at[o, BEFORE]
     for o in range(C.count[FOUND]):
-        hit = now[o, KICK] != 0.0 or now[o, KICK + 1] != 0.0 or now[o, KICK + 2] != 0.0
-        if hit and now[o, HIT] >= 0.0 and n < most:
-            for i in range(3):
-                Z.p[n, i] = now[o, KICK + i]
+        if kicked(now, o) and now[o, HIT] >= 0.0 and n < most:
+            put3(Z.p, n, 0, load3(now, o, KICK))
             copy_contact(C, o, H, n)
+            H.at[n, BEFORE] = -1
             n += 1
     for k in range(n):
         copy_contact(H, k, C, k)
-        for i in range(3):
-            now[k, KICK + i] = Z.p[k, i]
+        put3(now, k, KICK, load3(Z.p, k, 0))
     C.count[FOUND] = n
     return DONE
 

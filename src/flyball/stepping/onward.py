@@ -135,6 +135,12 @@ def clear(G, C, N, P, X, c, pace):
 
 
 @formula
+def kicked(now, c):
+    """Whether contact c had an impact before the step."""
+    return now[c, KICK] != 0.0 or now[c, KICK + 1] != 0.0 or now[c, KICK + 2] != 0.0
+
+
+@formula
 def was_hit(G, C, now, c, impacts):
     """Whether contact c was hit before the step, or a mechanism that it is on.
 
@@ -142,8 +148,7 @@ def was_hit(G, C, now, c, impacts):
     """
     first, any_ = impacts
     a, b = sides(G, C, c)
-    kicked = now[c, KICK] != 0.0 or now[c, KICK + 1] != 0.0 or now[c, KICK + 2] != 0.0
-    return kicked or (any_ and max(a, b) >= first)
+    return kicked(now, c) or (any_ and max(a, b) >= first)
 
 
 @formula
