@@ -116,6 +116,23 @@ def test_steel_by_youngs_modulus() -> None:
     assert run.contacts.force[:, 0].max() == pytest.approx(k * deepest**1.5, rel=5e-3)
 
 
+@pytest.mark.parametrize("outputs", [11, 501])
+def test_the_usual_step_follows_the_stiffness(outputs: int) -> None:
+    """Equal balls swap their velocities whatever the outputs are; a long step says what it takes."""
+    m = fb.Mechanism("swap")
+    for name, x in (("a", 0.0), ("b", 0.3)):
+        m.add(fb.Body(name, mass=1, shape=fb.Sphere(radius=R), position=(x, 0, 0), velocity=(0.3 - x, 0, 0)))
+    m.add(fb.Contact(friction=0, law="hertz", stiffness=1e6))
+    run = m.simulate(2.0, outputs=outputs)
+    assert [run["a"].vx[-1], run["b"].vx[-1]] == pytest.approx([0.0, 0.3], abs=1e-4)
+    assert not run.health.warnings
+    long = m.simulate(2.0, outputs=11, method=fb.Stepping(step=5e-3))
+    lost = long.energy.total[0] - long.energy.total[-1]
+    assert lost > 0.1 * long.energy.total[0]
+    assert long.energy.numerical_loss[-1] == pytest.approx(lost, rel=1e-9)
+    assert not long.energy.impact_loss.any() and any("numerical_loss" in x for x in long.health.doubtful)
+
+
 def on_a_mat(**law: object) -> fb.Mechanism:
     """A ball over a box, hard to each other, on a floor that gives way."""
     m = fb.Mechanism("mat", gravity=(0, 0, -G))

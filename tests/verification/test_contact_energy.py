@@ -72,5 +72,8 @@ def test_energy_never_grows(seed, planar, law):
     taken = sum(np.diff(run.exchanged[k]) for k in ("impact_loss", "friction_loss", "numerical_loss"))
     assert np.diff(E) == pytest.approx(-taken, abs=1e-9 * E[0])
     assert np.diff(run.energy.friction_loss).min() >= -1e-12 * E[0]
+    c = run.contacts
+    held = np.linalg.norm(c.tangential_force, axis=1)
+    assert (held <= (1 + 1e-6) * c.friction * c.normal_force + 1e-9 * np.abs(c.force).max()).all()
     weight = G * sum(b.mass for b in m.mass_properties().bodies.values())
     assert np.diff(E).max() <= MORE * E[0] + weight * run.health.contact.worst_overlap

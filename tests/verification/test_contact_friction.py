@@ -125,3 +125,20 @@ def test_a_belt_brings_a_block_to_speed(planar):
     assert run.exchanged["surface_work"][-1] == pytest.approx(2.0, rel=1e-6)
     assert run.exchanged["friction_loss"][-1] == pytest.approx(1.0, rel=1e-6)
     assert np.abs(run.energy.balance).max() < 1e-9
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_forces_on_what_turns_are_within_their_cones(friction):
+    """A ball slides down a sphere, and a box tumbles: at every output forces are along the normal that they have."""
+    m = fb.Mechanism("scene", gravity=(0, 0, -G))
+    m.add(fb.Ground("hill", shape=fb.Sphere(radius=1.0)))
+    m.add(fb.Ground("floor", shape=fb.Plane(), position=(0, 0, -1)))
+    m.add(fb.Body("ball", shape=fb.Sphere(radius=0.1), mass=1, position=(0.3, 0, np.sqrt(1.1**2 - 0.3**2))))
+    m.add(fb.Body("egg", shape=fb.Ellipsoid(semi_axes=(0.1, 0.2, 0.3)), mass=50, position=(3, 0, -0.7),
+                  orientation=(0.2, 0.1, 0), angular_velocity=(5, 3, 0)))  # fmt: skip
+    m.add(fb.Contact(friction=friction))
+    run = stepped(m, 1.0, 5e-3, outputs=201)
+    c = run.contacts
+    held = np.linalg.norm(c.tangential_force, axis=1)
+    assert c.normal_force.max() > 50 * G
+    assert (held <= (1 + 1e-9) * friction * c.normal_force + 1e-9).all()

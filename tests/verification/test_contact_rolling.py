@@ -99,42 +99,94 @@ def test_spinning_friction_stops_a_ball():
     assert run["body"].position[-1] == pytest.approx([0, 0, R], abs=1e-9)
 
 
-def unbalanced(step, held):
-    """A ball with its mass centre 3 cm off its middle rolls to and fro; ``held``: by a spring, of next to no stiffness."""
+def unbalanced(step, held, span=1.0, off=0.03, tilt=np.cos(1.0)):
+    """A ball with its mass centre off its middle rolls to and fro; ``held``: by a spring, of next to no stiffness."""
     m = floor(friction=5.0)
-    tilt = np.cos(1.0)
-    ball = fb.Sphere(radius=0.1, position=(0, 0, 0.03))
+    ball = fb.Sphere(radius=0.1, position=(0, 0, off))
     inertia = (2e-3, 2e-3, 2e-3)
-    at = (0, 0, 0.1 - 0.03 * tilt)
-    m.add(fb.Body("ball", shape=ball, mass=1, inertia=inertia, com=(0, 0, 0), position=at, orientation=(0, 1.0, 0)))
+    at = (0, 0, 0.1 - off * np.cos(tilt))
+    m.add(fb.Body("ball", shape=ball, mass=1, inertia=inertia, com=(0, 0, 0), position=at, orientation=(0, tilt, 0)))
     if held:
         m.add(fb.SpringDamper("spring", "ground", "ball", at=((0, 0, 9), at), stiffness=1e-6))
-    return stepped(m, 1.0, step, outputs=101)
+    return stepped(m, span, step, outputs=101)
 
 
 def test_an_unbalanced_ball_keeps_its_energy():
-    """To the second order in the step: 1e-4 of it at 5 ms."""
+    """To the third order in the step: 0.5 % in 5 s at 10 ms, of that above rest. It neither slides nor is hit."""
     off = {}
-    for step in (5e-3, 2.5e-3, 1.25e-3):
-        run = unbalanced(step, False)
-        off[step] = np.abs(run.energy.total / run.energy.total[0] - 1).max()
-        assert not any("contacts gave" in w for w in run.health.warnings)
-    assert off[5e-3] < 1e-4
-    assert off[5e-3] > 3 * off[2.5e-3] > 9 * off[1.25e-3]
+    for step in (1e-2, 5e-3, 2.5e-3):
+        run = unbalanced(step, False, 5.0, off=0.06, tilt=2.0)
+        off[step] = abs(run.energy.total[-1] - run.energy.total[0]) / (run.energy.total[0] - G * 0.04)
+        assert run.energy.numerical_loss[-1] == pytest.approx(run.energy.total[0] - run.energy.total[-1], abs=1e-9)
+        assert np.abs([run.energy.impact_loss, run.energy.friction_loss]).max() < 1e-9
+        assert not run.health.doubtful
+    assert off[1e-2] < 1e-2
+    assert off[1e-2] > 5 * off[5e-3] > 25 * off[2.5e-3]
 
 
-@pytest.mark.parametrize("step", [5e-3, 2e-4])
-def test_energy_that_long_steps_give_is_told(step):
-    """Of what belongs to a mechanism the turning of contacts is of the first order in the step."""
+@pytest.mark.parametrize("step", [5e-3, 1e-3])
+def test_an_unbalanced_ball_on_a_spring_keeps_its_energy(step):
+    """The same of what belongs to a mechanism."""
     run = unbalanced(step, True)
-    grown = run.energy.total[-1] / run.energy.total[0] - 1
-    assert 0 < grown < 5 * step
-    assert any("contacts gave" in w for w in run.health.warnings) == (step > 1e-3)
+    assert abs(run.energy.total[-1] / run.energy.total[0] - 1) < 1e-5
+    assert not run.health.doubtful
+
+
+CELT = np.array([0.2, 0.03, 0.02])  # semi-axes
+SKEW = np.array([[2e-4, -2e-5, 0], [-2e-5, 1.6e-3, 0], [0, 0, 1.7e-3]])
+DROP = np.array([0, 0, 0.01])  # from the mass centre to the ellipsoid's
+
+
+def celt(spin, tilt):
+    """An ellipsoid of 1 kg that rolls, its principal axes of inertia askew."""
+    up = np.array([0, np.sin(tilt), np.cos(tilt)])
+    foot = DROP - CELT**2 * up / np.sqrt((CELT**2 * up**2).sum())
+    turned = np.array([[1, 0, 0], [0, up[2], -up[1]], [0, up[1], up[2]]])
+    m = floor(friction=5.0)
+    shape = fb.Ellipsoid(semi_axes=CELT, position=DROP)
+    place = {"position": (0, 0, -(turned @ foot)[2]), "orientation": (tilt, 0, 0)}
+    moves = {"velocity": np.cross(turned @ foot, [0, 0, spin]), "angular_velocity": (0, 0, spin)}
+    m.add(fb.Body("stone", mass=1, inertia=SKEW, com=(0, 0, 0), shape=shape, **place, **moves))
+    return m
+
+
+def celt_exact(spin, tilt, t):
+    """Spin about the vertical, by the equations in body axes (Kane and Levinson 1982): J w' + w x J w = r x F."""
+    from scipy.integrate import solve_ivp
+
+    def rates(_, y):
+        w, n = y[:3], y[3:]
+        n1, size = np.cross(n, w), np.sqrt((CELT**2 * n * n).sum())
+        r = DROP - CELT**2 * n / size
+        r1 = -(CELT**2) * n1 / size + CELT**2 * n * (CELT**2 * n * n1).sum() / size**3
+        known = np.cross(r1, w) + np.cross(w, np.cross(r, w)) + G * n
+        x, y_, z = r
+        X = np.array([[0, -z, y_], [z, 0, -x], [-y_, x, 0]])
+        return np.r_[np.linalg.solve(SKEW - X @ X, np.cross(r, known) - np.cross(w, SKEW @ w)), n1]
+
+    up = np.array([0, np.sin(tilt), np.cos(tilt)])
+    y = solve_ivp(rates, (0, t[-1]), np.r_[spin * up, up], "DOP853", t, rtol=1e-9, atol=1e-11).y
+    return (y[:3] * y[3:]).sum(axis=0)
+
+
+def test_a_rattleback_rocks_up_from_its_spin():
+    """Rocking grows by what spin loses, which a method that takes energy would eat; what it takes is told and judged."""
+    tilt = np.radians(3.0)
+    run = stepped(celt(-5.0, tilt), 2.0, 2.5e-4, outputs=21)
+    assert run["stone.omega_z"] == pytest.approx(celt_exact(-5.0, tilt, run.t), abs=0.1)
+    assert abs(run.energy.total[-1] - run.energy.total[0]) < 5e-3 * run.energy.kinetic[0]
+    assert not run.health.doubtful
+    rough = stepped(celt(-5.0, tilt), 5.0, 1e-3, outputs=26)
+    lost = rough.energy.total[0] - rough.energy.total[-1]
+    assert lost > 0.02 * rough.energy.kinetic[0]
+    assert rough.energy.numerical_loss[-1] == pytest.approx(lost, rel=1e-6)
+    assert any("numerical_loss" in text for text in rough.health.doubtful) and "doubtful" in rough.health.status
 
 
 def test_a_ball_rolls_down_a_sphere():
     """As 7/10 v^2 = g (R + r) (cos a - cos b) has it, to the second order in the step: its normal turns."""
     from scipy.integrate import quad
+    from scipy.interpolate import CubicSpline
 
     size, a, b = 1.1, 0.1, 0.8  # it leaves at cos b = 10/17 cos a
 
@@ -150,8 +202,8 @@ def test_a_ball_rolls_down_a_sphere():
         n = round(1.02 * exact / step)
         run = stepped(m, n * step, step, outputs=n + 1)
         angle = np.arctan2(run["ball"].x, run["ball"].z)
-        off.append(abs(np.interp(b, angle, run.t) - exact))
+        off.append(abs(CubicSpline(angle, run.t)(b) - exact))
         overlap.append(run.health.contact.worst_overlap)
         assert abs(run.energy.total[-1] / run.energy.total[0] - 1) < 1e-4
-    assert off[0] < 2e-3
+    assert off[0] < 2e-5
     assert off[0] > 3 * off[1] > 9 * off[2]

@@ -7,8 +7,9 @@ from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..contact.broad.search import FASTER, MIDWAY
 from ..contact.broad.search import STEP as STEP_ON
-from ..contact.tables import AHEAD, BEFORE, DONE, FOUND, GAP, NUMBER
-from ..numerics.cone.operator import seen
+from ..contact.tables import AHEAD, BEFORE, DONE, FOUND, GAP, NORMAL, NUMBER
+from ..math.vec import load3, put3
+from ..numerics.cone.operator import push, seen
 from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
 from .bounce import ROUNDS, bounce, no_kicks
 from .joined import (
@@ -35,7 +36,7 @@ from .joined import VELOCITIES as VELOCITIES_AFTER
 from .lifts import PASSES as AGAIN
 from .lifts import sunk
 from .motion import begin, displace, fall, halfway, rest
-from .onward import begin_contacts, half_on, keep_start, lead, middle_rows, put_back_poses
+from .onward import begin_contacts, half_on, keep_start, kicked, lead, middle_rows, put_back_poses
 from .penalty import FEW, PASSES, aim, find_yielding, linearise, put_back, settled, start_rows, store
 from .record import book, book_turning
 from .rows import fill_rows, sides, static_where_stuck, warm
@@ -47,6 +48,7 @@ from .tables import (
     FIRST_OVERLAP,
     FLAT,
     GIVEN,
+    GOES_ON,
     HIT,
     IMPACTS,
     ITERATIONS,
@@ -54,9 +56,11 @@ from .tables import (
     KICK,
     LAST_STEP,
     LEFT,
+    LEFT_OVER,
     LIFTS,
     LOST_FRICTION,
     LOST_IMPACT,
+    MIDDLE,
     MOST_CONTACTS,
     NUMERICAL,
     POSITIONS,
@@ -123,6 +127,7 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
         ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
     if ended != CONVERGED and O.real[RESIDUAL] > pace.real[ROUGH] * pace.real[STEP]:
         pace.count[CUTS] += 1
+    pace.real[LEFT_OVER] = O.real[RESIDUAL]
     if O.real[RESIDUAL] > pace.real[WORST_RESIDUAL]:
         pace.real[WORST_RESIDUAL] = O.real[RESIDUAL]
         pace.real[WORST_AT] = pace.real[TIME] + pace.real[STEP]
@@ -133,7 +138,9 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
 
 @formula
 def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
-    """Displacements that leave no overlap, from those of the mean velocities; see ``motion.displace``.
+    """Displacements that leave no overlap, and no gap of what goes on, from those of the mean velocities.
+
+    See ``motion.displace``.
 
     min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. On the way
     impulses are booked, since the mean velocities are at hand.
@@ -149,7 +156,7 @@ def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
             gap = aim(now, c, gap)
         else:
             pace.real[WORST_OVERLAP] = min(pace.real[WORST_OVERLAP], C.x[c, GAP])
-        deepest = min(deepest, gap)
+        deepest = min(deepest, -abs(gap) if now[c, GOES_ON] == MIDDLE else gap)
         Q.bias[c, 0] = R.bias[c, 0] = gap / h
         book(P, X, c, u, pace, now)
         if P.turn.shape[0] > 0:
@@ -160,6 +167,7 @@ def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
         pace.real[FIRST_OVERLAP] = pace.real[WORST_OVERLAP]
     rest(Y)
     if deepest < -pace.real[FLAT]:
+        hold_down(C, P, X, Y, now)
         Q.size[0] = C.count[FOUND]
         solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
     if pace.count[YIELDING] != 0:
@@ -167,7 +175,16 @@ def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
 
 
 @formula
-def onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace):
+def hold_down(C, P, X, Y, now):
+    """Let displacements close gaps of the contacts that go on: as far as these press, which is what they start from."""
+    for c in range(C.count[FOUND]):
+        if now[c, GOES_ON] == MIDDLE:
+            push(P, Y.v, Y.wide, c, (-X.p[c, 0], 0.0, 0.0))
+            Y.p[c, 0] = X.p[c, 0]
+
+
+@formula
+def onto_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, pace, now):
     """End the mechanism's step on its joints, and lift again where that made contacts overlap. Returns a status."""
     for n in range(AGAIN + 1):
         if held_by_joints(A, M, C, P, Y, pace, FINISH) != DONE:
@@ -177,6 +194,7 @@ def onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace):
         if not sunk(G, A, M, C, P, Q, Y, R.bias, pace):
             break
         rest(Y)
+        hold_down(C, P, X, Y, now)
         solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
     return DONE
 
@@ -204,7 +222,7 @@ def back(N, A, X, pace, sums):
 def search_again(G, M, C, H, B, Z, pace, now):
     """Contacts with the velocities after impacts, which may meet what nothing moved towards before. Returns a status.
 
-    What was hit, and is none any more, stays to be told of; impulses of impacts stay with their contacts.
+    What was hit, and is none any more or has another normal, stays a contact: its impulse is along the normal it had.
     """
     status, most = enter(pace.door[SEARCHING], G, M, H, C, B, FASTER), H.at.shape[0]
     n = H.count[FOUND]
@@ -214,22 +232,21 @@ def search_again(G, M, C, H, B, Z, pace, now):
     C.count[NUMBER] = H.count[NUMBER]
     for k in range(n):
         o = H.at[k, BEFORE]
-        for i in range(3):
-            Z.p[k, i] = now[o, KICK + i] if o >= 0 else 0.0
-        if o >= 0:
+        same = o >= 0 and not (kicked(now, o) and load3(C.x, o, NORMAL) != load3(H.x, k, NORMAL))
+        put3(Z.p, k, 0, load3(now, o, KICK) if same else (0.0, 0.0, 0.0))
+        if same:
             now[o, HIT] = -1.0
+        if o >= 0:
             H.at[k, BEFORE] = C.at[o, BEFORE]
     for o in range(C.count[FOUND]):
-        hit = now[o, KICK] != 0.0 or now[o, KICK + 1] != 0.0 or now[o, KICK + 2] != 0.0
-        if hit and now[o, HIT] >= 0.0 and n < most:
-            for i in range(3):
-                Z.p[n, i] = now[o, KICK + i]
+        if kicked(now, o) and now[o, HIT] >= 0.0 and n < most:
+            put3(Z.p, n, 0, load3(now, o, KICK))
             copy_contact(C, o, H, n)
+            H.at[n, BEFORE] = -1
             n += 1
     for k in range(n):
         copy_contact(H, k, C, k)
-        for i in range(3):
-            now[k, KICK + i] = Z.p[k, i]
+        put3(now, k, KICK, load3(Z.p, k, 0))
     C.count[FOUND] = n
     return DONE
 
@@ -313,7 +330,7 @@ def step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, bef
         back(N, A, X, pace, sums)
         return status
     positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now)
-    if onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace) != DONE:
+    if onto_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, pace, now) != DONE:
         back(N, A, X, pace, sums)
         return NO_WAY
     displace(N, M, X, Y.v, pace)

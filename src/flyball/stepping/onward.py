@@ -3,8 +3,8 @@
 A contact that pressed in the step before, and neither opens nor is hit, takes no energy if its impulse p acts along the
 row D along which the mean velocity of the step vanishes: its work is p . D (v- + v+) / 2. So D v+ = -D v-, with rows in
 the middle of the step, where bodies are after half of it with the velocities of its start. This is the midpoint rule
-of constraints; what is left of the energy's error is what displacements out of overlaps do, of the second order in the
-step and nearly without a trend.
+of constraints. Gaps and overlaps that are left are closed by displacements, as far as the contact presses; what these
+change the energy of gravity by is the error that is left, of the third order in the step.
 
 The rule returns a velocity that the contact has at the start of the step with the opposite sign, so that what blows and
 solvers leave would never go. It is used where this velocity is less than what the rows change by in half a step, which
@@ -27,6 +27,7 @@ from .tables import (
     GOES_ON,
     KICK,
     LEAD,
+    LEFT_OVER,
     MIDDLE,
     PRESSES,
     SEEN_FIRST,
@@ -38,6 +39,7 @@ from .tables import (
 
 NEAR = 0.95  # cosine between normals of a step's start and its middle from which on a contact is none that goes on
 SMOOTH = 0.3  # part of the velocities by which rows may change in half a step: a contact that jumps does not go on
+CLEAR = 10.0  # times the residual of the last solve: what is slower may be noise of it
 STILL = 1e-9  # change of a normal, or turn of a body, in a step that is none
 STRAIGHT = 1e-10  # part of an arm across the normal that is none: as in balls
 
@@ -106,10 +108,36 @@ def seen_first(G, C, N, P, X, c):
     for side in range(2):
         a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
         if a >= 0:
-            free = a < N.body.shape[0]
-            v, w = (load3(X.v, a, 0), load3(X.v, a, 3)) if free else (load3(N.start, a, 12), load3(N.start, a, 15))
+            v, w = twist_first(N, X, a)
             u = add(u, scale(2.0 * side - 1.0, add(v, cross(w, load3(P.arm, c, 3 * side)))))
     return u
+
+
+@formula
+def twist_first(N, X, a):
+    """Velocities of mover a at the start of the step."""
+    if a < N.body.shape[0]:
+        return load3(X.v, a, 0), load3(X.v, a, 3)
+    return load3(N.start, a, 12), load3(N.start, a, 15)
+
+
+@formula
+def clear(G, C, N, P, X, c, pace):
+    """Whether the bodies' speeds at contact c are more than what the last solve left."""
+    fast, way = 0.0, (0.0, 0.0, 0.0)
+    for side in range(2):
+        a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+        if a >= 0:
+            v, w = twist_first(N, X, a)
+            fast += norm(cross(w, load3(P.arm, c, 3 * side)))
+            way = add(way, scale(2.0 * side - 1.0, v))
+    return fast + norm(way) > CLEAR * pace.real[LEFT_OVER]
+
+
+@formula
+def kicked(now, c):
+    """Whether contact c had an impact before the step."""
+    return now[c, KICK] != 0.0 or now[c, KICK + 1] != 0.0 or now[c, KICK + 2] != 0.0
 
 
 @formula
@@ -120,8 +148,7 @@ def was_hit(G, C, now, c, impacts):
     """
     first, any_ = impacts
     a, b = sides(G, C, c)
-    kicked = now[c, KICK] != 0.0 or now[c, KICK + 1] != 0.0 or now[c, KICK + 2] != 0.0
-    return kicked or (any_ and max(a, b) >= first)
+    return kicked(now, c) or (any_ and max(a, b) >= first)
 
 
 @formula
@@ -140,7 +167,8 @@ def begin_contacts(G, M, C, D, N, P, X, L, pace, now, before, impacts):
         closing = -dot(load3(C.x, c, NORMAL), u)
         if soft or closing <= pace.real[ENOUGH_V]:
             now[c, GOES_ON] = PRESSES
-        if not soft and closing <= slow and not was_hit(G, C, now, c, impacts) and changes(G, M, C, D, P, c, h):
+        steady = closing <= slow and not was_hit(G, C, now, c, impacts) and clear(G, C, N, P, X, c, pace)
+        if not soft and steady and changes(G, M, C, D, P, c, h):
             now[c, GOES_ON] = WANTED
             wanted = True
     return wanted
@@ -199,7 +227,8 @@ def lead(G, M, C, P, X, now, before):
         u = seen(P, X.v, X.wide, c)
         first = along(P, c, load3(now, c, SEEN_FIRST))
         more = sub(u, first)
-        ahead = (u[0] if abs(first[0]) <= abs(more[0]) else more[0], 0.0, 0.0)
+        mean = abs(first[0]) <= abs(more[0])
+        ahead = (u[0] if mean else more[0], 0.0, 0.0)
         if not straight(P, M, G, C, c):
             s, t = more[1], more[2]
             own = P.bias[c, 1], P.bias[c, 2]
@@ -207,5 +236,9 @@ def lead(G, M, C, P, X, now, before):
             if before[C.at[c, BEFORE], SLIDES] == 0.0 and a * a + b * b <= s * s + t * t:
                 s, t = u[1] + own[0], u[2] + own[1]
             ahead = (ahead[0], s, t)
-        put3(P.bias, c, 0, add(load3(P.bias, c, 0), ahead))
         put3(now, c, LEAD, ahead)
+        if mean:  # displacements close its gap
+            P.bias[c, 0] = 0.0
+        else:
+            now[c, GOES_ON] = WANTED
+        put3(P.bias, c, 0, add(load3(P.bias, c, 0), ahead))

@@ -20,7 +20,7 @@ ANGLE = 6  # column of Free.move, behind velocities: angle [rad] about z turned 
 # the end, overlap that is its spring's; impulse of its torque in the world; relative angular
 # velocity before an impact; part of its bias that is no velocity of a surface or gap; relative velocity at the start of
 # the step, in the world; whether it goes on: 0, pressed, and at rest along the normal, in the step before (PRESSES), or
-# besides with rows that are wanted (WANTED), and found, in the middle of the step (MIDDLE)
+# besides with rows wanted in the middle of the step (WANTED), which are found, and make it a mean (MIDDLE)
 IMPULSE, SLIDES, HIT, KICK, BEFORE_KICK = 0, 3, 4, 5, 8
 STIFF, OVERLAP, RATE, SHARE, TARGET, END_GAP, KEPT = range(11, 18)
 TORQUE, TURNED_BEFORE, LEAD, SEEN_FIRST, GOES_ON = 18, 21, 24, 27, 30
@@ -37,6 +37,7 @@ STORED, STORED_FIRST = 18, 19  # energy in contacts that give way: now, and at t
 LAST_STEP = 20  # the step before, 0 if there was none
 NUMERICAL = 21  # energy that the method took: rows that change within a step, displacements out of overlaps, damping
 LONGEST = 22  # the step before it is divided
+LEFT_OVER = 23  # residual [m/s] of the last solve for velocities
 REALS = 24
 # entries of Pace.count: steps still to take, steps taken; most iterations for velocities and positions; law of
 # restitution; iterations done, solves cut off, most contacts; how many impacts, in how many of them expansion was cut;
