@@ -218,7 +218,7 @@ class Study:
             if missed:
                 out.append((name, "; ".join(missed)))
         if any(name.startswith(("mean(", "rms(")) for name in self.of):
-            out.append(("mean, rms", "over the output times, each of which counts alike"))
+            out.append(("mean, rms", "over time by the trapezoidal rule between the output times"))
         remarks = {k: text for k, text in self.remarks.items() if text != self.doubtful.get(k)}
         out += self._listed("failed", self.reasons, "reasons")
         out += self._listed("doubtful", self.doubtful, "doubtful")
