@@ -177,7 +177,8 @@ def _failure(x: State, names: list[str]) -> NotConverged:
     """The error for a search that did not settle: what is left of forces, or which constraints are not fulfilled."""
     s, e = x.c.structure, Equations(x)
     left, known = e.block("r"), velocity_names(s)
-    begin = f"no steady motion of {s.model.name!r} was found in which {', '.join(names)} turn evenly and all else stands still"
+    who = ", ".join(names)
+    begin = f"no steady motion of {s.model.name!r} was found in which {who} turn evenly and all else stands still"
     residuals = {n.name: float(-value) for n, value in zip(known, left, strict=True)}
     gaps, misses = _gaps(e), _misses(e)
     if max(gaps.max(initial=0.0), misses.max(initial=0.0)) > SETTLED:
