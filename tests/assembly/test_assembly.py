@@ -66,23 +66,42 @@ def assert_closed(model, a):
         assert cosine == pytest.approx(1.0, abs=1e-9), f"{name} is not parallel"
 
 
-def rough_spatial_four_bar(seed=0, spread=0.3, angle=1.0):
-    """Revolute, spherical, universal, revolute, by frames; every body thrown and turned."""
+def rough_spatial_four_bar(seed=0, spread=0.3, angle=1.0, unit=1.0):
+    """Revolute, spherical, universal, revolute, by frames; every body thrown and turned; lengths in parts of a unit."""
     m = fb.Mechanism("rough spatial four-bar")
     random = np.random.default_rng(seed)
     for name in ("crank", "coupler", "rocker"):
         axis = random.normal(size=3)
         turn = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))
         m.add(
-            fb.Body(name, mass=1, inertia=(0.01, 0.01, 0.01), position=spread * random.normal(size=3), orientation=turn)
+            fb.Body(
+                name,
+                mass=1,
+                inertia=(0.01 * unit**2,) * 3,
+                position=unit * spread * random.normal(size=3),
+                orientation=turn,
+                velocity=tuple(unit * np.array([0.3, -0.2, 0.5])),
+                angular_velocity=(1, 2, -1),
+            )
         )
-    length = np.sqrt(0.05**2 + 0.5**2 + 0.35**2)
+    length = unit * np.sqrt(0.05**2 + 0.5**2 + 0.35**2)
     along_x, along_y = (0, "90 deg", 0), ("90 deg", 0, 0)
     framed(m, fb.Revolute, "A", "ground", (0, 0, 0), "crank", (0, 0, 0))
-    framed(m, fb.Spherical, "B", "crank", (0.15, 0, 0), "coupler", (0, 0, 0))
-    framed(m, fb.Universal, "C", "coupler", (0, 0, length), "rocker", (0, 0, 0.35), along_y, along_x)
-    framed(m, fb.Revolute, "D", "ground", (0.2, 0.5, 0), "rocker", (0, 0, 0), along_x, along_x)
+    framed(m, fb.Spherical, "B", "crank", (0.15 * unit, 0, 0), "coupler", (0, 0, 0))
+    framed(m, fb.Universal, "C", "coupler", (0, 0, length), "rocker", (0, 0, 0.35 * unit), along_y, along_x)
+    framed(m, fb.Revolute, "D", "ground", (0.2 * unit, 0.5 * unit, 0), "rocker", (0, 0, 0), along_x, along_x)
     return m
+
+
+@pytest.mark.parametrize("unit", [1e-4, 1e4])
+@pytest.mark.parametrize("seed", [16, 19, 24, 46, 55, 58])
+def test_a_start_does_not_depend_on_the_unit_of_length(seed, unit):
+    """Positions and velocities of a mechanism that is a ten thousandth or ten thousand times as large."""
+    one, other = (rough_spatial_four_bar(seed, unit=u).assemble() for u in (1.0, unit))
+    for before, after in zip((one.q, one.v), (other.q, other.v), strict=True):
+        a, b = before.reshape(3, -1).copy(), after.reshape(3, -1).copy()
+        b[:, :3] /= unit
+        assert b == pytest.approx(a, abs=1e-9)
 
 
 def chain(links, offset, angle, seed):

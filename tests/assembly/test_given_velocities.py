@@ -66,6 +66,36 @@ def test_what_cannot_be_kept_is_said(capsys):
     assert d.text in report.warnings[0]
 
 
+def near_dead_centre(angle, **given):
+    """A slider-crank, crank 0.1 m and rod 0.3 m, the crank ``angle`` from where it lies along the rod."""
+    m = fb.Mechanism("press", planar=True)
+    pin, slider = np.array([0.1 * np.cos(angle), 0.1 * np.sin(angle)]), 0.0
+    slider = pin[0] + np.sqrt(0.09 - pin[1] ** 2)
+    m.add(fb.Body("crank", mass=1, inertia=1e-3, position=tuple(pin / 2), angle=angle))
+    m.add(fb.Body("rod", mass=1, inertia=1e-2, position=((pin[0] + slider) / 2, pin[1] / 2)))
+    m.add(fb.Body("slider", mass=5, inertia=1, position=(slider, 0), **given))
+    m.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Revolute("B", "crank", "rod", at=tuple(pin)))
+    m.add(fb.Revolute("C", "rod", "slider", at=(slider, 0)))
+    m.add(fb.Prismatic("G", "ground", "slider", at=(slider, 0), axis=(1, 0)))
+    return m
+
+
+def test_a_velocity_that_nobody_gave_and_that_is_very_large_is_said():
+    """A slider is told to move slantwise 1e-3 from the dead centre: what the guide lets through spins the crank.
+
+    x' = -r w (sin a + cos a sin a r / (l cos b)), so w is some -0.5 / (0.1 * 1e-3 * 4/3) rad/s.
+    """
+    m = near_dead_centre(1e-3, velocity=(0.5, 0.3))
+    with pytest.warns(fb.StartWarning, match="angular velocity of 'crank': not given, got"):
+        r = m.simulate(1e-7, outputs=2)
+    d = next(d for d in r.health.departures if d.element == "crank")
+    assert (d.given, d.what, d.unit) == ((), "angular_velocity", "rad/s")
+    assert d.got[0] == pytest.approx(-0.5 / (0.1 * 1e-3 * 4 / 3), rel=1e-5)
+    assert "velocities far larger than those given: angular velocity of 'crank'" in dict(r.health.lines())["assembly"]
+    assert any("not given" in w for w in m.check().warnings)
+    assert not [d for d in near_dead_centre(0.5, velocity=(0.5, 0)).assemble().departures if d.what != "position"]
+
+
 def test_departures_come_back_from_a_file(tmp_path):
     with pytest.warns(fb.StartWarning):
         r = hinged(velocity=(5, 0)).simulate(0.01, outputs=2)

@@ -115,5 +115,5 @@ def test_what_has_no_place_in_a_file_is_refused(tmp_path: Path) -> None:
 
 def test_a_description_is_not_saved_as_a_program(tmp_path):
     """It would be run as one when it is loaded."""
-    with pytest.raises(fb.ModelError, match=r"saved as TOML; name it '\*\.toml'"):
+    with pytest.raises(fb.ModelError, match=r"ending '\.py' is not known here; it must be \.toml"):
         fb.Mechanism("crane").save(tmp_path / "crane.py")

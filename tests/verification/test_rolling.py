@@ -132,3 +132,39 @@ def test_chaplygin_sleigh_ends_on_a_straight_line():
     r = sleigh(60.0, outputs=11)
     assert r["sleigh.angle"][-1] == pytest.approx(5.771474235728, abs=1e-8)
     assert r["sleigh.omega"][-1] == pytest.approx(0.0, abs=1e-10)
+
+
+def bicycle(speed):
+    """The benchmark bicycle of Meijaard, Papadopoulos, Ruina and Schwab (Proc. R. Soc. A 463, 2007), z upwards."""
+    tilt, base, trail = np.pi / 10, 1.02, 0.08
+    m = fb.Mechanism("bicycle", gravity=(0, 0, -9.81))
+    m.add(fb.Body("rear", mass=2, inertia=(0.0603, 0.12, 0.0603), position=(0, 0, 0.3)))
+    frame = ((9.2, 0, -2.4), (0, 11, 0), (-2.4, 0, 2.8))
+    m.add(fb.Body("frame", mass=85, inertia=frame, position=(0.3, 0, 0.9)))
+    fork = ((0.05892, 0, 0.00756), (0, 0.06, 0), (0.00756, 0, 0.00708))
+    m.add(fb.Body("fork", mass=4, inertia=fork, position=(0.9, 0, 0.7), velocity=(speed, 0, 0)))
+    m.add(fb.Body("front", mass=3, inertia=(0.1405, 0.28, 0.1405), position=(base, 0, 0.35)))
+    m.add(fb.Revolute("rear hub", "frame", "rear", at=(0, 0, 0.3), axis=(0, 1, 0)))
+    m.add(fb.Revolute("head", "frame", "fork", at=(base + trail, 0, 0), axis=(-np.sin(tilt), 0, np.cos(tilt))))
+    m.add(fb.Revolute("front hub", "fork", "front", at=(base, 0, 0.35), axis=(0, 1, 0)))
+    m.add(fb.RollingDisk("rear rolls", "ground", "rear", at=(0, 0, 0.3), axis=(0, 1, 0), radius=0.3))
+    m.add(fb.RollingDisk("front rolls", "ground", "front", at=(base, 0, 0.35), axis=(0, 1, 0), radius=0.35))
+    return m
+
+
+def test_a_bicycle_rides_straight_on():
+    """Weave, castering and capsize at 5 m/s, by the published digits of the benchmark."""
+    m = bicycle(5.0)
+    e = m.equilibrium(turning=["fork.x", "rear hub.angle", "front hub.angle"])
+    assert e.speeds == pytest.approx({"fork.x": 5.0, "rear hub.angle": 5 / 0.3, "front hub.angle": 5 / 0.35})
+    found = m.linearize(about=e).eigenvalues
+    for published in (-0.77534188219585 + 4.46486771378823j, -14.0783896927982, -0.32286642900409):
+        assert np.abs(found - published).min() < 1e-6, published
+
+
+def test_what_a_steady_motion_cannot_fulfil_is_named():
+    """Wheels that turn while all else stands still slip: not a force of 1e-13 N is in the way, but a joint."""
+    with pytest.raises(
+        fb.NotConverged, match=r"RollingDisk '\w+ rolls' is not fulfilled .*rolls along, too \(one of fork\.x"
+    ):
+        bicycle(5.0).equilibrium(turning=["rear hub.angle"])

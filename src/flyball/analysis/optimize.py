@@ -114,6 +114,7 @@ class Search:
         self.count = 0
         self._best: tuple[float, np.ndarray, Any] | None = None
         self._first = 0.0
+        self._refused: list[str] = []  # why trials could not be computed
 
     def _bounds(self, to: Sequence[str] | Bounds, k: int) -> np.ndarray:
         out = np.full(len(self.names), np.inf if k else -np.inf)
@@ -136,7 +137,13 @@ class Search:
         if self._known is None or not np.array_equal(self._known[0], x):
             values = dict(zip(self.names, (x * self.scale).tolist(), strict=True))
             self.count += 1
-            found = sensitivity(self.model, self.asked.sensitivity(values))
+            try:
+                found = sensitivity(self.model, self.asked.sensitivity(values))
+            except AnalysisError as error:
+                named = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
+                error.args = (f"with {named}: {error}", *error.args[1:])
+                self._refused.append(str(error))
+                raise
             self.tell(self.count / self.asked.evaluations, f"{self.count} of at most {self.asked.evaluations} analyses")
             self._known = x.copy(), found
         return self._known[1]
@@ -231,11 +238,16 @@ class Search:
         found = self.at(x)
         best, start = (dict(zip(self.names, v.tolist(), strict=True)) for v in (x * self.scale, self.start))
         near = 1e-9 * (1.0 + np.abs(x))
+        message = message.rstrip(".")
+        if self._refused:
+            count = len(self._refused)
+            trials = f"{count} {'trial' if count == 1 else 'trials'} of {self.count} could not be computed"
+            message += f"; {trials} and the search stepped back; the last {self._refused[-1]}"
         at_bound = tuple(
             n for n, b in zip(self.names, (x - self.low < near) | (self.high - x < near), strict=True) if b
         )
         return Optimum(
-            best, start, cost, first, success, message.rstrip("."), self.count, self.asked.of or found.of, found.t,
+            best, start, cost, first, success, message, self.count, self.asked.of or found.of, found.t,
             found.values, at_bound, found.units,
         )  # fmt: skip
 

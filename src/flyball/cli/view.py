@@ -40,11 +40,13 @@ def _page(file: Path) -> Path:
 
     text = load_result(file).html()
     page = file.with_suffix(".html")
+    from ..model.writing import write
+
     try:
-        page.write_text(text, encoding="utf-8")
-    except OSError:
+        write(page, text)
+    except ModelError:
         import tempfile
 
         page = Path(tempfile.mkdtemp(prefix="flyball-")) / page.name
-        page.write_text(text, encoding="utf-8")
+        write(page, text)
     return page

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
-from ..errors import ModelError, cannot_write
+from ..errors import ModelError
 from .body import Body, Driver, Frame, Initial
 from .bulk import Bodies
 from .contact import Contact
@@ -33,6 +33,7 @@ from .sensor import IMU, Sensor
 from .shapes.mesh import Mesh, paths_from
 from .table import Table
 from .touch import Touch
+from .writing import DESCRIPTION, ending, write
 
 M = TypeVar("M", bound=Model)
 
@@ -75,13 +76,8 @@ def save(model: Model, path: str | os.PathLike) -> None:
     ModelError
         If the file cannot be written, or a value of the mechanism has no place in a file.
     """
-    if Path(path).suffix == ".py":
-        raise ModelError(f"cannot write {os.fspath(path)!r}: a description is saved as TOML; name it '*.toml'")
-    data = dumps(model, Path(path).parent).encode()
-    try:
-        Path(path).write_bytes(data)
-    except OSError as error:
-        raise cannot_write(path, error) from None
+    ending(path, DESCRIPTION)
+    write(path, dumps(model, Path(path).parent))
 
 
 def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:

@@ -12,6 +12,7 @@ from .numbers import number, tuple_of
 
 NAMED = 4  # elements that a line names
 WRITTEN = 1e-5  # part by which numbers written with some digits are off
+FAST = 100.0  # times the largest velocity that is given or prescribed, above which one that is not given is said
 VELOCITIES = ("velocity", "angular_velocity")
 
 
@@ -26,7 +27,8 @@ class Departure:
     what : str
         Its field: ``"position"``, ``"angle"``, ``"orientation"`` (quaternion), ``"velocity"``, ``"angular_velocity"``.
     given, got : tuple of float
-        As described, and where or how it starts: of the reference frame, along world axes.
+        As described, and where or how it starts: of the reference frame, along world axes. Of a velocity that is not
+        given, and is far larger than those that are, ``given`` is empty.
     unit : str
     """
 
@@ -39,7 +41,7 @@ class Departure:
     @property
     def distance(self) -> float:
         """How far apart these are [unit]; of orientations the angle of the turn between them [rad]."""
-        a, b = np.array(self.given), np.array(self.got)
+        a, b = np.array(self.given or (0.0,) * len(self.got)), np.array(self.got)
         if self.what == "orientation":
             # |a - b| = 2 |sin(theta / 4)|, |a + b| = 2 |cos(theta / 4)|; b and -b are the same orientation
             apart, opposite = sorted((float(np.linalg.norm(a - b)), float(np.linalg.norm(a + b))))
@@ -50,7 +52,8 @@ class Departure:
     def text(self) -> str:
         """In words."""
         field = self.what.replace("_", " ")
-        return f"{field} of {self.element!r}: given {_numbers(self.given)}, got {_numbers(self.got)} {self.unit}"
+        given = f"given {_numbers(self.given)}" if self.given else "not given"
+        return f"{field} of {self.element!r}: {given}, got {_numbers(self.got)} {self.unit}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -74,7 +77,7 @@ def _numbers(values: Sequence[float]) -> str:
 
 
 def changed_velocities(departures: Sequence[Departure]) -> list[Departure]:
-    """Given velocities that were changed by more than the digits that users write."""
+    """Given velocities that were changed by more than the digits that users write, and others that are very large."""
     return [
         d
         for d in departures
@@ -83,7 +86,13 @@ def changed_velocities(departures: Sequence[Departure]) -> list[Departure]:
 
 
 def not_allowed(d: Departure) -> str:
-    """What to say of a velocity that the start does not have, and what to do."""
+    """What to say of a velocity that the start does not have, or has unasked, and what to do."""
+    if not d.given:
+        return (
+            f"{d.text}: more than {FAST:g} times the largest velocity that is given; the constraints need it to keep "
+            f"given velocities as nearly as they can. Check those, and whether the position is near a dead centre, or "
+            f"give {d.element!r} a velocity too"
+        )
     return (
         f"{d.text}: joints, drivers or other given velocities do not allow it; the nearest was taken. Correct it, or "
         f"leave it out: what is not given is free"
@@ -105,7 +114,11 @@ def summary(departures: Sequence[Departure]) -> str:
         )
         text = f"closed after moving {count}, {worst.element} farthest: {far}"
     changed = changed_velocities(departures)
-    if changed:
-        more = f"; and {len(changed) - NAMED} more" if len(changed) > NAMED else ""
-        text += f"; velocities that the constraints do not allow: {'; '.join(d.text for d in changed[:NAMED])}{more}"
+    for what, found in (
+        ("velocities that the constraints do not allow", [d for d in changed if d.given]),
+        ("velocities far larger than those given", [d for d in changed if not d.given]),
+    ):
+        if found:
+            more = f"; and {len(found) - NAMED} more" if len(found) > NAMED else ""
+            text += f"; {what}: {'; '.join(d.text for d in found[:NAMED])}{more}"
     return text

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..model.writing import PAGE, write
 from .numbers import number
 from .touch import Touch
 
@@ -138,9 +139,7 @@ class Equilibrium:
 
     def to_html(self, path: str | os.PathLike) -> None:
         """Write the page that shows the mechanism where it is, and the verdict."""
-        from ..view.writing import write
-
-        write(path, self.html())
+        write(path, self.html(), PAGE)
 
     def _repr_html_(self) -> str:
         """The page, in a notebook."""

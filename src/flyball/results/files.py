@@ -11,17 +11,18 @@ from __future__ import annotations
 import copy
 import csv
 import hashlib
+import io
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import cannot_write
 from ..model.quantities import ENERGY
+from ..model.writing import TABLE, replacing, write
 from .labels import TIME, coordinates, labelled
 from .numbers import with_unit
 from .stored import put, text_type
@@ -80,58 +81,54 @@ def to_csv(result: Result, path: str | os.PathLike) -> None:
     channels = result.channels()
     header = [f"{TIME} [s]", *(with_unit(k, unit) for k, (unit, _) in channels.items())]
     columns = [result.t.tolist(), *(np.asarray(v).tolist() for _, v in channels.values())]
+    write_table(path, header, zip(*columns, strict=True))
 
-    def write(part: Path) -> None:
-        with open(part, "w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(header)
-            writer.writerows(zip(*columns, strict=True))
 
-    replaced(path, write)
+def write_table(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a table (.csv)."""
+    with replacing(path, TABLE) as file, io.TextIOWrapper(file, encoding="utf-8", newline="") as text:
+        writer = csv.writer(text)
+        writer.writerow(header)
+        writer.writerows(rows)
 
 
 def save(result: Result, path: str | os.PathLike, *, whole: bool = True) -> None:
     """Write everything, the model included, to one NetCDF file; the labelled quantities for other programs if told."""
-
-    def write(part: Path) -> None:
-        _write(result, part, whole)
-        seal(part)
-
-    replaced(path, write)
+    folder = Path(path).parent
+    write(path, sealed_file(lambda file: _write(result, file, whole, folder)))
 
 
-def replaced(path: str | os.PathLike, write: Callable[[Path], None]) -> None:
-    """Write beside the file and put it in place when done: a file that is there is a whole file."""
-    path = Path(path)
-    part = path.with_name(f".{path.name}.part")
-    try:
-        write(part)
-        part.replace(path)
-    except OSError as error:
-        raise cannot_write(path, error) from None
-    finally:
-        part.unlink(missing_ok=True)
+def sealed_file(fill: Callable[[Any], None]) -> memoryview:
+    """The bytes of a NetCDF file that a function fills, with their checksum behind the end.
 
-
-def _write(result: Result, path: Path, whole: bool) -> None:
+    In memory: where HDF5 meets a full disk it ends the process by a segmentation fault.
+    """
     import h5netcdf
 
-    with h5netcdf.File(path, "w") as file:
-        file.attrs.update(_about(result) | {"Conventions": "CF-1.11"})
-        file.dimensions[TIME] = len(result.t)
-        file.create_variable(TIME, (TIME,), data=result.t).attrs["units"] = "s"
-        for name, labels in coordinates(result).items() if whole else ():
-            file.dimensions[name] = len(labels)
-            file.create_variable(name, (name,), dtype=text_type(), data=np.array(labels, object))
-        listed = False
-        for x in labelled(_unread(result), MOST, forget=True) if whole else ():
-            made = file.create_variable(_safe(x.name), x.dims, data=np.ascontiguousarray(x.values))
-            made.attrs.update(_attributes(x.unit, x.note))
-            listed = listed or not x.name.startswith(f"{ENERGY}.")
-        if not listed:
-            what = "too many parts to list" if whole else "a motion that is not at its end"
-            file.attrs["comment"] = f"{what}: read this file with flyball.load_result"
-        _write_solution(result, file.create_group(GROUP), path.parent)
+    image = io.BytesIO()
+    with h5netcdf.File(image, "w") as file:
+        fill(file)
+    image.seek(0, io.SEEK_END)
+    image.write(SEAL + hashlib.sha256(image.getbuffer()).hexdigest().encode())
+    return image.getbuffer()
+
+
+def _write(result: Result, file: Any, whole: bool, folder: Path) -> None:
+    file.attrs.update(_about(result) | {"Conventions": "CF-1.11"})
+    file.dimensions[TIME] = len(result.t)
+    file.create_variable(TIME, (TIME,), data=result.t).attrs["units"] = "s"
+    for name, labels in coordinates(result).items() if whole else ():
+        file.dimensions[name] = len(labels)
+        file.create_variable(name, (name,), dtype=text_type(), data=np.array(labels, object))
+    listed = False
+    for x in labelled(_unread(result), MOST, forget=True) if whole else ():
+        made = file.create_variable(_safe(x.name), x.dims, data=np.ascontiguousarray(x.values))
+        made.attrs.update(_attributes(x.unit, x.note))
+        listed = listed or not x.name.startswith(f"{ENERGY}.")
+    if not listed:
+        what = "too many parts to list" if whole else "a motion that is not at its end"
+        file.attrs["comment"] = f"{what}: read this file with flyball.load_result"
+    _write_solution(result, file.create_group(GROUP), folder)
 
 
 def _unread(result: Result) -> Result:
@@ -142,13 +139,6 @@ def _unread(result: Result) -> Result:
             vars(out).pop(name, None)
     vars(out).pop("_views", None)
     return out
-
-
-def seal(path: Path) -> None:
-    """Write the checksum of a file behind its end."""
-    text = SEAL + file_hash(path, path.stat().st_size).encode()
-    with open(path, "ab") as file:
-        file.write(text)
 
 
 def sealed(path: Path) -> bool | None:

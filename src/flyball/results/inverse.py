@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ModelError, cannot_write
+from ..errors import ModelError
 from ..math.vec import cross, sub
 from ..model.coupling import Coupling
 from ..model.joint import Joint
 from ..model.model import listing, suggest
+from .files import write_table
 from .numbers import number, span, with_unit
 
 if TYPE_CHECKING:
@@ -271,13 +271,8 @@ class InverseDynamics:
         """Times, efforts and reactions as a table; the header holds names and units, undetermined cells are empty."""
         curves = self.channels()
         rows = np.column_stack([self.t, *(v for _, v in curves.values())])
-        try:
-            with open(path, "w", encoding="utf-8", newline="") as file:
-                out = csv.writer(file)
-                out.writerow(["time [s]", *(with_unit(k, unit) for k, (unit, _) in curves.items())])
-                out.writerows([["" if x != x else repr(x) for x in row] for row in rows.tolist()])
-        except OSError as error:
-            raise cannot_write(path, error) from None
+        header = ["time [s]", *(with_unit(k, unit) for k, (unit, _) in curves.items())]
+        write_table(path, header, (["" if x != x else repr(x) for x in row] for row in rows.tolist()))
 
     def plot(self, path: str | os.PathLike | None = None) -> Any:
         """Efforts and reactions over time; returns the Matplotlib figure, or writes it to ``path``."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..model.writing import PAGE, write
 from .growth import growing
 
 if TYPE_CHECKING:
@@ -162,9 +163,8 @@ class Modes:
     def to_html(self, path: str | os.PathLike, **options: Any) -> None:
         """Write a page in which the modes move; options as for `flyball.view.modes.page`."""
         from ..view.modes import page
-        from ..view.writing import write
 
-        write(path, page(self, **options))
+        write(path, page(self, **options), PAGE)
 
     def plot(self, path: str | os.PathLike | None = None) -> Any:
         """Eigenvalues in the complex plane; returns the Matplotlib figure, or writes it to ``path``."""

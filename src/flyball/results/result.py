@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.model import Model
 from ..model.quantities import ENERGY, MEMBER, one, quantities
+from ..model.writing import PAGE, RESULT, TABLE, ending, write
 from ..tables.values import Values
 from .booked import Begun
 from .bulk import Bulk
@@ -337,10 +338,24 @@ class Result:
         to_csv(self, path)
 
     def save(self, path: str | os.PathLike) -> None:
-        """Everything, the model included, as one NetCDF file; ``flyball.load_result`` reads it back."""
+        """Everything, the model included, as one NetCDF file (.nc); ``flyball.load_result`` reads it back.
+
+        The ending says what is written: a path that ends in .csv or .html is written as by `to_csv` or `to_html`.
+
+        Raises
+        ------
+        ModelError
+            If the ending is another, or the file cannot be written.
+        """
         from .files import save
 
-        save(self, path)
+        found = ending(path, (*RESULT, *TABLE, *PAGE))
+        if found in TABLE:
+            self.to_csv(path)
+        elif found in PAGE:
+            self.to_html(path)
+        else:
+            save(self, path)
 
     def plot(self, *names: str, path: str | os.PathLike | None = None) -> Any:
         """Plot curves over time; returns the Matplotlib figure, or writes it to ``path``."""
@@ -368,9 +383,7 @@ class Result:
         ModelError
             If the file cannot be written, or there is nothing to draw.
         """
-        from ..view.writing import write
-
-        write(path, self.html(**options))
+        write(path, self.html(**options), PAGE)
 
     def report(self, **options: Any) -> str:
         """The report as text: summary, animation, plots, tables of the model, and its file. Options as for `html`."""
@@ -386,9 +399,7 @@ class Result:
         ModelError
             If the file cannot be written, or there is nothing to draw.
         """
-        from ..view.writing import write
-
-        write(path, self.report(**options))
+        write(path, self.report(**options), PAGE)
 
     def _repr_html_(self) -> str:
         from ..view.notebook import iframe

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ModelError, cannot_write
+from ..errors import ModelError
 from ..model.words import listing, suggest
+from ..model.writing import RESULT, TABLE, ending, write
 from .indices import Indices
 from .numbers import plain, span
 from .study_file import RUN, save_study, to_xarray
@@ -218,7 +219,7 @@ class Study:
             if missed:
                 out.append((name, "; ".join(missed)))
         if any(name.startswith(("mean(", "rms(")) for name in self.of):
-            out.append(("mean, rms", "over the output times, each of which counts alike"))
+            out.append(("mean, rms", "over time by the trapezoidal rule between the output times"))
         remarks = {k: text for k, text in self.remarks.items() if text != self.doubtful.get(k)}
         out += self._listed("failed", self.reasons, "reasons")
         out += self._listed("doubtful", self.doubtful, "doubtful")
@@ -280,14 +281,14 @@ class Study:
 
     def to_csv(self, path: str | os.PathLike) -> None:
         """The table of `to_dataframe`; numbers are written exactly."""
-        try:
-            self.to_dataframe().to_csv(path)
-        except OSError as error:
-            raise cannot_write(path, error) from None
+        write(path, self.to_dataframe().to_csv(), TABLE)
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write it as one NetCDF file; ``flyball.load_study`` reads it back."""
-        save_study(self, path)
+        """Write it as one NetCDF file (.nc); ``flyball.load_study`` reads it back. A path in .csv: as by `to_csv`."""
+        if ending(path, (*RESULT, *TABLE)) in TABLE:
+            self.to_csv(path)
+        else:
+            save_study(self, path)
 
     def plot(self, *of: str, path: str | os.PathLike | None = None) -> Any:
         """Quantities over one parameter, as a surface over two, or scattered over each of more.

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .files import GROUP, SLASH, replaced, seal
+from ..model.writing import write
+from .files import GROUP, SLASH, sealed_file
 from .stored import text_type
 
 if TYPE_CHECKING:
@@ -61,37 +61,29 @@ def _about(study: Study) -> dict[str, str]:
 
 def save_study(study: Study, path: str | os.PathLike) -> None:
     """Write it to one NetCDF file: beside the file that may be there, which it then replaces."""
-
-    def write(part: Path) -> None:
-        _write(study, part)
-        seal(part)
-
-    replaced(path, write)
+    write(path, sealed_file(lambda file: _write(study, file)))
 
 
-def _write(study: Study, path: Path) -> None:
-    import h5netcdf
-
+def _write(study: Study, file: Any) -> None:
     texts = {k: getattr(study, k) for k in TOLD}
     texts["options"] = {k: _plain(x) for k, x in study.options.items()}
     texts |= {k: getattr(study, k) for k in BY_RUN}
-    with h5netcdf.File(path, "w") as file:
-        file.attrs.update(_about(study) | {"Conventions": "CF-1.11"})
-        file.dimensions[RUN], file.dimensions[TIME] = len(study), len(study.t)
-        file.create_variable(TIME, (TIME,), data=study.t).attrs["units"] = "s"
-        for k, name in enumerate(study.parameters):
-            file.create_variable(safe(f"parameter {name}"), (RUN,), data=np.ascontiguousarray(study.points[:, k]))
-        for (name, x), unit in zip(study.values.items(), study.units, strict=True):
-            made = file.create_variable(safe(name), (RUN, TIME)[: x.ndim], data=np.ascontiguousarray(x))
-            made.attrs["units"] = unit or "1"
-        file.create_variable("status", (RUN,), data=study.status)
-        file.create_variable("doubtful", (RUN,), data=_doubted(study)).attrs.update(DOUBTED)
-        group = file.create_group(GROUP)
-        group.attrs["study"] = FORMAT
-        group.create_variable("study", (), dtype=text_type(), data=np.array(json.dumps(texts), object))
-        for k, axis in enumerate(study.axes):
-            group.dimensions[f"n_{k}"] = len(axis)
-            group.create_variable(f"axis_{k}", (f"n_{k}",), data=axis)
+    file.attrs.update(_about(study) | {"Conventions": "CF-1.11"})
+    file.dimensions[RUN], file.dimensions[TIME] = len(study), len(study.t)
+    file.create_variable(TIME, (TIME,), data=study.t).attrs["units"] = "s"
+    for k, name in enumerate(study.parameters):
+        file.create_variable(safe(f"parameter {name}"), (RUN,), data=np.ascontiguousarray(study.points[:, k]))
+    for (name, x), unit in zip(study.values.items(), study.units, strict=True):
+        made = file.create_variable(safe(name), (RUN, TIME)[: x.ndim], data=np.ascontiguousarray(x))
+        made.attrs["units"] = unit or "1"
+    file.create_variable("status", (RUN,), data=study.status)
+    file.create_variable("doubtful", (RUN,), data=_doubted(study)).attrs.update(DOUBTED)
+    group = file.create_group(GROUP)
+    group.attrs["study"] = FORMAT
+    group.create_variable("study", (), dtype=text_type(), data=np.array(json.dumps(texts), object))
+    for k, axis in enumerate(study.axes):
+        group.dimensions[f"n_{k}"] = len(axis)
+        group.create_variable(f"axis_{k}", (f"n_{k}",), data=axis)
 
 
 def _plain(x: Any) -> Any:

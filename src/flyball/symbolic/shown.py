@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from ..errors import ModelError
 from ..graph.values import written_out
+from ..model.writing import LATEX, PAGE, write
 from .document.document import document
 from .document.parts import Document
 from .document.plain import plain
@@ -65,9 +66,7 @@ class Shown:
         ModelError
             If the file cannot be written.
         """
-        from ..view.writing import write
-
-        write(path, self.latex())
+        write(path, self.latex(), LATEX)
 
     def html(self) -> str:
         """All of it as one page that needs no network: browsers draw its formulas (MathML) by themselves."""
@@ -83,9 +82,7 @@ class Shown:
         ModelError
             If the file cannot be written.
         """
-        from ..view.writing import write
-
-        write(path, self.html())
+        write(path, self.html(), PAGE)
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts: sizes, and the names of all symbols."""

@@ -6,12 +6,11 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache, partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from ..errors import ModelError, cannot_write
+from ..model.writing import PICTURE, ending, replacing
 from ..results.numbers import with_unit
 from .figures import hidden
 from .marks import draw_marks
@@ -54,7 +53,6 @@ STYLE: dict[str, Any] = {
 }
 RAISED = str.maketrans("\N{MINUS SIGN}-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SHIPPED = "DejaVu Sans"  # with Matplotlib; not every font has raised figures
-SUFFIXES = (".png", ".svg", ".pdf")
 PRETTY = {"N*m": "N m", "m/s^2": "m/s²", "rad/s^2": "rad/s²", "1": "-"}
 BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.04), "borderaxespad": 0.4}
 
@@ -106,22 +104,17 @@ def handed_out(drawing: Drawing, path: str | os.PathLike | None) -> Drawing | No
     if path is None:
         drawing.align_ylabels()
         return drawing
-    path = Path(path)
-    if path.suffix.lower() not in SUFFIXES:
-        raise ModelError(f"cannot write a plot to {os.fspath(path)!r}: its suffix must be {', '.join(SUFFIXES)}")
-    dated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    try:
-        if path.suffix.lower() == ".png":
-            _write_png(drawing, path)
-        else:
+    kind = ending(path, PICTURE)
+    with replacing(path) as file:
+        if kind in (".svg", ".pdf"):
             drawing.align_ylabels()
-            drawing.savefig(path, metadata=dated[path.suffix.lower()])
-    except OSError as error:
-        raise cannot_write(path, error) from None
+            drawing.savefig(file, format=kind[1:], metadata={"Date" if kind == ".svg" else "CreationDate": None})
+        else:
+            _write_png(drawing, file)
     return None
 
 
-def _write_png(drawing: Drawing, path: Path) -> None:
+def _write_png(drawing: Drawing, file: BinaryIO) -> None:
     """Place everything and draw it, each once: `savefig` draws a figure three times over to the same picture."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -135,7 +128,7 @@ def _write_png(drawing: Drawing, path: Path) -> None:
         drawing.set_layout_engine("none")
     drawing.align_ylabels()  # not before: each axis would be measured again for every other one
     # files are larger by a seventh than with level 6, and written in a third of the time
-    FigureCanvasAgg(drawing).print_png(path, pil_kwargs={"compress_level": 3})
+    FigureCanvasAgg(drawing).print_png(file, pil_kwargs={"compress_level": 3})
 
 
 def _plainly_numbered(drawing: Drawing) -> None:

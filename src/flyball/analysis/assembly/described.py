@@ -13,7 +13,7 @@ import numpy as np
 
 from ...math.vec import cross
 from ...model.geometry import quaternion_to_matrix, rotation_about
-from ...results.departure import Departure
+from ...results.departure import FAST, Departure
 from ...tables.system import EXCESS, INERTIA, NV, POINT, Q0, TREE, V0
 from ...tables.values import Values
 from ..compiled import Compiled
@@ -52,13 +52,19 @@ class Given:
 
 def given(x: Values) -> list[Given]:
     """Bodies that are told how they move; of a mechanism in absolute coordinates."""
+    return [g for g in _all_bodies(x) if g.origin or g.turning]
+
+
+def _all_bodies(x: Values) -> list[Given]:
+    """All bodies, with what is given of each."""
     out = []
     shifts = 2 if x.structure.model.planar else 3
     for b in x.structure.model.bodies:
         origin, turning = b.velocity is not None, b.angular_velocity is not None
-        if origin or turning:
-            row = x.system.body_i[x.structure.place[b.name]]
-            out.append(Given(b.name, int(row[V0]), shifts, int(row[NV]) - shifts, origin, turning, b.as_drawn))
+        if (at := x.structure.place[b.name]) < 0:
+            continue
+        row = x.system.body_i[at]
+        out.append(Given(b.name, int(row[V0]), shifts, int(row[NV]) - shifts, origin, turning, b.as_drawn))
     return out
 
 
@@ -147,22 +153,51 @@ def gradient(x: Values, g: Given, q: np.ndarray) -> np.ndarray:
     return np.hstack([np.eye(3), np.array([_cross(a, k) for k in R.T]).T])
 
 
+def _motion(x: Values, g: Given, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity of the origin of a body's reference frame, and its angular velocity, along world axes; of three each."""
+    d, R = x.bodies[g.name], _rotation(x, g.name, q)
+    own = v[g.at : g.at + g.n]
+    w = np.zeros(3) if not g.turns else np.array([0.0, 0.0, own[2]]) if g.planar else R @ own[3:]
+    return (np.r_[own[:2], 0.0] if g.planar else own[:3]) - _cross(w, R @ d.com), w
+
+
 def not_kept(c: Compiled, q: np.ndarray, v: np.ndarray) -> list[Departure]:
     """Given velocities that the state (q, v) does not have."""
     x, out = c.values, []
     told, largest = given(x), float(np.abs(v / c.sizes).max(initial=0.0)) * x.length
     for g in told:
-        d, R = x.bodies[g.name], _rotation(x, g.name, q)
-        own = v[g.at : g.at + g.n]
-        planar = g.planar
-        w = np.zeros(3) if not g.turns else np.array([0.0, 0.0, own[2]]) if planar else R @ own[3:]
-        u = (np.r_[own[:2], 0.0] if planar else own[:3]) - _cross(w, R @ d.com)
+        d = x.bodies[g.name]
+        u, w = _motion(x, g, q, v)
         pairs = [("velocity", _origin(d)[: g.shifts], u[: g.shifts], "m/s", 1.0)] if g.origin else []
-        turns = slice(2, 3) if planar else slice(0, 3)
+        turns = slice(2, 3) if g.planar else slice(0, 3)
         pairs += [("angular_velocity", d.w[turns], w[turns], "rad/s", x.length)] if g.turning else []
         for what, wanted, got, unit, size in pairs:
             apart = np.abs(got - wanted).max()
             own_size = max(np.abs(wanted).max(), np.abs(got).max())
             if apart > KEPT * own_size and apart * size > STILL * max(largest, size * np.abs(wanted).max()):
                 out.append(Departure(g.name, what, tuple(wanted.tolist()), tuple(got.tolist()), unit))
+    return out
+
+
+def fast(c: Compiled, q: np.ndarray, v: np.ndarray, rates: np.ndarray) -> list[Departure]:
+    """Velocities that are not given and are far above all that are: what was given asks for them, or comes near to it.
+
+    Near a dead centre, for instance. ``rates``: those that drivers and initial conditions prescribe, in 1/s. Turning is
+    compared with velocities through the mechanism's length.
+    """
+    x = c.values
+    told = given(x)
+    if not told:
+        return []
+    drawn = [x.bodies[g.name] for g in told]
+    speeds = [float(np.linalg.norm(y)) for d in drawn for y in (_origin(d) / x.length, d.w)]
+    limit = FAST * max(*speeds, float(np.abs(rates).max(initial=0.0)))
+    out = []
+    for g in _all_bodies(x):
+        u, w = _motion(x, g, q, v)
+        turns = slice(2, 3) if g.planar else slice(0, 3)
+        if not g.turning and np.linalg.norm(w) > limit:
+            out.append(Departure(g.name, "angular_velocity", (), tuple(w[turns].tolist()), "rad/s"))
+        elif not g.origin and np.linalg.norm(u) > limit * x.length:
+            out.append(Departure(g.name, "velocity", (), tuple(u[: g.shifts].tolist()), "m/s"))
     return out

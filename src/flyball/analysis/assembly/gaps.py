@@ -12,7 +12,7 @@ from ...tables.system import G_VALUE, NU
 from ..compiled import Compiled
 
 SHOWN = 8  # elements that a message names
-SMALL = 1e-9  # m or rad, below which a gap is none
+SMALL = 1e-9  # part of the mechanism's length, or radians, below which a gap is none
 
 
 def disagreement(c: Compiled, best: Any) -> AssemblyError:
@@ -20,7 +20,7 @@ def disagreement(c: Compiled, best: Any) -> AssemblyError:
     t = best.t
     c.at(t, best.q, best.v)
     g = c.work.row[G_VALUE]
-    name = c.structure.model.name
+    name, length = c.structure.model.name, c.values.length
     lawless = [r.element for r, x in zip(c.structure.rows, g, strict=True) if r.law >= 0 and not np.isfinite(x)]
     if lawless:
         missed = c.structure.missed(c.work.stack)
@@ -31,10 +31,10 @@ def disagreement(c: Compiled, best: Any) -> AssemblyError:
     gaps: dict[str, tuple[float, float]] = {}
     for element, rows in c.structure.slices.items():
         part, metric = g[rows], c.metric[rows]
-        if len(part) and not np.abs(part).max() < SMALL:
+        if len(part) and not np.abs(part / np.where(metric, length, 1.0)).max() < SMALL:
             gaps[element] = float(np.linalg.norm(part[metric])), float(np.linalg.norm(part[~metric]))
-    worst = sorted(gaps, key=lambda k: -max(gaps[k][0] / c.values.length, gaps[k][1]))
-    shown = "; ".join(f"{k} is {_size(*gaps[k])} from closed" for k in worst[:SHOWN])
+    worst = sorted(gaps, key=lambda k: -max(gaps[k][0] / length, gaps[k][1]))
+    shown = "; ".join(f"{k} is {_size(*gaps[k], length)} from closed" for k in worst[:SHOWN])
     return AssemblyError(
         f"{name!r} cannot be assembled at t = {t:g} s: no position fulfils all constraints. At the best position found "
         f"{shown or 'rows disagree'}. Check lengths and the points of these joints, the drivers, and initial values, "
@@ -44,8 +44,11 @@ def disagreement(c: Compiled, best: Any) -> AssemblyError:
     )
 
 
-def _size(metres: float, radians: float) -> str:
-    parts = [f"{metres:.4g} m" if metres > SMALL else "", f"{np.degrees(radians):.4g} deg" if radians > SMALL else ""]
+def _size(metres: float, radians: float, length: float) -> str:
+    parts = [
+        f"{metres:.4g} m" if metres > SMALL * length else "",
+        f"{np.degrees(radians):.4g} deg" if radians > SMALL else "",
+    ]
     return " and ".join(x for x in parts if x)
 
 

@@ -65,8 +65,16 @@ def _shifts(c: Compiled) -> np.ndarray:
     return out
 
 
-def _step(c: Compiled, r: np.ndarray, R, damping: float) -> np.ndarray:
-    """Least step with G d = r, in the metric of the inverse weights R R^T (R sparse), damped.
+def row_scales(c: Compiled) -> np.ndarray:
+    """Factors (nr,) that make rows dimensionless: lengths are counted in the mechanism's length, turns in radians.
+
+    Without them a sum of squares over rows, and what singular values are small, would depend on the unit of length.
+    """
+    return np.where(c.metric, 1.0 / c.values.length, 1.0)
+
+
+def _step(c: Compiled, r: np.ndarray, rows, R, damping: float) -> np.ndarray:
+    """Least step with (rows G) d = r, in the metric of the inverse weights R R^T (both sparse), damped.
 
     Near a singular position a combination of rows may speak of a motion by a part of 1e-8 only: where the size allows
     it the singular values of G R are used, not their squares, which would drown in rounding.
@@ -74,7 +82,7 @@ def _step(c: Compiled, r: np.ndarray, R, damping: float) -> np.ndarray:
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
 
-    B = c.sparse_jacobian() @ R
+    B = rows @ c.sparse_jacobian() @ R
     if B.shape[0] <= DENSE:
         used = np.unique(B.indices)
         U, s, Vt = np.linalg.svd(B[:, used].toarray(), full_matrices=False)
@@ -103,23 +111,23 @@ def newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
     """Damped Gauss-Newton until closed or no better. Returns (q, iterations)."""
     import scipy.sparse as sp
 
-    w, shifts = inverse_weights(c), _shifts(c)
-    R = sp.diags(np.sqrt(w)).tocsr()
+    w, shifts, scale = inverse_weights(c), _shifts(c), row_scales(c)
+    R, rows = sp.diags(np.sqrt(w)).tocsr(), sp.diags(scale).tocsr()
     limit = 0.7 * c.values.length * np.sqrt(np.where(w > 0.0, w, 1.0))  # 0.7 rad, or 0.7 of the mechanism's size
     size = misfit(c, t, q, v)
-    g = c.work.row[G_VALUE].copy()
+    g = scale * c.work.row[G_VALUE]
     damping, wider, capped = 0.0, 1.0, 0
     norm = float(g @ g)
     for k in range(ITERATIONS):
         if size < 1e-13:
             return q, k
         c.at(t, q, v)
-        d = _step(c, -g, R, damping)
+        d = _step(c, -g, rows, R, damping)
         over = np.abs(d / np.where(shifts, wider * limit, limit)).max(initial=0.0)
         d = d / over if over > 1.0 else d
         new = _moved_by(c, q, d)
         new_size = misfit(c, t, new, v)
-        trial = c.work.row[G_VALUE].copy()
+        trial = scale * c.work.row[G_VALUE]
         new_norm = float(trial @ trial)
         if np.isfinite(new_size) and new_norm < norm:
             gain = 1.0 - new_norm / norm

@@ -15,7 +15,7 @@ from ...results.numbers import tuple_of
 from ...tables.coordinates import BodyState
 from ...tables.system import NQ, Q0
 from ..compiled import Compiled, compiled
-from .described import not_kept
+from .described import fast, not_kept
 from .gaps import contradictory_velocities, disagreement, no_rate
 from .positions import CLOSED, OPEN, close, misfit, newton, rounding
 from .told import driven, told, turns, wind
@@ -34,7 +34,7 @@ class Assembly:
     v: np.ndarray
     moved: dict[str, float] = field(default_factory=dict)  # body -> how far its mass centre went [m]
     iterations: int = 0
-    departures: tuple[Departure, ...] = ()  # positions that assembly changed, given velocities that cannot be
+    departures: tuple[Departure, ...] = ()  # changed positions, given velocities that cannot be, very large others
 
     def again(self) -> Assembly:
         """The same with arrays and scratch of its own."""
@@ -101,7 +101,7 @@ def _found(
     model: Model, plain: Compiled, t: float, parameters: Mapping[str, float] | None, why: Why | None
 ) -> Assembly:
     env = plain.values.env
-    values, rates = told(model, env)
+    values, initial_rates = told(model, env)
     known = dict(values) | driven(model, t, env)
     plain.follow(turns(plain, known))
     drawn = plain.values.q.copy()
@@ -110,13 +110,14 @@ def _found(
     plain.at(t, q, plain.values.v)
     if error := no_rate(plain, t):
         raise error
-    v, wanted, c = consistent(model, plain, parameters, t, q, rates)
+    v, wanted, c = consistent(model, plain, parameters, t, q, initial_rates)
     if gaps := contradiction(wanted, v):
         said = why(c, t, q, v, wanted.nu) if why is not None and not wanted.held else ""
         raise contradictory_velocities(c, gaps, Assembly(plain, t, q, v), said)
     plain.at(t, q, v)
     near = rounding(plain)
-    departures = (*_repositioned(plain, drawn, q, near), *not_kept(plain, q, v))
+    rates = wanted.scale[: len(wanted.nu)] * wanted.nu
+    departures = (*_repositioned(plain, drawn, q, near), *not_kept(plain, q, v), *fast(plain, q, v, rates))
     return Assembly(plain, t, q, v, _moved(plain, drawn, q, near), count, departures)
 
 

@@ -18,7 +18,7 @@ from ...model.model import Model
 from ...tables.system import NU
 from ..compiled import Compiled, compiled
 from .described import Given, described, deviation, given, gradient
-from .positions import DENSE, ITERATIONS, NO_PART, NO_PIVOT
+from .positions import DENSE, ITERATIONS, NO_PART, NO_PIVOT, row_scales
 
 CONSISTENT = 1e-13  # part of the terms of a row that its residual may be
 WRONG = 1e-9  # the same, above which rows contradict one another
@@ -34,7 +34,8 @@ class Wanted:
     """Rows that velocities must fulfil (hard), and those that they should (soft), at a position.
 
     ``root``: R with R R^T the inverse mass matrix, zero for bodies whose motion is given and must not change. Soft
-    rows are weighted so that the sum of their squares is twice the kinetic energy of the difference.
+    rows are weighted so that the sum of their squares is twice the kinetic energy of the difference. Hard rows times
+    ``scale`` are rates in 1/s all of them, so that what is small does not depend on the unit of length.
     """
 
     c: Compiled
@@ -42,6 +43,7 @@ class Wanted:
     nu: np.ndarray
     G: Any  # both dense up to `SMALL` velocities
     root: Any
+    scale: np.ndarray  # of the hard rows
     held: list[Given]  # hard, besides the constraints
     soft: list[Given]
     weights: dict[str, np.ndarray]
@@ -62,18 +64,21 @@ class Wanted:
         G = c.jacobian() if small else c.sparse_jacobian()
         if held:
             G = _above(G, _stacked(c, q, held, {}))
-        return cls(c, q, nu, G, root, held, soft, weights)
+        scale = np.concatenate([row_scales(c), *(_inverse_sizes(c, g) for g in held)])
+        return cls(c, q, nu, G, root, scale, held, soft, weights)
 
     @property
     def determined(self) -> bool:
         """Whether these rows leave no velocity free."""
-        A = np.vstack([_plain(x) for x in self._whitened()])
+        A = np.vstack([_plain(x) / (_norm(_plain(x)) or 1.0) for x in self._whitened()])
         free = (abs(self.root).sum(axis=0) > 0.0).sum()
         return bool(np.linalg.matrix_rank(A, tol=BLOCKED * _norm(A)) == free) if A.size else free == 0
 
     def _whitened(self, soft: bool = True) -> tuple[Any, Any]:
         """Both kinds of rows, by velocities whose squares are twice the kinetic energy."""
-        return self.G @ self.root, _stacked(self.c, self.q, self.soft if soft else [], self.weights) @ self.root
+        return _times(self.scale, self.G) @ self.root, _stacked(
+            self.c, self.q, self.soft if soft else [], self.weights
+        ) @ self.root
 
     def missed(self, v: np.ndarray) -> np.ndarray:
         """Of the hard rows."""
@@ -90,13 +95,28 @@ class Wanted:
         """(missed, lost) -> the change of velocities that takes them away; without soft rows only what is missed."""
         A, C = self._whitened(soft)
         solve = _dense(A, C) if A.shape[0] + C.shape[0] <= DENSE else _sparse(A, C)
-        return lambda missed, lost: self.root @ solve(missed, lost)
+        return lambda missed, lost: self.root @ solve(self.scale * missed, lost)
 
 
 def _weight(R: np.ndarray, g: Given) -> np.ndarray:
     """Square root of the mass matrix of a body, the part that its given velocities speak of."""
     W = np.linalg.inv(R)
     return W if g.whole else W[: g.shifts, : g.shifts] if g.origin else W[g.shifts :, g.shifts :]
+
+
+def _inverse_sizes(c: Compiled, g: Given) -> np.ndarray:
+    """Factors that make the given velocities of a body rates in 1/s."""
+    shifts = np.full(g.shifts if g.origin else 0, 1.0 / c.values.length)
+    return np.r_[shifts, np.ones(g.turns if g.turning else 0)]
+
+
+def _times(scale: np.ndarray, A: Any) -> Any:
+    """Rows of a matrix, each times a factor."""
+    if isinstance(A, np.ndarray):
+        return scale[:, None] * A
+    import scipy.sparse as sp
+
+    return (sp.diags(scale) @ A).tocsr()
 
 
 def _stacked(c: Compiled, q: np.ndarray, told: list[Given], weights: Mapping[str, np.ndarray]):
@@ -246,19 +266,23 @@ def consistent(
     for i in holds:
         nu[c.structure.slices[i.name]] = rates[i.name]
     w = Wanted.at(c, q, nu)
-    if not w.G.shape[0] or np.abs(w.missed(v)).max() <= CONSISTENT * terms(w, v):
+    if not w.G.shape[0] or np.abs(w.scale * w.missed(v)).max() <= CONSISTENT * terms(w, v):
         return v, w, c
     v = _approach(w, v)
-    if w.soft and np.abs(w.missed(v)).max() > CONSISTENT * terms(w, v):  # soft rows pull at the others
+    if w.soft and np.abs(w.scale * w.missed(v)).max() > CONSISTENT * terms(w, v):  # soft rows pull at the others
         v = _approach(w, v, soft=False)
     return v, w, c
 
 
 def terms(w: Wanted, v: np.ndarray) -> float:
-    """What terms of the hard rows may be: a body that spins fast about its own axis leaves rounding in them all."""
-    largest = float(abs(w.G).max()) if w.G.shape[0] else 0.0
-    found = max(largest * float(np.abs(v).max(initial=0.0)), float(np.abs(w.nu).max(initial=0.0)))
-    return max(found, NOTHING)
+    """What terms of the scaled hard rows may be [1/s].
+
+    A body that spins fast about its own axis leaves rounding in them all.
+    """
+    sizes = w.c.sizes
+    largest = float(_times(w.scale, _times(sizes, abs(w.G).T).T).max()) if w.G.shape[0] else 0.0
+    asked = float(np.abs(w.scale[: len(w.nu)] * w.nu).max(initial=0.0))
+    return max(largest * float(np.abs(v / sizes).max(initial=0.0)), asked, NOTHING)
 
 
 def _approach(w: Wanted, v: np.ndarray, soft: bool = True) -> np.ndarray:
@@ -266,16 +290,16 @@ def _approach(w: Wanted, v: np.ndarray, soft: bool = True) -> np.ndarray:
     step = w.steps(soft)
     last = moved = np.inf
     patience = 1 if isinstance(w.G, np.ndarray) or w.G.shape[0] <= DENSE else PATIENCE
-    best, left = v, patience
+    best, left, sizes = v, patience, w.c.sizes
     for _ in range(ITERATIONS):
         missed = w.missed(v)
         d = step(missed, w.lost(v) if soft else np.zeros(0))
-        worst, way = float(np.abs(missed).max()), float(np.abs(d).max(initial=0.0))
+        worst, way = float(np.abs(w.scale * missed).max()), float(np.abs(d / sizes).max(initial=0.0))
         if worst > 0.9 * last and way > 0.9 * moved:
             left -= 1
         else:
             best, last, moved, left = v, worst, way, patience
-        if left == 0 or way <= CONSISTENT * float(np.abs(v).max(initial=0.0)):
+        if left == 0 or way <= CONSISTENT * float(np.abs(v / sizes).max(initial=0.0)):
             break
         v = v + d
     return v if patience == 1 else best
@@ -284,12 +308,13 @@ def _approach(w: Wanted, v: np.ndarray, soft: bool = True) -> np.ndarray:
 def contradiction(w: Wanted, v: np.ndarray) -> dict[str, float]:
     """Elements whose rows the velocities miss, and by how much; none where they are consistent."""
     r = np.abs(w.missed(v))
-    limit = WRONG * terms(w, v)
-    s = w.c.structure
-    gaps = {k: float(r[rows].max(initial=0.0)) for k, rows in s.slices.items()}
+    scaled, limit = w.scale * r, WRONG * terms(w, v)
+    parts = dict(w.c.structure.slices)
     at = len(w.nu)
     for g in w.held:
         n = len(gradient(w.c.values, g, w.q))
-        gaps[g.name] = float(r[at : at + n].max())
+        parts[g.name] = slice(at, at + n)
         at += n
-    return {k: gaps[k] for k in sorted(gaps, key=lambda k: -gaps[k]) if gaps[k] > limit}
+    missed = {k: float(scaled[rows].max(initial=0.0)) for k, rows in parts.items()}
+    found = sorted((k for k in missed if missed[k] > limit), key=lambda k: -missed[k])
+    return {k: float(r[parts[k]].max()) for k in found}

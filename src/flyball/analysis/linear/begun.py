@@ -17,7 +17,7 @@ from ...numerics.rank import TOLERANCE
 from ...tables.system import NU
 from ..assemble import assemble
 from ..assembly.described import described, deviation
-from ..assembly.positions import inverse_weights
+from ..assembly.positions import inverse_weights, row_scales
 from ..assembly.start import Assembly
 from ..assembly.velocities import Wanted
 from ..motion.driven import leaves_no_freedom
@@ -84,17 +84,18 @@ def held(base: Assembly) -> bool:
 
 def as_described(model: Model, base: Assembly) -> bool:
     """Whether the start is what the description says, to rounding, or all that it leaves open follows from it."""
-    drawn, length = base.compiled.values, base.compiled.values.length
-    apart = np.abs(tangent_step(base.compiled, drawn.q, base.q)).max(initial=0.0)
-    if apart > ROUNDED * min(1.0, length) or model.initial:
+    drawn = base.compiled.values
+    apart = np.abs(tangent_step(base.compiled, drawn.q, base.q) / base.compiled.sizes).max(initial=0.0)
+    if apart > ROUNDED or model.initial:
         return False
-    return bool(_none_added(base)) or (_wanted(base).determined and not base.departures)
+    return bool(_none_added(base)) or (_wanted(base).determined and not any(d.given for d in base.departures))
 
 
 def _none_added(base: Assembly) -> bool:
     """Whether velocities that are not described are zero."""
-    faster = np.abs(base.v - described(base.compiled.values, base.q)).max(initial=0.0)
-    return bool(faster <= ROUNDED * np.abs(base.v).max(initial=0.0))
+    sizes = base.compiled.sizes
+    faster = np.abs((base.v - described(base.compiled.values, base.q)) / sizes).max(initial=0.0)
+    return bool(faster <= ROUNDED * np.abs(base.v / sizes).max(initial=0.0))
 
 
 def _wanted(base: Assembly) -> Wanted:
@@ -108,10 +109,11 @@ def _described(d: Direction, base: Assembly, x: State) -> tuple[np.ndarray, np.n
     c, at = base.compiled, d.e.at
     dq = tangent_rate(c, x.q, d.derivative(d.values.q))
     c.at(x.t, x.q, x.v)
-    G = c.jacobian()
+    rows = row_scales(c)
+    G = rows[:, None] * c.jacobian()
     which = np.array([r.holonomic for r in c.structure.rows], bool)
     size = np.sqrt(inverse_weights(c))
-    left = d.along(x, dq, np.zeros(len(x.v)))[at["g"]][which]
+    left = (rows * d.along(x, dq, np.zeros(len(x.v)))[at["g"]])[which]
     if which.any():
         dq -= size * np.linalg.lstsq(G[which] * size, left, rcond=TOLERANCE)[0]
     q = x.q.astype(complex)

@@ -20,9 +20,10 @@ from ...tables.forest import step_of
 from ...tables.names import velocity_names
 from ...tables.specs import Structure
 from ...tables.system import BODY_LAW, V0
+from ..assembly.positions import row_scales
 from ..assembly.start import Assembly
 from ..motion.layer import in_coordinates
-from .balance import settled, unbalanced
+from .balance import acting, settled, unbalanced
 from .derivatives import Equations, State
 from .free import prescribed
 
@@ -82,13 +83,28 @@ def _search(x: State, at: list[int], free: list[int]) -> tuple[State | None, Sta
 def _settled(x: State) -> bool:
     """Whether positions, speeds and multipliers fulfil the equations with all accelerations zero."""
     e = Equations(x)
-    gaps = np.abs(e.block("g")).max(initial=0.0) / x.c.values.length + np.abs(e.block("n")).max(initial=0.0)
-    return bool(gaps < 1e-9 and settled(e, SETTLED))
+    return max(_gaps(e).max(initial=0.0), _misses(e).max(initial=0.0)) < SETTLED and settled(e, SETTLED)
+
+
+def _gaps(e: Equations) -> np.ndarray:
+    """How far rows are from closed: of the mechanism's length, or in radians."""
+    return np.abs(row_scales(e.state.c) * e.block("g"))
+
+
+def _misses(e: Equations) -> np.ndarray:
+    """By how much rows miss their rates, as a part of the fastest velocity or prescribed rate."""
+    x, scale = e.state, row_scales(e.state.c)
+    asked = scale * (e.block("n") - e.by_velocity[e.at["n"]] @ x.v)
+    fastest = np.abs(x.v / x.c.sizes).max(initial=0.0) + np.abs(asked).max(initial=0.0)
+    return np.abs(scale * e.block("n")) / (fastest or 1.0)
 
 
 def _place(b: Assembly, name: str) -> int:
     """The velocity of a joint's coordinate."""
     s = b.compiled.structure
+    floating = {n.name: d for d, n in enumerate(velocity_names(s)) if n.unit == "m"}
+    if name in floating:  # of a body that hangs on nothing: where a vehicle rolls along
+        return floating[name]
     owner, _, what = name.partition(".")
     element = s.model.find(owner)
     if not isinstance(element, Joint) or what not in element.coordinates:
@@ -158,11 +174,30 @@ def _body(s: Structure, d: int) -> int:
 
 
 def _failure(x: State, names: list[str]) -> NotConverged:
-    left = Equations(x).block("r")
-    known = velocity_names(x.c.structure)
-    d = int(np.argmax(np.abs(left)))
+    """The error for a search that did not settle: what is left of forces, or which constraints are not fulfilled."""
+    s, e = x.c.structure, Equations(x)
+    left, known = e.block("r"), velocity_names(s)
+    who = ", ".join(names)
+    begin = f"no steady motion of {s.model.name!r} was found in which {who} turn evenly and all else stands still"
+    residuals = {n.name: float(-value) for n, value in zip(known, left, strict=True)}
+    gaps, misses = _gaps(e), _misses(e)
+    if max(gaps.max(initial=0.0), misses.max(initial=0.0)) > SETTLED:
+        worse, unit = (
+            (misses, "of its rate") if misses.max() > gaps.max() else (gaps, "of the mechanism's length, or rad")
+        )
+        k = int(np.argmax(worse))
+        others = ", ".join(n.name for n in known)
+        return NotConverged(
+            f"{begin}: {s.rows[k].element.title} is not fulfilled ({worse[k]:.3g} {unit}). Something else has to move "
+            f"with it: where a wheel rolls, name the coordinate that it rolls along, too (one of {others}), and its "
+            f"speed by Initial or velocity=; or give a better guess of positions and speeds",
+            residuals,
+        )
+    acts = acting(e)
+    part = np.abs(left) / np.where(acts > 0.0, acts, np.inf)
+    d = int(np.argmax(part))
     return NotConverged(
-        f"no steady motion of {x.c.structure.model.name!r} was found in which {', '.join(names)} turn evenly and all "
-        f"else stands still: {-left[d]:.3g} remain along {known[d].name}. Give a better guess of positions and speeds",
-        {n.name: float(-value) for n, value in zip(known, left, strict=True)},
+        f"{begin}: {-left[d]:.3g} remain along {known[d].name}, {part[d]:.2g} of what acts there. Give a better guess "
+        f"of positions and speeds",
+        residuals,
     )

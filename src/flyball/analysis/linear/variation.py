@@ -103,7 +103,7 @@ def followed(loop: Variation) -> Varied:
     own = clock._replace(real=clock.real.copy(), count=clock.count.copy(), y=clock.y.copy(), K=clock.K.copy())
     rows, _ = run_clock(start.assembly, own, loop.R, _silent, FOLLOW)
     if own.count[ex.STATUS] != ex.DONE:
-        raise loop.stopped(own)
+        raise loop.stopped(own, alone=True)
     z, n = clock.accounts - loop.nq - loop.nv, len(clock.accounts)
 
     def powers(some: np.ndarray) -> np.ndarray:
@@ -257,13 +257,14 @@ class Variation:
             by.append(Changes(dq, dv, da, np.hstack([dlam, effort[:, self.prescribed]]), dz))
         return Varied(t[:, 0], Changes(q, v, vdot, lam, z), by)
 
-    def stopped(self, clock: ex.Clock, t: float | None = None) -> SimulationError:
-        """Why it went no further."""
+    def stopped(self, clock: ex.Clock, t: float | None = None, alone: bool = False) -> SimulationError:
+        """Why it went no further; ``alone``: the clock is that of the motion, without the changes."""
         t = float(clock.real[ex.T]) if t is None else t
         real, own = clock.real.copy(), self.clock
         real[ex.T] = t
         y, at = own.y.copy(), self.nq + self.nv
-        y[0, :at], y[0, at:] = clock.y[0, :at], clock.y[0, at + 2 * self.nv * self.n :][: self.nz]
+        changes = 0 if alone else 2 * self.nv * self.n
+        y[0, :at], y[0, at:] = clock.y[0, :at], clock.y[0, at + changes :][: self.nz]
         stopped = own._replace(real=real, count=clock.count, y=y)
         message, cause = reason(self.start.assembly, self.start.base, stopped, kept=False)
         error = SimulationError(

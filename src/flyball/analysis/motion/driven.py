@@ -120,6 +120,8 @@ def _largest(error: np.ndarray, allowed: float) -> np.ndarray:
 
 def _pieces(t: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Integrals over every interval, (n - 1, accounts), and how much they differ from those with fewer nodes."""
+    if len(t) < 2:
+        return np.zeros((0, P.shape[1])), np.zeros(0)
     best = _quadrature(t, P, min(NODES, len(t)))
     others = [np.diff(t)[:, None] * 0.5 * (P[1:] + P[:-1])] if len(t) <= FEWER[0] else []
     others += [_quadrature(t, P, m) for m in FEWER if m < len(t)]

@@ -20,6 +20,7 @@ from ...graph.printers.python import python_functions, python_module, told_const
 from ...graph.printers.routine import Routine
 from ...graph.printers.tables import opaque
 from ...model.words import suggest
+from ...model.writing import write
 from .functions import Functions
 from .words import constants, head
 
@@ -93,7 +94,7 @@ class Code:
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in self.texts.items():
-            (folder / name).write_text(text, encoding="utf-8")
+            write(folder / name, text)
         written = [folder / name for name in self.texts]
         if self.language == "casadi":
             for name, f in self.functions.items():
