@@ -9,6 +9,7 @@ from .methods.freedom import Freedom
 from .methods.motion import Motions
 from .methods.statics import Statics
 from .methods.symbols import Symbols
+from .methods.threads import on_one_thread
 from .model.model import Model
 
 
@@ -31,6 +32,7 @@ class Mechanism(Motions, Statics, Design, Freedom, Symbols, Model):
 
 
 for _family in (Motions, Statics, Design, Freedom, Symbols):  # so that Python's own messages name what the user called
-    for _name, _method in vars(_family).items():
+    for _name, _method in list(vars(_family).items()):
         if not _name.startswith("_") and callable(_method):
             _method.__qualname__ = f"Mechanism.{_name}"
+            setattr(_family, _name, on_one_thread(_method, by_scipy=_family is Statics))

@@ -11,7 +11,6 @@ import pytest
 import scipy.sparse as sp
 
 import flyball as fb
-from flyball.analysis import linearize, modes
 from flyball.analysis.linear import large
 from flyball.numerics.pencil import Pencil
 from tests.analyses.made import G, chain, parallelogram, rod
@@ -88,6 +87,18 @@ def test_a_damped_line_of_masses():
     assert np.array(shape) / shape[49] == pytest.approx(wave / wave[49], abs=1e-6)
 
 
+@pytest.mark.parametrize("coordinates", [*LAYERS, "auto"])
+def test_so_many_freedoms_are_sparse_in_all_coordinates(coordinates):
+    """201 freedoms, of which joint coordinates have no more velocities: all eigenvalues when asked for; some modes."""
+    L = line().linearize(["push.x"], ["m3.x"], coordinates=coordinates)
+    assert L.large
+    assert L.response([2.0]) == pytest.approx([line_response(2.0)[2]], rel=1e-9)
+    found = L.eigenvalues
+    assert found[found.imag > 0] == pytest.approx(line_eigenvalues(), rel=1e-9)
+    assert line().modes(count=4, coordinates=coordinates).eigenvalues == pytest.approx(line_eigenvalues()[:4], rel=1e-9)
+    assert len(line().modes(coordinates="joint").eigenvalues) == N
+
+
 def test_the_matrices_are_the_equations():
     """E, A, B, C, D as they stand, sparse, give the response; states have names; all of it is plain data, and pickled."""
     L = line().linearize(["push.x"], ["m3.x", "m2.ax"], coordinates="absolute")
@@ -161,8 +172,7 @@ def test_both_forms_answer_alike(coordinates):
 @pytest.fixture
 def sparse(monkeypatch):
     """Take the way of large mechanisms always."""
-    for module in (large, linearize, modes):
-        monkeypatch.setattr(module, "DENSE", 0)
+    monkeypatch.setattr(large, "DENSE", 0)
 
 
 def test_what_is_dense_is_made_when_asked_for(sparse, monkeypatch):
@@ -172,8 +182,7 @@ def test_what_is_dense_is_made_when_asked_for(sparse, monkeypatch):
     L = m.linearize(["push.x"], ["rod 1.x"], coordinates="joint")
     assert L.large
     m.gravity = (0, 0)  # of no consequence: the model is the one that was linearised
-    for module in (large, linearize, modes):
-        monkeypatch.setattr(module, "DENSE", 600)
+    monkeypatch.setattr(large, "DENSE", 600)
     assert L.states[:4] == ("J0.angle", "J1.angle", "J2.angle", "J3.angle")
     some = L.descriptor.nearest(8)
     assert np.sort_complex(some) == pytest.approx(np.sort_complex(L.eigenvalues), abs=1e-8)
@@ -214,8 +223,7 @@ def test_the_same_is_refused(name, monkeypatch):
     """Large or not: the same error."""
     texts = []
     for bound in (600, 0):
-        for module in (large, linearize, modes):
-            monkeypatch.setattr(module, "DENSE", bound)
+        monkeypatch.setattr(large, "DENSE", bound)
         for ask in ("linearize", "modes"):
             with pytest.raises(fb.FlyballError) as said:
                 getattr(REFUSED[name](), ask)(coordinates="absolute")

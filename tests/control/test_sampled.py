@@ -66,6 +66,40 @@ def test_pid(watched, coordinates):
     assert np.abs(r["pid.error"] - (1 - a)).max() < AGREED
 
 
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+def test_short_intervals_take_fewer_evaluations_and_are_as_good(coordinates):
+    """At 1 kHz, by the usual tolerance: half the stages of order 8; the same as the exact discrete solution."""
+    period, n = 1e-3, 2000
+    Ak, Bk, *_ = cont2discrete((*PLANT, np.eye(2), np.zeros((2, 1))), period)
+    x, exact = np.zeros(2), []
+    for _ in range(n):
+        exact.append(x)
+        x = Ak @ x + Bk[:, 0] * (KP * (1.0 - x[0]) - KD * x[1])
+    law = f"{KP}*(1 - A.displacement) - {KD}*A.displacement_rate"
+    m = slide(fb.Transfer("u", of=law, num=[1], den=[1], period=period), force="u")
+    at = {"t_end": (n - 0.5) * period, "outputs": period * np.arange(n), "coordinates": coordinates}
+    r = m.simulate(**at)
+    found = np.stack([r["A.displacement"], r["A.displacement_rate"]], axis=1)
+    assert np.abs(found - exact).max() < 1e-10
+    assert r.health.evaluations < 0.75 * m.simulate(method="dop853", **at).health.evaluations
+
+
+def test_intervals_that_are_not_short_stay_within_the_tolerance():
+    """From much shorter than a step to much longer: every error is one that steps of order 8 may have."""
+    for period in (2e-3, 0.02, 0.05, 0.2, 0.5):
+        n = round(10.0 / period)
+        Ak, Bk, *_ = cont2discrete((*PLANT, np.eye(2), np.zeros((2, 1))), period)
+        x, exact = np.zeros(2), []
+        for _ in range(n):
+            exact.append(x[0])
+            x = Ak @ x + Bk[:, 0] * (5.0 * (1.0 - x[0]))
+        m = slide(fb.Transfer("u", of="5*(1 - A.displacement)", num=[1], den=[1], period=period), force="u")
+        for rtol in (1e-5, 1e-8):
+            at = {"t_end": (n - 0.5) * period, "outputs": period * np.arange(n), "rtol": rtol, "atol": 0.1 * rtol}
+            off = np.abs(m.simulate(**at)["A.displacement"] - exact).max()
+            assert off < rtol, (period, rtol, off)
+
+
 @pytest.mark.parametrize("watched", [False, True])
 def test_limits_and_a_set_point_that_jumps_at_an_instant(watched):
     m = slide(pid(setpoint="where(t < 0.5, 1, -0.5)", lower=-4, upper=12))

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 
 from flyball.numerics.rank import null_space
 from flyball.numerics.saddle import null_basis, surely_independent
-from flyball.numerics.sparse_rank import negative_pivots, weak_pivots
+from flyball.numerics.sparse_rank import FEW, by_pivots, negative_pivots, null_spaces, rank, weak_pivots
 
 
 def rows(m: int, n: int, seed: int = 0) -> np.ndarray:
@@ -47,3 +47,32 @@ def test_pivots_count_what_eigenvalues_count():
     assert len(weak) == vectors.shape[1] == 2
     assert np.linalg.matrix_rank(np.delete(A, weak, axis=0)) == 58
     assert np.abs(vectors.T @ A).max() < 1e-6
+
+
+@pytest.mark.parametrize("apart", [1.0, 1e-3, 1e-5, 1e-6, 1e-7, 1e-10, 0.0])
+def test_pivots_say_what_singular_values_say_or_nothing(apart):
+    """Rows that depend on others nearly, or truly: the rank, and the dependencies to rounding."""
+    A = rows(200, 300)
+    A[40] = A[41] + A[90] + apart * A[40]
+    A[150] = A[151] - 2 * A[152]
+    A /= np.linalg.norm(A, axis=1)[:, None]
+    d = np.linalg.svd(A, compute_uv=False)
+    least = int((d > 1e-8 * d[0]).sum())
+    assert max(A.shape) > FEW
+    assert rank(sp.csr_matrix(A)) == rank(A) == least
+    found, lam, _ = null_spaces(sp.csr_matrix(A))
+    assert (found, lam.shape) == (least, (200, 200 - least))
+    assert np.linalg.matrix_rank(lam) == 200 - least
+    assert np.linalg.norm(lam.T @ A, axis=1) == pytest.approx(0.0, abs=1e-8)
+    assert (by_pivots(sp.csr_matrix(A)) is None) == (1e-9 < apart < 1e-4)
+
+
+def test_all_dependencies_of_many_are_found():
+    """More of them than are made of a matrix that is very large."""
+    A = rows(240, 300)
+    for k in range(0, 240, 3):
+        A[k] = A[k + 1] - A[k + 2]
+    A /= np.linalg.norm(A, axis=1)[:, None]
+    count, lam = by_pivots(sp.csr_matrix(A))
+    assert (count, lam.shape) == (160, (240, 80))
+    assert np.abs(lam.T @ A).max() < 1e-12

@@ -44,6 +44,9 @@ class Maker:
     def refusal(self, plan):
         return self.refused
 
+    def ready(self):
+        return self.where == "memory"
+
     def known(self, plan, x):
         return self.where
 
@@ -139,13 +142,29 @@ def test_what_begins_anew_is_what_began_so(maker):
         assert (a.health.steps, a.health.evaluations) == (r.health.steps, r.health.evaluations)
 
 
-@pytest.mark.parametrize("where", ["memory", "disk"])
-def test_code_that_is_there_is_taken_where_there_is_something_to_gain(maker, where):
-    """Motions that are too short to make code for; in memory as on disk, so that the next process gives the same."""
-    assert not four_bar().simulate(10.0).health.engine.startswith("made")
-    maker.where = where
-    assert four_bar().simulate(10.0).health.engine.startswith("made")
+def test_code_on_disk_is_taken_where_there_is_something_to_gain(maker):
+    """Motions that are too short to make code for."""
+    assert not four_bar().simulate(3.0).health.engine.startswith("made")
+    maker.where = "disk"
     assert not four_bar().simulate(0.1).health.engine.startswith("made")
+    assert four_bar().simulate(3.0).health.engine.startswith("made")
+
+
+def test_code_that_the_process_has_is_taken_from_the_beginning(maker):
+    """However short the motion: nothing is begun anew."""
+    maker.where = "memory"
+    for r in (four_bar().simulate(0.01), driven().kinematics(3, t_end=0.01)):
+        assert r.health.engine.startswith("made")
+
+
+def test_a_short_motion_has_the_digits_of_the_code_that_there_is():
+    """Left to choose, once a motion has had it made: to the last bit, and whatever values parameters have."""
+    m = example("slider_crank.toml")
+    for crank in (0.2, 0.21):
+        made = m.simulate(0.05, outputs=3, specialize=True, parameters={"crank": crank})
+        again = m.simulate(0.05, outputs=3, parameters={"crank": crank})
+        assert again.health.engine == "made for this mechanism: kept in this process"
+        assert np.array_equal(again.q, made.q)
 
 
 def test_many_short_motions_pay_for_code_together(maker):
@@ -242,7 +261,7 @@ def test_kinematics_has_the_choice_too(maker):
 def test_the_command_has_both_flags(maker, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     door().save("m.toml")
-    for flags, engine in ((["--specialize"], "made"), (["--no-specialize"], "table-driven: asked for"), ([], "table")):
+    for flags, engine in (([], "table"), (["--specialize"], "made"), (["--no-specialize"], "table-driven: asked for")):
         words = ["run", "m.toml", "--t-end", "0.1", "--no-plots", "--no-animation", "--quiet", *flags]
         said = CliRunner().invoke(app, words)
         assert said.exit_code == 0, said.output

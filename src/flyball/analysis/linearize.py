@@ -32,10 +32,11 @@ from .linear.frames import kinematic, told
 from .linear.free import Free, free, refuse_singular
 from .linear.in_bodies import in_bodies
 from .linear.inputs import Input, with_inputs
-from .linear.instant import instant
+from .linear.instant import Many, instant
 from .linear.kinks import refuse_kinks
-from .linear.large import DENSE, Large, is_large
+from .linear.large import FREE, Large, are_many, is_large
 from .linear.reduced import Frame, Inputs, Reduced, reduced
+from .linear.rounding import Doubt
 from .linear.sliders import without_places
 from .linear.spectrum import spectrum
 from .linear.stability import by_eigenvalues
@@ -67,10 +68,10 @@ class InstantOptions(Options):
                 "frozen is about a motion: at an equilibrium nothing moves, and it does nothing; leave it out"
             )
 
-    def state(self, model: Model, most: int | None = None) -> State:
-        """The state there; with more velocities than ``most`` in absolute coordinates."""
+    def state(self, model: Model, many: Many | None = None) -> State:
+        """The state there; in absolute coordinates where velocities and rows are ``many``."""
         return instant(
-            model, self.about, t=self.t or 0.0, parameters=self.parameters, coordinates=self.coordinates, most=most
+            model, self.about, t=self.t or 0.0, parameters=self.parameters, coordinates=self.coordinates, many=many
         )[0]
 
 
@@ -102,12 +103,13 @@ def _linear(model: Model, o: LinearizeOptions) -> LinearModel:
     here = model
     if o.about is None:  # the copy with inputs is assembled at once
         here, named = with_inputs(model, o.inputs)
-    x = o.state(here, DENSE)
-    if len(x.v) > DENSE and not is_large(x):
+    x = o.state(here, partial(are_many, FREE))
+    large = is_large(x, FREE)
+    if not large and are_many(FREE, len(x.v), len(x.c.structure.rows)):
         x = o.state(here)
     if o.about is not None:
         x, named = _with(x, o.inputs)
-    if not is_large(x):
+    if not large:
         return _small(x, o, named)[0]
     whole = Large.at(x, o.frozen, _parameters(named))
     later = partial(_state_space_of, model.snapshot(), o)
@@ -141,7 +143,7 @@ def small_motions(model: Model, o: LinearizeOptions) -> tuple[LinearModel, str]:
         list(zip(o.outputs, units, strict=True)),
         found.output_values[: len(o.outputs)],
         snapshot(here),
-        replace(space, eigenvalues=_sorted(space.eigenvalues)),
+        replace(space, eigenvalues=_sorted(np.asarray(space.eigenvalues))),
         lambda: found.descriptor,
         found.turning,
         found.seen_from,
@@ -280,6 +282,10 @@ def _sorted(w: np.ndarray) -> np.ndarray:
     return w[np.lexsort((w.imag, w.real, np.abs(w.imag)))]
 
 
+def _eigenvalues(A: np.ndarray, doubt: Doubt | None) -> np.ndarray:
+    return _sorted(spectrum(A, doubt).values)
+
+
 def _state_space(e: Equations, f: Free, r: Reduced, inputs: list[Input], outputs: Sequence[str]) -> StateSpace:
     A, B, C, D = _matrices(r, _outputs(e, r, inputs, outputs), inputs, outputs)
     named = [f.names[d] for d in f.chosen]
@@ -294,7 +300,7 @@ def _state_space(e: Equations, f: Free, r: Reduced, inputs: list[Input], outputs
         mass=r.M,
         damping=r.D,
         stiffness=r.K,
-        eigenvalues=_sorted(spectrum(A, r.doubt).values),
+        eigenvalues=partial(_eigenvalues, A, r.doubt),
         motion=r.position[:, : len(A)],
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..tables.names import velocity_names
 from .linear.curves import snapshot
 from .linear.derivatives import State
 from .linear.in_bodies import in_bodies
-from .linear.large import DENSE, Large, is_large
+from .linear.large import DENSE, FREE, Large, are_many, is_large
 from .linear.reduced import Frame
 from .linear.sliders import of_slides, of_states_only, refuse_sampled
 from .linear.spectrum import EQUAL, Spectrum, spectrum
@@ -24,6 +25,7 @@ from .options import count as at_least
 from .resting.instant import closed_instant
 
 FEW = 10
+EACH = 4  # freedoms for each mode that is asked for, from which on these are found by themselves
 STILL = 1e-6  # of the fastest: sparse eigenvalues below are zero; a double zero shows rounding by its square root
 UNSURE = 1e-6  # of a sparse eigenvalue, whose own uncertainty is not known: growth below is none
 ROUNDED = 1e-11  # parts of a shape, or of an eigenvalue, below this part of its largest are rounding
@@ -55,8 +57,9 @@ def modes(model: Model, o: ModesOptions) -> Modes:
 def _modes(model: Model, o: ModesOptions) -> Modes:
     """Of a mechanism in which nothing holds at times any more, but friction that slides."""
     count, frozen = o.count, o.frozen
-    x = o.state(model, DENSE)
-    if is_large(x):
+    free = DENSE if count is None else max(FREE, EACH * count)
+    x = o.state(model, partial(are_many, free))
+    if is_large(x, free):
         return _sparse(x, count or FEW, frozen)
     f, frame, r = without_inputs(x, frozen)
     own = spectrum(r.A, r.doubt)

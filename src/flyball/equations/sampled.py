@@ -5,6 +5,10 @@
 Signals first, one after the other in an order in which each is known before it is needed, those of other controllers
 that are sampled at the same instant too; then all states at once. What is measured is that of just before: positions
 and velocities do not jump there. No table changes, so that an instant costs two evaluations of the motion.
+
+Steps end on instants. Where an interval between two is much shorter than a step that the tolerance allows, a method of
+lower order with fewer stages takes it as well: as long as all errors of such steps together stay below the tolerance,
+each no larger than the part of the motion that its step is.
 """
 
 from __future__ import annotations
@@ -20,15 +24,18 @@ from ..laws.evaluation import evaluate
 from ..numerics.integrators.clock import (
     ACCEPTED,
     DONE,
+    ERROR,
     JUMPED,
     NEXT,
     QUOTA,
     REJECTED,
     RUNNING,
+    SPAN,
     STARTED,
     STATUS,
     STUCK,
     T_END,
+    TRIED,
     WIDE,
     Clock,
     H,
@@ -45,7 +52,9 @@ SAMPLED, STATE, LAW, LATER = range(4)  # columns of Samples.row: clock, state, l
 NEAR = 1e-9  # of a period: a time that is an instant
 AFTER = 8.0 * 2.0**-52  # of a time: more than an instant is off, by rounding, from the time that it stands for
 ROWS = 64  # of output that are taken at once
-ENGINE, S_, W_, R_, CLOCK, SHEET, PLAN = range(7)
+ENGINE, S_, W_, R_, CLOCK, SHEET, PLAN, LOWER = range(8)
+WAIT, AGAIN = range(2)  # entries of Samples.lower
+SELDOM = 1024  # intervals after which the lower order is tried again, at most
 
 
 class Samples(NamedTuple):
@@ -56,6 +65,7 @@ class Samples(NamedTuple):
     row: np.ndarray  # (nu, 4): clock, state, law, whether all others come first; in order
     value: np.ndarray  # (nu,): scratch
     end: np.ndarray  # (1,): end of the motion [s], at which nothing is sampled any more
+    lower: np.ndarray  # (2,): intervals until the lower order is tried, 0: it is taken, -1: never; how many if it fails
 
 
 @formula
@@ -142,16 +152,31 @@ def sample_kernel(address, S, W, R, clock, sheet, P):
 
 
 @kernel
-def sampled_kernel(address, S, W, R, clock, sheet, P, out):
+def sampled_kernel(address, S, W, R, clock, sheet, P, lower, out):
     """Integrate from instant to instant, as `engine.INTEGRATE` does between them. Returns rows written."""
-    A = (address, held(S), held(W), held(R), held(clock), held(sheet), held(P))
+    A = (address, held(S), held(W), held(R), held(clock), held(sheet), held(P), held(lower))
     return advance(by_engine, A, A, A[SHEET].rows, out)
 
 
 @formula
 def by_engine(A, rows):
-    """The engine's own loop, which writes to its sheet."""
-    return enter(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[SHEET], INTEGRATE)
+    """The engine's own loop, which writes to its sheet; by the lower order where that is as good."""
+    clock, lower = A[CLOCK], A[PLAN].lower
+    taken, refused = clock.count[ACCEPTED], clock.count[REJECTED]
+    if lower[WAIT] == 0:
+        n = enter(A[ENGINE], A[S_], A[W_], A[LOWER], clock, A[SHEET], INTEGRATE)
+    else:
+        n = enter(A[ENGINE], A[S_], A[W_], A[R_], clock, A[SHEET], INTEGRATE)
+    if clock.count[STATUS] == DONE and lower[WAIT] >= 0:
+        at_once = clock.count[ACCEPTED] == taken + 1 and clock.count[REJECTED] == refused
+        if lower[WAIT] > 0:
+            lower[WAIT] = lower[WAIT] - 1 if at_once else lower[AGAIN]
+        elif at_once and clock.real[ERROR] * clock.real[SPAN] <= clock.real[TRIED]:
+            lower[AGAIN] = 1
+        else:
+            lower[WAIT] = lower[AGAIN]
+            lower[AGAIN] = min(2 * lower[AGAIN], SELDOM)
+    return n
 
 
 @formula
@@ -195,19 +220,20 @@ class Sampling:
     Parameters
     ----------
     plan : Samples
-    R : Tableau
+    R, lower : Tableau
+        The method; one of lower order for short intervals.
     width, most : int
         Of a row of output; how many rows there is room for.
     """
 
-    def __init__(self, plan: Samples, R: Tableau, width: int, most: int) -> None:
-        self.plan, self.R = plan, R
+    def __init__(self, plan: Samples, R: Tableau, lower: Tableau, width: int, most: int) -> None:
+        self.plan, self.R, self.lower = plan, R, lower
         self.sheet = Sheet(np.zeros((max(1, min(ROWS, most // 2)), max(width, 1))))
 
     def go_on(self, S: System, W: Work, clock: Clock, out: np.ndarray) -> int:
         """Integrate on, sampling on the way. Returns rows written."""
         address = engine.address(S, W, self.R, clock, self.sheet)
-        return int(sampled_kernel(address, S, W, self.R, clock, self.sheet, self.plan, out))
+        return int(sampled_kernel(address, S, W, self.R, clock, self.sheet, self.plan, self.lower, out))
 
     def differs(self, other: Sampling) -> bool:
         """Whether another one has other instants."""

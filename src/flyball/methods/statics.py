@@ -154,8 +154,8 @@ class Statics(Model):
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         coordinates : {"auto", "absolute", "joint"}
-            Those that the states are changes of. With more than 600 velocities at rest what is dense is made when it is
-            asked for, and `LinearModel.descriptor` is in absolute coordinates.
+            Those that the states are changes of. With more than 150 freedoms, or 600 velocities, at rest what is dense
+            is made when it is asked for, and `LinearModel.descriptor` is in absolute coordinates.
         frozen : bool
             The equations of this very instant, of a motion that need not be steady: their eigenvalues tell little.
 
@@ -197,7 +197,8 @@ class Statics(Model):
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         coordinates : {"auto", "absolute", "joint"}
-            Those that the linear equations are made in; absolute ones with more than 600 velocities at rest.
+            Those that the linear equations are made in; absolute ones with more than 600 velocities at rest,
+            or 150 freedoms where ``count`` is given and few of them.
         count : int, optional
             How many, slowest first; all, or of large mechanisms the ten slowest, if not given.
         frozen : bool

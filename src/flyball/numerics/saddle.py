@@ -14,8 +14,10 @@ REFINED = 2  # times that a solution is improved
 SURE = 1e-4  # singular values above this part of the largest are surely some
 
 
-def saddle(P: Any, G: Any, H: Any = None) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-    """What gives x and l of P x - G^T l = f, H x = g; H is G if not given.
+def saddle(
+    P: Any, G: Any, H: Any = None, refined: int = REFINED
+) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """What gives x and l of P x - G^T l = f, H x = g; H is G if not given; improved so many times.
 
     Raises
     ------
@@ -42,7 +44,7 @@ def saddle(P: Any, G: Any, H: Any = None) -> Callable[[np.ndarray, np.ndarray], 
     def solve(f: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         b = np.concatenate([f, size * g])
         y = once(b)
-        for _ in range(REFINED):
+        for _ in range(refined):
             y += once(b - A @ y)
         return y[:n], size * y[n:]
 
@@ -61,7 +63,7 @@ def null_basis(G: Any) -> np.ndarray:
     m, n = G.shape
     if not m:
         return np.eye(n)
-    project = saddle(sp.identity(n, format="csr"), G)
+    project = saddle(sp.identity(n, format="csr"), G, refined=0)  # twice, which improves it
     basis = np.random.default_rng(1).standard_normal((n, n - m))
     for _ in range(2):
         basis = project(basis, np.zeros((m, n - m)))[0]

@@ -2,35 +2,54 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from .ldl import Pattern, analyse, factor_kernel
-from .rank import parts
+from .rank import TOLERANCE, parts
+from .rank import rank as rank_of_array
 
-DENSE = 1500  # rows or columns up to which the rank comes from a singular value decomposition
+FEW = 150  # rows or columns up to which singular values take no longer than pivots
+DENSE = 1500  # rows or columns up to which they decide where pivots leave a doubt
+CLEAR = 1e-8  # pivots of unit rows above this are surely some: singular values of 1e-4 and more
 WEAK = 1e-10  # pivots of a large matrix with unit rows below this count as zero
 ADDED = 1e-13  # to the diagonal of such a matrix
-SHOWN = 64  # vectors of a large matrix' null spaces that are made
+SHOWN = 64  # vectors of a null space that are made of a matrix that is larger than `DENSE`
 
 
-def rank_by_pivots(G: Any) -> int:
-    """How many rows are independent, of a large matrix."""
-    return G.shape[0] - len(weak_pivots(G @ G.T)[0])
+def rank(G: Any) -> int:
+    """How many rows are independent, of a sparse matrix or an array."""
+    if max(G.shape) > FEW and (found := by_pivots(G)) is not None:
+        return found[0]
+    return rank_of_array(_array(G))
 
 
 def null_spaces(G: Any) -> tuple[int, np.ndarray, np.ndarray | None]:
     """Rank, basis of the dependencies among rows (n, n - rank), basis of what the rows allow (m, m - rank).
 
-    G is sparse, or an array. Of a large matrix up to `SHOWN` dependencies are given and nothing of what is allowed:
-    there would be too much.
+    G is sparse, or an array. Where pivots decide, the dependencies are no orthonormal basis, and nothing of what is
+    allowed is given; of a matrix larger than `DENSE` up to `SHOWN` dependencies are.
     """
-    if max(G.shape) <= DENSE:
-        p = parts(G if isinstance(G, np.ndarray) else G.toarray())
-        return p.rank, p.dependencies, p.null
-    count, dependent = sparse_null_space(G @ G.T)
-    return G.shape[0] - count, dependent, None
+    if max(G.shape) > FEW and (found := by_pivots(G)) is not None:
+        return *found, None
+    q = parts(_array(G))
+    return q.rank, q.dependencies, q.null
+
+
+def by_pivots(G: Any) -> tuple[int, np.ndarray] | None:
+    """Rank, and a basis of the dependencies among rows; None where pivots leave a doubt that singular values do not."""
+    import scipy.sparse as sp
+
+    G = sp.csr_matrix(G)
+    p = Pivots(G @ G.T)
+    basis = p.vectors(p.weak[:SHOWN]) if max(G.shape) > DENSE else p.dependencies(G)
+    return None if basis is None else (int(G.shape[0]) - len(p.weak), basis)
+
+
+def _array(G: Any) -> np.ndarray:
+    return G if isinstance(G, np.ndarray) else np.asarray(G.toarray())
 
 
 def sparse_null_space(A: Any) -> tuple[int, np.ndarray]:
@@ -42,10 +61,6 @@ def sparse_null_space(A: Any) -> tuple[int, np.ndarray]:
 def weak_pivots(A: Any) -> tuple[np.ndarray, np.ndarray]:
     """Unknowns of a sparse positive semidefinite matrix that those eliminated before them leave nothing of.
 
-    From A = L D L^T in a pattern and order of its own: where a pivot is nothing but what was added to the diagonal,
-    L^T x = e_k gives a vector of the null space. Its pivot is x^T A x, so that of a vector spread over very many
-    entries is larger by their number: there the quotient of Rayleigh decides.
-
     Returns
     -------
     weak : ndarray of int
@@ -53,27 +68,86 @@ def weak_pivots(A: Any) -> tuple[np.ndarray, np.ndarray]:
     vectors : ndarray (n, k)
         Up to `SHOWN` vectors of a basis of the null space.
     """
-    import scipy.sparse as sp
-    from scipy.sparse.linalg import spsolve_triangular
+    p = Pivots(A)
+    return np.argsort(p.pattern.perm)[p.weak], p.vectors(p.weak[:SHOWN])
 
-    n = A.shape[0]
-    size = np.sqrt(np.where(A.diagonal() > 0.0, A.diagonal(), 1.0))
-    P, L, D = _factor(sp.diags(1.0 / size) @ A @ sp.diags(1.0 / size), ADDED)
-    transposed = (sp.csc_matrix((L, P.Li, P.Lp), shape=(n, n)) + sp.identity(n, format="csc")).T.tocsr()
 
-    def vectors(pivots: np.ndarray) -> np.ndarray:
-        ends = np.zeros((n, len(pivots)))
-        ends[pivots, np.arange(len(pivots))] = 1.0
-        return spsolve_triangular(transposed, ends, lower=False) if len(pivots) else ends
+class Pivots:
+    """Pivots of a sparse positive semidefinite matrix, in an order of its own: where they are none.
 
-    with np.errstate(divide="ignore"):
-        pivots = 1.0 / D
-    sure, doubtful = ~(pivots > WEAK), (pivots > WEAK) & (pivots < 10.0 * ADDED * n)
-    which = np.flatnonzero(doubtful)
-    quotients = pivots[which] / np.maximum((vectors(which) ** 2).sum(axis=0), 1.0)
-    weak = np.sort(np.r_[np.flatnonzero(sure), which[quotients < 10.0 * ADDED]])
-    ends = vectors(weak[:SHOWN])[P.perm] / size[:, None]
-    return np.argsort(P.perm)[weak], ends / np.maximum(np.abs(ends).max(axis=0, initial=0.0), 1e-300)
+    From A = L D L^T: where a pivot is nothing but what was added to the diagonal, L^T x = e_k gives a vector of the
+    null space. Its pivot is x^T A x, so that of a vector spread over very many entries is larger by their number: there
+    the quotient of Rayleigh decides.
+
+    Attributes
+    ----------
+    weak : ndarray of int
+        Which of them are none, in their order.
+    least : float
+        The least of the others.
+    """
+
+    def __init__(self, A: Any) -> None:
+        import scipy.sparse as sp
+
+        n = A.shape[0]
+        self.size = np.sqrt(np.where(A.diagonal() > 0.0, A.diagonal(), 1.0))
+        unit = sp.diags(1.0 / self.size)
+        self.pattern, L, self.inverse = _factor(unit @ A @ unit, ADDED)
+        self.lower = sp.csc_matrix((L, self.pattern.Li, self.pattern.Lp), shape=(n, n)) + sp.identity(n, format="csc")
+        with np.errstate(divide="ignore"):
+            pivots = 1.0 / self.inverse
+        sure, doubtful = ~(pivots > WEAK), (pivots > WEAK) & (pivots < 10.0 * ADDED * n)
+        which = np.flatnonzero(doubtful)
+        quotients = pivots[which] / np.maximum((self._ends(which) ** 2).sum(axis=0), 1.0)
+        self.weak = np.sort(np.r_[np.flatnonzero(sure), which[quotients < 10.0 * ADDED]])
+        self.least = float(np.delete(pivots, self.weak).min(initial=np.inf))
+
+    def vectors(self, which: np.ndarray) -> np.ndarray:
+        """Vectors (n, k) of the null space that belong to weak pivots, their largest entry 1."""
+        return _scaled(self._ends(which)[self.pattern.perm] / self.size[:, None])
+
+    def dependencies(self, G: Any) -> np.ndarray | None:
+        """A basis (n, k) of the null space where the matrix is G G^T; None if it is in doubt what is none.
+
+        What was added to the diagonal is taken out by a step of inverse iteration; what is left of x G then says
+        whether rows depend on one another as truly as singular values tell it.
+        """
+        if not self.least > CLEAR:
+            return None
+        x = self.vectors(self.weak)
+        if len(self.weak):
+            x = _scaled(x - self._solve(G @ (G.T @ x)))
+            if not (np.linalg.norm(G.T @ x, axis=0) <= TOLERANCE * np.linalg.norm(x, axis=0)).all():
+                return None
+        return x
+
+    def _ends(self, which: np.ndarray) -> np.ndarray:
+        """Vectors x with L^T x = e_k, in the order of the pivots."""
+        from scipy.sparse.linalg import spsolve_triangular
+
+        ends = np.zeros((len(self.inverse), len(which)))
+        ends[which, np.arange(len(which))] = 1.0
+        return spsolve_triangular(self._upper, ends, lower=False) if len(which) else ends
+
+    @cached_property
+    def _upper(self) -> Any:
+        return self.lower.T.tocsr()
+
+    def _solve(self, b: np.ndarray) -> np.ndarray:
+        """(A + what was added)^-1 b."""
+        from scipy.sparse.linalg import spsolve_triangular
+
+        y = np.zeros_like(b)
+        y[self.pattern.perm] = b / self.size[:, None]
+        y = spsolve_triangular(self.lower.tocsr(), y, unit_diagonal=True)
+        y = spsolve_triangular(self._upper, self.inverse[:, None] * y, lower=False, unit_diagonal=True)
+        return y[self.pattern.perm] / self.size[:, None]
+
+
+def _scaled(x: np.ndarray) -> np.ndarray:
+    """Columns whose largest entry is 1."""
+    return x / np.maximum(np.abs(x).max(axis=0, initial=0.0), 1e-300)
 
 
 def negative_pivots(A: Any) -> int:

@@ -34,7 +34,7 @@ class StateSpace:
     mass: np.ndarray | None
     damping: np.ndarray | None
     stiffness: np.ndarray | None
-    eigenvalues: np.ndarray
+    eigenvalues: np.ndarray | Callable[[], np.ndarray]
     motion: np.ndarray
 
 
@@ -154,7 +154,10 @@ class LinearModel:
     @property
     def eigenvalues(self) -> np.ndarray:
         """Of A, by imaginary, then real part, (n,) complex [1/s]; those that cannot be told apart are their mean."""
-        return self.dense.eigenvalues
+        own = self.dense
+        if callable(own.eigenvalues):
+            own.eigenvalues = own.eigenvalues()
+        return own.eigenvalues
 
     @property
     def motion(self) -> np.ndarray:

@@ -16,7 +16,7 @@ from ...equations.dependencies import dependencies
 from ...model.body import Driver
 from ...model.coupling import Coupling
 from ...numerics.rank import parts
-from ...numerics.sparse_rank import DENSE, SHOWN, sparse_null_space
+from ...numerics.sparse_rank import DENSE, FEW, SHOWN, by_pivots
 from ...results.records import Records
 from ...results.result import Result
 from ..compiled import Compiled, compiled
@@ -25,7 +25,7 @@ from .poses import absolute_states
 from .stresses import CHANGED, self_stresses
 
 LEAST = 1e-6  # part of the largest entry of a dependency that makes a row part of it
-NONE, SURE = 1e-11, 1e-4  # singular values, of the largest, that are surely none, and surely some
+NONE, SURE = 1e-11, 1e-5  # singular values, of the largest, that are surely none, and surely some
 
 
 class Determinacy:
@@ -85,7 +85,7 @@ class _Along:
                 lam = _put(lam, left[sure], own[sure])
                 left = left[~sure]
             if len(left):
-                own = self._decomposed(left[0])
+                own = self._decomposed(left[0], count)
                 lam, left, count = _put(lam, left[:1], own[None]), left[1:], own.shape[1]
         return lam
 
@@ -99,16 +99,17 @@ class _Along:
         self.out.count[which], self.out.least[which] = count, least / largest
         return sure, lam
 
-    def _decomposed(self, k: int) -> np.ndarray:
-        """Multipliers (nr, count) at one time, by singular values."""
+    def _decomposed(self, k: int, count: int) -> np.ndarray:
+        """Multipliers (nr, dependencies) at one time, by singular values; by pivots where there are about many."""
         c, nq, nv = self.base, self.base.structure.nq, self.base.structure.nv
         t, q, v, z = np.split(self.states[k], np.cumsum([1, nq, nv]))
         c.z = np.where(np.isnan(z), c.z, z)
         c.at(float(t[0]), q, v)
         G, size, _ = scaled_jacobian(c)
         size = np.maximum(size, 1e-300)
-        if max(G.shape) > DENSE:
-            own, self.out.least[k] = sparse_null_space(G @ G.T)[1], 1.0
+        large, many = max(G.shape) > DENSE, count >= SHOWN and max(G.shape) > FEW
+        if (large or many) and (found := by_pivots(G)) is not None:
+            own, self.out.least[k] = found[1], 1.0
         else:
             p = parts(G.toarray())
             own, self.out.least[k] = p.dependencies, float(p.values[-1] / p.values[0]) if p.rank else 1.0

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...numerics.rank import rank
-from ...numerics.sparse_rank import DENSE, rank_by_pivots, sparse_null_space
+from ...numerics.rank import null_space
+from ...numerics.sparse_rank import DENSE, FEW, rank, sparse_null_space
 from ..assembly.start import Assembly
 from ..compiled import Compiled
 
@@ -19,7 +19,7 @@ class Found:
 
     assembly: Assembly
     dependencies: np.ndarray  # multipliers (nr, k) that act on nothing; of a large mechanism up to `SHOWN` of them
-    allowed: np.ndarray | None  # velocities (nv, f) that the rows allow; None where there may be very many
+    allowed: np.ndarray | None  # velocities (nv, f) that the rows allow; None: found when asked for
     gap: str = ""  # why it cannot be assembled, if it cannot
 
     @property
@@ -30,7 +30,8 @@ class Found:
         a = self.assembly
         a.compiled.at(a.t, a.q, a.v)
         G, _, scale = scaled_jacobian(a.compiled)
-        return sparse_null_space((G.T @ G).tocsr())[1] * scale[:, None]
+        few = max(G.shape) <= DENSE
+        return (null_space(G.toarray()) if few else sparse_null_space((G.T @ G).tocsr())[1]) * scale[:, None]
 
 
 def lengths(c: Compiled) -> np.ndarray:
@@ -63,11 +64,9 @@ def scaled_jacobian(c: Compiled, dense: bool = False) -> tuple[Any, np.ndarray, 
 
 def rank_of(c: Compiled) -> int:
     """Rank of the Jacobian last evaluated."""
-    dense = few(c)
-    G = scaled_jacobian(c, dense)[0]
-    return rank(G) if dense else rank_by_pivots(G)
+    return rank(scaled_jacobian(c, few(c))[0])
 
 
 def few(c: Compiled) -> bool:
     """Whether the Jacobian is so small that its rank is found from all of it, as an array."""
-    return max(len(c.structure.rows), c.structure.nv) <= DENSE
+    return max(len(c.structure.rows), c.structure.nv) <= FEW

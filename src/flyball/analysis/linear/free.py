@@ -16,6 +16,7 @@ from ...equations.tree import retract
 from ...errors import SingularityError
 from ...numerics.rank import TOLERANCE, null_space, parts
 from ...numerics.saddle import null_basis, surely_independent
+from ...numerics.sparse_rank import rank as rank_of
 from ...tables.names import Named, velocity_names
 from ...tables.system import BODY_LAW, G_VALUE, V0
 from ..compiled import Compiled
@@ -90,13 +91,22 @@ def free(e: Equations, like: Free | None = None) -> Free:
     which = np.array([r.holonomic for r in s.rows], bool)
     given = prescribed(c)
     holonomic, rows = np.vstack([G[which], given]), np.vstack([G, given])
-    still = np.eye(s.nv)[void(e)]
+    still = _taking(void(e), s.nv)
     Z, chosen = _basis(np.vstack([holonomic, still]), scale, None if like is None else like.chosen)
     Zv, chosen_v = Z, chosen
     if not which.all():
         Zv, chosen_v = _basis(np.vstack([rows, still]), scale, None if like is None else like.chosen_v)
-    left, left_v, on_positions = np.eye(s.nv)[chosen], np.eye(s.nv)[chosen_v], np.r_[which, np.ones(len(given), bool)]
+    left = _taking(chosen, s.nv)
+    left_v = left if chosen_v is chosen else _taking(chosen_v, s.nv)
+    on_positions = np.r_[which, np.ones(len(given), bool)]
     return Free(names, holonomic, rows, Z, Zv, chosen, chosen_v, scale, left, left_v, on_positions)
+
+
+def _taking(which: np.ndarray, n: int) -> np.ndarray:
+    """Unit rows (m, n) that take some of n numbers."""
+    out = np.zeros((len(which), n))
+    out[np.arange(len(which)), which] = 1.0
+    return out
 
 
 def void(e: Equations) -> np.ndarray:
@@ -124,7 +134,7 @@ def prescribed(c: Compiled) -> np.ndarray:
 
 def rank(G: np.ndarray, scale: np.ndarray) -> int:
     """Rank of constraint rows."""
-    return len(G[0]) - _null(G, scale).shape[1] if len(G) else 0
+    return rank_of(compared(G, scale)) if len(G) else 0
 
 
 def _null(G: np.ndarray, scale: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ...errors import ModelError
@@ -17,6 +17,7 @@ from ..motion.layer import in_coordinates
 from ..motion.start import begin
 from .derivatives import State
 
+Many = Callable[[int, int], bool]
 SPARSE = "absolute: of so many velocities the equations are sparse there"
 
 
@@ -27,7 +28,7 @@ def instant(
     t: float | str = 0.0,
     parameters: Mapping[str, float] | None = None,
     coordinates: str = "auto",
-    most: int | None = None,
+    many: Many | None = None,
 ) -> tuple[State, str]:
     """State of a mechanism, and the coordinates that it is in and why.
 
@@ -42,8 +43,8 @@ def instant(
         Values in SI units in place of the model's, and of those that an equilibrium was found with.
     coordinates : str
         ``"auto"``, ``"absolute"`` or ``"joint"``.
-    most : int, optional
-        With more velocities than this absolute coordinates are taken, in which large mechanisms are sparse.
+    many : callable, optional
+        Whether absolute coordinates are taken, in which large mechanisms are sparse, by numbers of velocities and rows.
 
     Raises
     ------
@@ -58,23 +59,27 @@ def instant(
     elif isinstance(about, Equilibrium):
         told = {**about.parameters, **(parameters or {})}
         base = _there(model, about, told)
-        a, why = _chosen(base, coordinates, told, most)
+        a, why = _chosen(base, coordinates, told, many)
     elif about is None:
         base = assemble(model, t=number(t, {}, "s", "t"), parameters=parameters)
-        a, why = _chosen(base, coordinates, parameters, most)
+        a, why = _chosen(base, coordinates, parameters, many)
     else:
         raise ModelError(f"about must be a result or an equilibrium, got {type(about).__name__}")
-    if most is not None and a.compiled.structure.nv > most:
+    s = a.compiled.structure
+    if many is not None and many(s.nv, len(s.rows)):
         a, why = base, SPARSE
     return State.moving(a.compiled, a.t, a.q, a.v), why
 
 
 def _chosen(
-    base: Assembly, coordinates: str, parameters: Mapping[str, float] | None, most: int | None
+    base: Assembly,
+    coordinates: str,
+    parameters: Mapping[str, float] | None,
+    many: Many | None,
 ) -> tuple[Assembly, str]:
     """The assembly in the coordinates asked for; where none have few velocities, these are not made."""
     s = base.compiled.structure
-    if most is not None and coordinates == "auto" and s.nv - len(s.rows) > most:
+    if many is not None and coordinates == "auto" and many(s.nv - len(s.rows), 0):
         return base, SPARSE
     return in_coordinates(base, coordinates, parameters)
 

@@ -31,16 +31,23 @@ from .loads import feels
 from .reduced import without_inertia
 from .steady import SAME, SWING, balanced, changing, timed
 
-DENSE = 600  # velocities up to which the constraints are taken out and all is dense
+DENSE = 600  # velocities up to which the constraints are taken out and all is dense, and
+FREE = 150  # freedoms, as counted: what is dense of more takes longer than all that is sparse
 PART = 1e-3  # of a dependency: elements with less have none in it
 LOST = 1e-6  # of rows of unit size: dependencies that nearby rows change by as much are none there
 MASSLESS = 1e12  # motion that forces make, where every inertia is one by itself: some motion has none
 
 
-def is_large(x: State) -> bool:
-    """Whether the linear equations at a state are to be sparse: many velocities, at rest, constraints on positions."""
+def are_many(free: int, velocities: int, rows: int) -> bool:
+    """Whether there are more velocities, or freedoms as counted than ``free``, than dense equations are made for."""
+    return velocities > DENSE or velocities - rows > free
+
+
+def is_large(x: State, free: int) -> bool:
+    """Whether the linear equations at a state are sparse: of many velocities, at rest, constraints on positions."""
     s = x.c.structure
-    return len(x.v) > DENSE and not s.tree and not np.any(x.v) and all(r.holonomic for r in s.rows)
+    many = are_many(DENSE if s.loads else free, s.nv, len(s.rows))  # friction by reactions is for dense ones
+    return many and not s.tree and not np.any(x.v) and all(r.holonomic for r in s.rows)
 
 
 @dataclass

@@ -57,7 +57,7 @@ def stiffness(x: Rest, f: Free) -> Stiffness:
         along = Z @ (unit[:, None] * V)
         size = np.abs(along)
         acts = np.einsum("ik,ik->k", size, abs(x.K) @ size) + acts_by @ size**2
-        real = np.abs(w) > np.einsum("ik,ij,jk->k", np.abs(V), blur, np.abs(V))
+        real = np.abs(w) > (np.abs(V) * (blur @ np.abs(V))).sum(axis=0)
         parts = np.where(real, w / np.where(acts > 0.0, acts, 1.0), 0.0)
         return along / np.linalg.norm(along, axis=0), parts
 

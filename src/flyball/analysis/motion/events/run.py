@@ -100,7 +100,7 @@ class Run:
         self.loop = self._loop()
 
     def _sampling(self, t: float) -> Sampling | None:
-        return sampling(self.here.c, self.method, (t, self.end), (self.width, len(self.buffer)))
+        return sampling(self.here.c, self.method, self.pace.mixed, (t, self.end), (self.width, len(self.buffer)))
 
     @property
     def stops(self) -> Sampling | None:

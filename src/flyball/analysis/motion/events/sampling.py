@@ -7,17 +7,21 @@ import math
 import numpy as np
 
 from ....equations.sampled import NEAR, Samples, Sampling
-from ....numerics.integrators.tableaux import Tableau
+from ....numerics.integrators.tableaux import Tableau, tableau
 from ...compiled import Compiled
 
+LOWER = "rk45"  # for short intervals
 
-def sampling(c: Compiled, R: Tableau, span: tuple[float, float], rows: tuple[int, int]) -> Sampling | None:
+
+def sampling(c: Compiled, R: Tableau, lower: bool, span: tuple[float, float], rows: tuple[int, int]) -> Sampling | None:
     """What samples the controllers of a mechanism between two times; None if none is sampled.
 
     Parameters
     ----------
     c : Compiled
     R : Tableau
+    lower : bool
+        Whether a method of lower order may be taken where intervals are short.
     span : (float, float)
         First and last time [s]; at the last nothing is sampled.
     rows : (int, int)
@@ -38,5 +42,6 @@ def sampling(c: Compiled, R: Tableau, span: tuple[float, float], rows: tuple[int
         np.array(table, np.int64),
         np.zeros(len(table)),
         np.array([span[1]]),
+        np.array([1 if lower else -1, 1], np.int64),
     )
-    return Sampling(plan, R, *rows)
+    return Sampling(plan, R, tableau(LOWER), *rows)
