@@ -12,6 +12,8 @@ from .onward import arm, carry_on, lead
 from .penalty import stiffness
 from .tables import GRAVITY, IMPULSE, LEAD, SLIDES, STEP, TORQUE, YIELDING
 
+SQUARE = 1e-6  # cosine between a grain and the surface below which it stands square on it
+
 
 @formula
 def fill_rows(G, M, C, P, L, pace):
@@ -44,7 +46,14 @@ def tangents(G, M, C, P, L, c):
     i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
     a, b = G.shape_i[i, MOVER], G.shape_i[j, MOVER]
     law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
-    cross_frame(P.frame, c, direction(G, M, L, i, a, load3(P.frame, c, 0)), law[ACROSS])
+    n, ratio = load3(P.frame, c, 0), law[ACROSS]
+    t, along_it = axes_across(n)[0], ratio  # a grain that stands square on the surface: as across it all around
+    if L.grain.shape[0] > 0:
+        for side in range(2):
+            g = along_grain(M, L, i if side == 0 else j, a if side == 0 else b, n)
+            if dot(g, g) > 0.0:
+                t, along_it = g, 1.0
+    cross_frame(P.frame, c, scale(along_it, t), scale(ratio, cross(n, t)))
     P.bias[c, 1] = P.bias[c, 2] = 0.0
     if L.belt.shape[0] > 0:
         add_belt(M, L, P, c, i, a, -1.0)
@@ -65,15 +74,12 @@ def onward(G, M, C, D, N, P, L, pace, now):
 
 
 @formula
-def direction(G, M, L, i, a, n):
-    """A tangent: along the grain of shape i where anisotropic friction has one, any other where it has none."""
-    if L.grain.shape[0] > 0:
-        g = along_world(M, a, load3(L.grain, i, 0))
-        g = sub(g, scale(dot(g, n), n))
-        s = dot(g, g)
-        if s > 1e-12:
-            return scale(1.0 / sqrt(s), g)
-    return axes_across(n)[0]
+def along_grain(M, L, shape, mover, n):
+    """The unit tangent along the grain of a shape; 0 where it has none, or one that stands square on the surface."""
+    g = along_world(M, mover, load3(L.grain, shape, 0))
+    g = sub(g, scale(dot(g, n), n))
+    s = dot(g, g)
+    return scale(1.0 / sqrt(s), g) if s > SQUARE * SQUARE else (0.0, 0.0, 0.0)
 
 
 @formula
@@ -83,10 +89,10 @@ def along_world(M, a, g):
 
 
 @formula
-def cross_frame(frame, c, t, ratio):
-    """Rows t1 = t and t2 = ratio n x t: in a circular cone, forces across are ``ratio`` times as large."""
-    put3(frame, c, 3, t)
-    put3(frame, c, 6, scale(ratio, cross(load3(frame, c, 0), t)))
+def cross_frame(frame, c, first, second):
+    """The two tangential rows: in a circular cone, forces along one are as many times as large as it is long."""
+    put3(frame, c, 3, first)
+    put3(frame, c, 6, second)
 
 
 @formula
@@ -115,7 +121,13 @@ def again(P, c, before, o, first):
         return (0.0, 0.0, 0.0)
     x = along(P, c, load3(before, o, first))
     n, s, t = load3(P.frame, c, 0), load3(P.frame, c, 3), load3(P.frame, c, 6)
-    return (x[0] / dot(n, n), x[1] / dot(s, s), x[2] / dot(t, t))
+    return (x[0] / dot(n, n), parted(x[1], s), parted(x[2], t))
+
+
+@formula
+def parted(x, row):
+    """Component x along a row over the square of the row's length; none along a row that is none: smooth across."""
+    return x / dot(row, row) if dot(row, row) > 0.0 else 0.0 * x
 
 
 @formula

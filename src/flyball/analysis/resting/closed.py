@@ -127,7 +127,7 @@ def refuse_surfaces(scene: Touching) -> None:
     what = (
         ("a surface that moves (surface_velocity): what it drags along does not rest", bool(scene.surfaces.belt.any())),
         ("rolling or spinning friction", bool((pair[..., [su.ROLLING, su.SPINNING]] > 0.0).any())),
-        ("friction with a grain", bool((pair[..., su.ACROSS] > 1.0).any())),
+        ("friction with a grain", bool((np.abs(scene.surfaces.pair[..., su.ACROSS] - 1.0) > 0.0).any())),
     )
     for text, there in what:
         if there:
