@@ -238,3 +238,49 @@ def test_an_elastic_stop_that_is_released_takes_its_energy_along(side, coordinat
     given = r["energy.event_work"]
     assert given[-2:] == pytest.approx([-0.5 * k * depth**2, 0.5 * k * (deeper**2 - depth**2)], abs=1e-8)
     assert r.energy.drift < 1e-8
+
+
+@layers
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("speed", "push"), [(1.0, 0.0), (-1.0, 0.0), (0.0, 5.0), (0.0, -5.0)])
+def test_a_motion_that_begins_at_an_elastic_stop(side, speed, push, coordinates):
+    """Right at it its rate decides, and where it has none its acceleration: pressed for half an oscillation, or free."""
+    mass, k = 2.0, 300.0
+    bound = {"lower" if side > 0 else "upper": 0}
+    m = slider(
+        fb.Limit("buffer", "guide.displacement", **bound, stiffness=k),
+        fb.Actuator("push", "guide.displacement", force=side * push),
+        gravity=0.0, mass=mass, speed=side * speed,
+    )  # fmt: skip
+    w = np.sqrt(k / mass)
+    r = m.simulate(0.2, outputs=[0.0, 0.1, 0.2], coordinates=coordinates, **TIGHT)
+    wanted = speed * r.t + push / mass * r.t**2 / 2
+    if speed < 0.0 or push < 0.0:
+        wanted = speed / w * np.sin(w * r.t) + push / k * (1 - np.cos(w * r.t))
+    assert side * r["guide"].displacement == pytest.approx(wanted, abs=1e-8)
+
+
+@layers
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_buffer_that_is_caught_up_with_inside_of_it(side, coordinates):
+    """Out faster than it is pushed it is free, until a force has slowed it: k y + c y' = 0; then it swings about F / k.
+
+    The depth until then is 0.1 - 2 t + 50 t^2, so that the push is 15000 t^2 + 1400 t - 10.
+    """
+    mass, k, c, force = 2.0, 300.0, 20.0, 200.0
+    bound = {"lower" if side > 0 else "upper": 0}
+    m = slider(
+        fb.Limit("buffer", "guide.displacement", **bound, stiffness=k, damping=c),
+        fb.Actuator("push", "guide.displacement", force=-side * force),
+        gravity=0.0, mass=mass, speed=side * 2.0, height=-side * 0.1,
+    )  # fmt: skip
+    met = (np.sqrt(1400.0**2 + 600000.0) - 1400.0) / 30000.0
+    y, rate, rest = 0.1 - 2 * met + 50 * met**2, 100 * met - 2, force / k
+    a = c / (2 * mass)
+    w = np.sqrt(k / mass - a * a)
+    r = m.simulate(0.12, outputs=[0.0, met, 0.06, 0.12], coordinates=coordinates, **TIGHT)
+    on = r.t[2:] - met
+    swing = (y - rest) * np.cos(w * on) + (rate + a * (y - rest)) / w * np.sin(w * on)
+    wanted = [0.1, y, *(rest + np.exp(-a * on) * swing)]
+    assert -side * r["guide"].displacement == pytest.approx(wanted, abs=1e-8)
+    assert times(r, "buffer") == pytest.approx([met], abs=1e-8)
