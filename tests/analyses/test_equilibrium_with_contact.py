@@ -172,3 +172,14 @@ def test_what_statics_does_not_know_is_refused() -> None:
     belt.add(fb.Contact())
     with pytest.raises(fb.ModelError, match="surface_velocity"):
         belt.equilibrium()
+
+
+@pytest.mark.parametrize("across", [0.4, 0.1])
+def test_friction_with_a_grain_is_refused(across):
+    """Be it greater or smaller across the grain: statics counts with one number."""
+    m = fb.Mechanism("box", gravity=(0, 0, -9.81))
+    m.add(fb.Material("wood", friction=(0.2, across), grain=(1, 0, 0)))
+    m.add(fb.Ground("floor", shape=fb.Plane(), material="wood"))
+    m.add(fb.Body("box", shape=fb.Box(edges=(0.2, 0.2, 0.1)), mass=1, position=(0, 0, 0.05)), fb.Contact())
+    with pytest.raises(fb.ModelError, match="statics does not know friction with a grain"):
+        m.equilibrium()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -95,6 +97,25 @@ def test_limited_pid_is_integrated_from_corner_to_corner(windup):
     assert r["pid.output"][0] == UPPER
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_clamping_at_either_limit(side):
+    """With e = +-t, kp = 1 and ki = 2 the sum t + t^2 is at the limit 3 at t1 = (sqrt(13) - 1) / 2: I stays +-t1^2.
+
+    An integral of +-10 with e = -+1 is 9 beyond the limit and on its way back: it goes on, I = +-(10 - 2 t).
+    """
+    given = {"kp": 1, "ki": 2, "lower": -3, "upper": 3, "anti_windup": "clamping"}
+    m = slide(
+        fb.PID("out", setpoint=f"{side}*t", measured="0", **given),
+        fb.PID("back", setpoint=f"{-side}", measured="0", initial=10 * side, **given),
+        force="0*(out + back)",
+    )
+    r = m.simulate(2, outputs=5, **TIGHT)
+    still = (13**0.5 - 1) / 2
+    assert np.abs(r["out.integral"] - side * np.minimum(r.t, still) ** 2).max() < 1e-9
+    assert np.abs(r["back.integral"] - side * (10 - 2 * r.t)).max() < 1e-9
+    assert r["out"].output[-1] == r["back"].output[-1] == 3 * side
+
+
 def test_anti_windup_overshoots_less():
     top = {
         w: slide(pid(ki=400, lower=LOWER, upper=UPPER, anti_windup=w)).simulate(3, outputs=301)["A.displacement"].max()
@@ -102,6 +123,20 @@ def test_anti_windup_overshoots_less():
     }
     assert top["none"] > top["clamping"] + 0.01
     assert top["none"] > top["back-calculation"] + 0.01
+
+
+@pytest.mark.parametrize(
+    ("num", "den", "response"),
+    [
+        ([2, 3], [4, 2], lambda t: 1.5 - np.exp(-t / 2)),  # 1/2 + 1 / (2 s + 1)
+        ([2, 6, 10], [2, 6, 4], lambda t: 2.5 - 3 * np.exp(-t) + 1.5 * np.exp(-2 * t)),  # 1 + 3 / ((s + 1) (s + 2))
+    ],
+)
+def test_a_transfer_function_that_passes_its_input_on_at_once(num, den, response):
+    """The state space of a transfer function of equal orders, by partial fractions."""
+    K = fb.StateSpace.from_control("K", SimpleNamespace(num=[[num]], den=[[den]], dt=0), inputs=["1"])
+    r = slide(K, force="0*K").simulate(3, outputs=7, **TIGHT)
+    assert np.abs(r["K.output"] - response(r.t)).max() < 1e-9
 
 
 def test_linear_controllers_are_exponentials():

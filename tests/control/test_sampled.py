@@ -111,6 +111,20 @@ def test_limits_and_a_set_point_that_jumps_at_an_instant(watched):
     assert u.min() == -4 and u.max() == 12
 
 
+@pytest.mark.parametrize("periods", [0.1, 1.0, 10.0])
+def test_back_calculation_takes_back_no_more_than_there_is_at_an_instant(periods):
+    """With e = kp = 1, ki = 2 and the limit 1/2: I+ = I + 2 T + (1/2 - 1 - I) T / max(T, tracking).
+
+    A tracking time up to the period ends at I* = 2 T - 1/2 at once; n periods go there by 1 - 1/n at each instant.
+    """
+    m = slide(
+        fb.PID("pid", setpoint="1", measured="0", kp=1, ki=2, upper=0.5, tracking=periods * T, period=T), force="0*pid"
+    )
+    r = simulated(m, 30)[2]
+    n, k = max(1.0, periods), np.arange(30)
+    assert np.abs(r["pid.unlimited"] - 1 - (2 * T * n - 0.5) * (1 - (1 - 1 / n) ** k)).max() < 1e-12
+
+
 def test_state_space_with_an_observer_of_the_control_library():
     """A deadbeat-like state feedback on an observed state, as a discrete `control.StateSpace`."""
     ct = pytest.importorskip("control")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import flyball as fb
 from tests.layers import both_layers
@@ -118,6 +119,34 @@ def test_a_ball_joint_of_a_body_struck_in_space():
     assert np.abs(seen[0][:3]).max() > 0.1
     np.testing.assert_allclose(seen[0], seen[1], rtol=1e-6, atol=1e-7)
     np.testing.assert_allclose(seen[1][3:], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("on", ["body", "frame"])
+@pytest.mark.parametrize(("held", "coordinates"), [(False, "absolute"), (True, "absolute"), (True, "joint")])
+def test_a_body_that_is_turned_struck_along_its_own_axes(on, held, coordinates):
+    """In space: v+ = A F / m, w+ = R J^-1 R^T (A T + r x A F), A the axes of the part that is struck.
+
+    Held by a ball joint at its mass centre it turns as fast, and the joint carries -A F.
+    """
+    turned = Rotation.from_rotvec((0.3, 0.9, -0.7)).as_matrix()
+    own = turned @ Rotation.from_rotvec((-1.1, 0.2, 0.6)).as_matrix()  # axes of the frame, in world axes
+    force, torque, at = np.array([1.0, -2.0, 0.5]), np.array([0.3, 0.7, -0.4]), np.array([0.2, 0.5, -0.3])
+    m = fb.Mechanism("stone", gravity=(0, 0, 0))
+    m.add(fb.Body("stone", mass=2, inertia=(0.4, 0.5, 0.8), position=(1, 0, 0), orientation=turned))
+    m.add(fb.Frame("corner", "stone", position=(0.1, 0, 0.2), orientation=turned.T @ own))
+    if held:
+        m.add(fb.Spherical("S", "ground", "stone", at=(1, 0, 0)))
+    part, axes, arm, more = "corner", own, turned @ (0.1, 0, 0.2), {}
+    if on == "body":
+        part, axes, arm, more = "stone", turned, at, {"at": tuple(at + (1, 0, 0))}
+    blow = fb.Impulse(part, tuple(force), torque=tuple(torque), axes="body", **more)
+    m.add(fb.Event("hit", "start", do=blow))
+    run = m.simulate(1e-3, outputs=2, coordinates=coordinates)
+    w = turned @ (turned.T @ (axes @ torque + np.cross(arm, axes @ force)) / (0.4, 0.5, 0.8))
+    np.testing.assert_allclose(run["stone"].angular_velocity[0], w, atol=1e-11)
+    np.testing.assert_allclose(run["stone"].velocity[0], (0, 0, 0) if held else axes @ force / 2, atol=1e-12)
+    if held:
+        np.testing.assert_allclose(run.events[0].impulses["S"], [*-axes @ force, 0, 0, 0], atol=1e-11)
 
 
 @both_layers

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import flyball as fb
-from tests.events.one_sided import LAYERS, G, run, slider, times
+from tests.events.one_sided import LAYERS, TIGHT, G, run, slider, times
 
 layers = pytest.mark.parametrize("coordinates", LAYERS)
 
@@ -175,3 +176,111 @@ def test_an_elastic_stop_that_is_just_reached_at_rest_never_pulls(stop):
     assert way * run["S.displacement"] == pytest.approx([0.0, x, speed * left - 0.5 * F * left**2], abs=1e-8)
     assert times(run, "stop") == pytest.approx([0.5, 1.0 + free], abs=1e-5)  # pressed as soon as it can be told
     assert [h.kind for h in run.events] == (["taut", "slack"] if stop == "rope" else ["close", "open"])
+
+
+@layers
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("speed", [2.0, 1.0, -1.0])
+def test_a_motion_that_begins_beyond_an_elastic_stop(side, speed, coordinates):
+    """0.1 m beyond it with 30 N of the spring and 20 N s/m: faster out than 1.5 m/s it is free, else it is pushed.
+
+    The depth is then e^-at (0.1 cos wt + b sin wt) until k y + c y' is nothing, and the block goes on as it left.
+    """
+    mass, k, c, depth = 2.0, 300.0, 20.0, 0.1
+    bound = {"lower" if side > 0 else "upper": 0}
+    m = slider(
+        fb.Limit("buffer", "guide.displacement", **bound, stiffness=k, damping=c),
+        gravity=0.0, mass=mass, speed=side * speed, height=-side * depth,
+    )  # fmt: skip
+    a = c / (2 * mass)
+    w = np.sqrt(k / mass - a * a)
+    b = (a * depth - speed) / w
+
+    def pushed(t):
+        """Depth and its rate."""
+        cos, sin = np.cos(w * t), np.sin(w * t)
+        fall = np.exp(-a * t)
+        return fall * (depth * cos + b * sin), fall * ((w * b - a * depth) * cos - (w * depth + a * b) * sin)
+
+    if k * depth > c * speed:
+        leaves = brentq(lambda t: k * pushed(t)[0] + c * pushed(t)[1], 1e-6, 0.25)
+        y, rate = pushed(leaves)
+    else:
+        leaves, y, rate = 0.0, depth, -speed
+    at = np.array([0.0, 0.4 * leaves, leaves + 0.05, leaves + 0.3])
+    r = m.simulate(at[-1], outputs=at[[0, 1, 2, 3]] if leaves else at[[0, 2, 3]], coordinates=coordinates, **TIGHT)
+    wanted = np.where(r.t < leaves, pushed(r.t)[0], y + rate * (r.t - leaves))
+    assert side * r["guide"].displacement == pytest.approx(-wanted, abs=1e-8)
+    assert side * r["guide"].rate[-1] == pytest.approx(-rate, abs=1e-8)
+    first = k * depth - c * speed if leaves else 0.0
+    assert side * r["buffer"].force[0] == pytest.approx(first, abs=1e-7)
+
+
+@layers
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_an_elastic_stop_that_is_released_takes_its_energy_along(side, coordinates):
+    """Let go at the depth d it gives up k d^2 / 2; in force again deeper, it has the energy of that depth."""
+    mass, k, v, on, off, again = 2.0, 300.0, 1.5, 0.1, 0.15, 0.17
+    bound = {"lower" if side > 0 else "upper": 0}
+    m = slider(
+        fb.Limit("buffer", "guide.displacement", **bound, stiffness=k),
+        fb.Event("go", f"t - {off}", do=fb.Release("buffer")), fb.Event("back", f"t - {again}", do=fb.Lock("buffer")),
+        gravity=0.0, mass=mass, speed=-side * v, height=side * v * on,
+    )  # fmt: skip
+    r = m.simulate(0.3, outputs=[0.0, off, 0.16, 0.3], coordinates=coordinates, **TIGHT)
+    w = np.sqrt(k / mass)
+    depth, rate = v / w * np.sin(w * (off - on)), v * np.cos(w * (off - on))
+    deeper = depth + rate * (again - off)
+    turn = w * (0.3 - again)
+    assert -side * r["guide"].displacement == pytest.approx(
+        [-v * on, depth, depth + rate * 0.01, deeper * np.cos(turn) + rate / w * np.sin(turn)], abs=1e-8
+    )
+    given = r["energy.event_work"]
+    assert given[-2:] == pytest.approx([-0.5 * k * depth**2, 0.5 * k * (deeper**2 - depth**2)], abs=1e-8)
+    assert r.energy.drift < 1e-8
+
+
+@layers
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("speed", "push"), [(1.0, 0.0), (-1.0, 0.0), (0.0, 5.0), (0.0, -5.0)])
+def test_a_motion_that_begins_at_an_elastic_stop(side, speed, push, coordinates):
+    """Right at it its rate decides, and where it has none its acceleration: pressed for half an oscillation, or free."""
+    mass, k = 2.0, 300.0
+    bound = {"lower" if side > 0 else "upper": 0}
+    m = slider(
+        fb.Limit("buffer", "guide.displacement", **bound, stiffness=k),
+        fb.Actuator("push", "guide.displacement", force=side * push),
+        gravity=0.0, mass=mass, speed=side * speed,
+    )  # fmt: skip
+    w = np.sqrt(k / mass)
+    r = m.simulate(0.2, outputs=[0.0, 0.1, 0.2], coordinates=coordinates, **TIGHT)
+    wanted = speed * r.t + push / mass * r.t**2 / 2
+    if speed < 0.0 or push < 0.0:
+        wanted = speed / w * np.sin(w * r.t) + push / k * (1 - np.cos(w * r.t))
+    assert side * r["guide"].displacement == pytest.approx(wanted, abs=1e-8)
+
+
+@layers
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_buffer_that_is_caught_up_with_inside_of_it(side, coordinates):
+    """Out faster than it is pushed it is free, until a force has slowed it: k y + c y' = 0; then it swings about F / k.
+
+    The depth until then is 0.1 - 2 t + 50 t^2, so that the push is 15000 t^2 + 1400 t - 10.
+    """
+    mass, k, c, force = 2.0, 300.0, 20.0, 200.0
+    bound = {"lower" if side > 0 else "upper": 0}
+    m = slider(
+        fb.Limit("buffer", "guide.displacement", **bound, stiffness=k, damping=c),
+        fb.Actuator("push", "guide.displacement", force=-side * force),
+        gravity=0.0, mass=mass, speed=side * 2.0, height=-side * 0.1,
+    )  # fmt: skip
+    met = (np.sqrt(1400.0**2 + 600000.0) - 1400.0) / 30000.0
+    y, rate, rest = 0.1 - 2 * met + 50 * met**2, 100 * met - 2, force / k
+    a = c / (2 * mass)
+    w = np.sqrt(k / mass - a * a)
+    r = m.simulate(0.12, outputs=[0.0, met, 0.06, 0.12], coordinates=coordinates, **TIGHT)
+    on = r.t[2:] - met
+    swing = (y - rest) * np.cos(w * on) + (rate + a * (y - rest)) / w * np.sin(w * on)
+    wanted = [0.1, y, *(rest + np.exp(-a * on) * swing)]
+    assert -side * r["guide"].displacement == pytest.approx(wanted, abs=1e-8)
+    assert times(r, "buffer") == pytest.approx([met], abs=1e-8)

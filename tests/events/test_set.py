@@ -168,6 +168,22 @@ def test_a_pin_and_a_driver(layer):
     refused(m, rf"Set of 'a' in Event 'more' would put .* elsewhere in no time, by {0.1 * math.sin(1.5):.3g}", layer)
 
 
+def test_in_a_mechanism_of_a_millimetre_a_tenth_of_a_nanometre_is_elsewhere(layer):
+    """What is rounding is told from the size of the mechanism: a pin, and a stop, that go 1e-7 of it."""
+    m = mechanism(x=0.0)
+    m.add(fb.Body("b", mass=1e-6, inertia=1e-13, position=(1e-3, 0)))
+    m.add(fb.Frame("P", "ground", position=("x", 0)), fb.Frame("Q", "b", position=(-1e-3, 0)))
+    m.add(fb.Revolute("A", "P", "Q"), fb.Event("move", "t - 0.003", do=fb.Set("x", 1e-10)))
+    with pytest.raises(fb.SimulationError, match=r"Set of 'x' in Event 'move' would put .* elsewhere in no time, by"):
+        m.simulate(0.01, coordinates=layer)
+    m = mechanism(lo=0.0)
+    m.add(fb.Body("p", mass=1e-6, inertia=1e-13), fb.Body("q", mass=1e-6, inertia=1e-13, position=(1e-3, 0)))
+    m.add(fb.Revolute("A", "ground", "q", at=(0, 0)), fb.Limit("floor", "p.y", lower="lo"))
+    m.add(fb.Event("up", "t - 0.003", do=fb.Set("lo", 1e-10)))
+    with pytest.raises(fb.SimulationError, match=r"would put Limit 'floor' elsewhere in no time, by 1e-10 m"):
+        m.simulate(0.01, coordinates=layer)
+
+
 def test_what_touches_keeps_its_size(layer):
     m = mechanism(r=0.1, back=0.5)
     m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1))), fb.Contact(friction=0, restitution="back"))

@@ -71,6 +71,31 @@ def test_a_ball_with_backspin_slides_then_rolls():
     assert np.abs(run.energy.balance).max() < 1e-9 * run.energy.kinetic[0]
 
 
+@pytest.mark.parametrize("static", [0.3, 0.4])
+@pytest.mark.parametrize("heading", [0.6, 2.2, -1.0])
+def test_a_ball_that_is_pulled_faster_and_faster_begins_to_slip(heading, static):
+    """Rolling takes 2/7 of the force m c t: up to 7/2 mu0 g / c; then a = c t - mu g, all along the force."""
+    r, mu, c = 0.1, 0.3, 20.0
+    d = np.array([np.cos(heading), np.sin(heading)])
+    ball = fb.Body("ball", shape=fb.Sphere(radius=r), mass=2, position=(0, 0, r))
+    pull = fb.PointForce("pull", "ball", force=(f"{2 * c * d[0]}*t", f"{2 * c * d[1]}*t", 0))
+    slips = 3.5 * static * G / c
+    end = slips + 0.2
+    m = scene(floor(), ball, pull, friction=mu, static_friction=static)
+    run = m.simulate(end, outputs=[0.0, slips, slips + 0.01, end], **TIGHT)
+    t = run.t
+    since = np.maximum(t - slips, 0.0)
+    rolled = np.minimum(t, slips)
+    x = 5 * c / 42 * rolled**3 + 5 * c / 14 * rolled**2 * since
+    x += c * (slips * since**2 / 2 + since**3 / 6) - mu * G * since**2 / 2
+    slip = c / 2 * (t**2 - slips**2) - 3.5 * mu * G * since
+    assert np.allclose(run["ball"].position[:, :2], np.outer(x, d), rtol=0, atol=1e-8)
+    turning = 5 / 14 * c * rolled**2 + 2.5 * mu * G * since
+    assert np.allclose(run["ball"].angular_velocity[:, :2] * r, np.outer(turning, (-d[1], d[0])), rtol=0, atol=1e-7)
+    assert np.allclose(run["floor-ball"].slip[2:], slip[2:], rtol=0, atol=1e-7)
+    assert np.allclose(run.contacts.at(end).force[0], (*-mu * 2 * G * d, 2 * G), rtol=0, atol=1e-6)
+
+
 def braked_wheel():
     """A wheel that a driver holds, and a brake on it: friction on what nothing free moves."""
     wheel = fb.Body("wheel", mass=1.0, inertia=1.0, position=(5, 5))

@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 from flyball.graph.node import Graph
 from flyball.graph.printers.text import text
+from flyball.graph.simplify.arctangents import Algebra
+from flyball.graph.simplify.numbers import known, snapped
 from flyball.graph.simplify.simplify import simplified
-from flyball.graph.values import evaluate
+from flyball.graph.values import evaluate, reached
 from flyball.math import scalar
 
 NAMES = ("a", "b", "x", "y", "u", "v")
@@ -156,3 +158,57 @@ def test_what_is_no_number_stays(number):
     x = g.symbol("x")
     for made in (sin(number * x), cos(x + number), number * cos(x) + number * sin(x), number * x * x + x):
         assert len(simplified([made])) == 1
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda x, d: cos(x + (math.pi / 2.0 + d)),
+        lambda x, d: sin(x + (math.pi + d)),
+        lambda x, d: sin(2.0 * x - d),
+        lambda x, d: -d * cos(x) + sin(x),
+    ],
+)
+@pytest.mark.parametrize("off", [1e-13, -1e-13])
+def test_an_angle_near_a_right_one_is_none(make, off):
+    """At x = 0 each of them is -sin d, which is nothing where d has been taken for rounding."""
+    g = Graph()
+    (found,) = simplified([make(g.symbol("x"), off)])
+    assert evaluate([found], {"x": 0.0})[0] == pytest.approx(-off, rel=1e-2, abs=0.0)
+
+
+@pytest.mark.parametrize("number", [math.pi / 2.0, 2.0 * math.pi / 3.0, 1.0 / 3.0, math.sqrt(2.0) / 2.0])
+def test_numbers_are_known_to_rounding_only(number):
+    assert known(number) is not None
+    for x in (number + 1e-13, number - 1e-13):
+        assert known(x) is None
+        assert snapped(x) == x
+
+
+@pytest.mark.parametrize(
+    "angle",
+    [
+        lambda u, w, v, z: v,  # w = atan2(b, a) twice
+        lambda u, w, v, z: 2.0 * z,
+        lambda u, w, v, z: 3.0 * z - u,
+        lambda u, w, v, z: v + z,
+        lambda u, w, v, z: 2.0 * (w + u) + 1.0,
+        lambda u, w, v, z: 2.0 * (z + 1.0),
+        lambda u, w, v, z: -1.5 * v + 2.0 * w + 0.25,
+        lambda u, w, v, z: 2.0 * (u - 0.5 * w),
+        lambda u, w, v, z: w + scalar.rounded(u),
+        lambda u, w, v, z: w + 2.0 * math.pi * scalar.rounded(u),
+    ],
+)
+@pytest.mark.parametrize("at", [(0.7, -1.3, 0.4), (-0.2, 0.9, 2.0)])
+def test_arctangents_in_angles_that_are_sums_and_multiples(angle, at):
+    """With w = atan2(b, a), v = 2 w + u / 2 and z = u - w: the values of cosine and sine, and no arctangent is left."""
+    g = Graph()
+    a, b, u, w, v, z = (g.symbol(n) for n in "abuwvz")
+    algebra = Algebra([(w, scalar.atan2(b, a), None), (v, 2.0 * w + 0.5 * u, None), (z, u - w, None)])
+    found = algebra([cos(angle(u, w, v, z)), sin(angle(u, w, v, z))])
+    assert not any(n.op == "atan2" for n in reached(found))
+    x, y, s = at
+    turn = math.atan2(y, x)
+    value = angle(s, turn, 2.0 * turn + 0.5 * s, s - turn)
+    assert evaluate(found, {"a": x, "b": y, "u": s}) == pytest.approx([math.cos(value), math.sin(value)], abs=1e-14)

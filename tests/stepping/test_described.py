@@ -44,6 +44,45 @@ def test_friction_along_the_grain_and_across_it() -> None:
     assert run["across"].x[-1] - 5 == pytest.approx(1 / (2 * 0.4 * G), rel=2e-2)
 
 
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+def test_a_surface_that_runs_on_a_body_drives_it(heading) -> None:
+    """Tracks that run forwards push back, at mu g from rest (not by static friction) up to the speed that they have."""
+    m = fb.Mechanism("crawler", gravity=(0, 0, -G))
+    m.add(fb.Material("track", friction=0.2, static_friction=0.5, surface_velocity=(1, 0, 0)))
+    m.add(fb.Ground("floor", shape=fb.Plane()), box(orientation=(0, 0, heading), material="track"), fb.Contact())
+    run = m.simulate(0.6, outputs=[0.0, 0.2, 0.4, 0.6], method=fb.Stepping(step=1e-3))
+    speed = -np.minimum(0.2 * G * run.t, 1.0)
+    assert run["box"].vx == pytest.approx(speed * np.cos(heading), abs=1e-5)
+    assert run["box"].vy == pytest.approx(speed * np.sin(heading), abs=1e-5)
+
+
+def test_a_belt_that_is_rough_at_rest_slides_by_its_kinetic_friction() -> None:
+    """What lies still on a belt that runs slides on it: mu g t, though static friction would hold more."""
+    m = floor(friction=0.2, static_friction=0.5, surface_velocity=(0, 1, 0))
+    m.add(box(), fb.Contact())
+    run = m.simulate(0.3, outputs=4, method=fb.Stepping(step=1e-3))
+    assert run["box"].vy == pytest.approx(0.2 * G * run.t, abs=1e-5)
+
+
+@pytest.mark.parametrize("across", [0.4, 0.1, 0.0])
+@pytest.mark.parametrize("grain", [(1, 0, 0), (0, 1, 0), (0, 0, 1)])
+@pytest.mark.parametrize("whose", ["floor", "box"])
+def test_a_grain_is_that_of_either_surface_and_turns_with_it(whose, grain, across) -> None:
+    """v - mu g t along it and across it; where it stands square on the surface that across it holds all around."""
+    wood, turned = {"material": "wood"}, {"orientation": (0, 0, np.pi / 2)}  # x of the reference frame along y
+    m = fb.Mechanism("boxes", gravity=(0, 0, -G))
+    m.add(fb.Material("wood", friction=(0.2, across), grain=grain))
+    m.add(fb.Ground("floor", shape=fb.Plane(), **(wood | turned if whose == "floor" else {})))
+    own = {"angular_velocity": (0, 0, 0), **(wood | turned if whose == "box" else {})}
+    m.add(box("a", velocity=(1, 0, 0), **own), box("b", velocity=(0, 1, 0), position=(5, 0, 0.05), **own))
+    m.add(fb.Contact(between="floor", others=["a", "b"]))
+    run = m.simulate(0.2, outputs=3, method=fb.Stepping(step=2e-3))
+    mu = {(1, 0, 0): (across, 0.2), (0, 1, 0): (0.2, across), (0, 0, 1): (across, across)}[grain]
+    assert run["a"].vx == pytest.approx(1 - mu[0] * G * run.t, abs=1e-5)
+    assert run["b"].vy == pytest.approx(1 - mu[1] * G * run.t, abs=1e-5)
+    assert run["a"].z == pytest.approx(0.05, abs=1e-9)
+
+
 def test_what_is_excluded_goes_through() -> None:
     m = floor(friction=0.2)
     m.add(box("a"), box("b", position=(1, 0, 0.05)), fb.Contact(friction=0.2, exclude=[("a", "floor")]))

@@ -99,6 +99,39 @@ def test_a_rope_of_any_stiffness_carries_a_ball(ratio):
         assert stretch < 2e-3
 
 
+def test_a_damped_rope_is_a_damped_spring_as_long_as_it_is_taut():
+    """e^-at (v / w) sin wt, with w^2 = k / m - a^2 and a = c / 2m, to the second order in the step."""
+    k, c, v = 400.0, 8.0, 1.0
+    m = hanging(velocity=(v, 0))
+    m.gravity = (0, 0)
+    m.add(fb.Rope("rope", ["ground", "bob"], at=[(0, 0), (1.0, 0)], stiffness=k, damping=c, length=1.0))
+    w = np.sqrt(k - c * c / 4)
+    off = []
+    for h in (2e-3, 1e-3):
+        s = Stepped(m, h)
+        s.step(round(0.1 / h))
+        off.append(s.q[0] - 1 - np.exp(-c / 2 * 0.1) * v / w * np.sin(w * 0.1))
+    assert abs(off[1]) < 1e-5
+    assert off[0] == pytest.approx(4 * off[1], rel=0.1)
+
+
+@pytest.mark.parametrize("z", [0.1, 2.0, 100.0])
+@pytest.mark.parametrize("coordinates", LAYERS)
+def test_a_damper_of_any_strength_slows_down_and_never_throws_back(coordinates, z):
+    """v+ = v (1 - (1 - b) z / 2) / (1 + (1 + b) z / 2) with z = h c / m: b = (z/4)^2 / (1 + (z/4)^2)."""
+    h, mass = 0.01, 2.0
+    m = fb.Mechanism("slide", planar=True, gravity=(0, 0))
+    m.add(fb.Body("cart", mass=mass, inertia=1.0, velocity=(1, 0)))
+    m.add(fb.Prismatic("A", "ground", "cart", at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("d", "A.displacement", damping=z * mass / h))
+    s = Stepped(m, h, coordinates)
+    b = (z / 4) ** 2 / (1 + (z / 4) ** 2)
+    for n in range(1, 4):
+        s.step()
+        wanted = ((1 - (1 - b) * z / 2) / (1 + (1 + b) * z / 2)) ** n
+        assert s.twist("cart")[0][0] == pytest.approx(wanted, rel=1e-7)
+
+
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
 def test_a_pendulum_on_a_stiff_spring_keeps_its_length_and_energy(ratio):
     """The spring is as long as its force says, 3 m g / k at most: no energy of a curved way is in it."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import mpmath
 import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.stepping.penalty import mean_force
 
 G, R = 9.81, 0.1
 K = 1e7
@@ -208,3 +210,21 @@ def test_far_too_large_steps_bring_to_rest_and_gain_nothing() -> None:
     assert R - run["ball"].z[-1] == pytest.approx((G / 1e9) ** (2 / 3), rel=1e-3)
     assert np.abs(run.energy.balance).max() < 1e-10
     assert run.energy.total.max() <= run.energy.total[0] + 1e-12
+
+
+@pytest.mark.parametrize("n", [1.0, 1.5, 2.2])
+@pytest.mark.parametrize("change", [0.5, 3e-3, 1e-3, 1e-4, 1e-7, -1e-3, -0.5])
+def test_mean_force_of_a_power_law(n: float, change: float) -> None:
+    """(b^(n+1) - a^(n+1)) / (n + 1) (b - a), and its slope with b, however little a and b differ; with fifty digits."""
+    k, a = 2.0, 0.3
+    b = a * (1.0 + change)
+    with mpmath.workdps(50):
+        power = mpmath.mpf(n)
+
+        def mean(y):
+            return k * (y ** (power + 1) - mpmath.mpf(a) ** (power + 1)) / ((power + 1) * (y - mpmath.mpf(a)))
+
+        wanted = float(mean(mpmath.mpf(b))), float(mpmath.diff(mean, mpmath.mpf(b)))
+    found = mean_force(k, n, a, b)
+    assert found[0] == pytest.approx(wanted[0], rel=1e-12)
+    assert found[1] == pytest.approx(wanted[1], rel=1e-7)

@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import flyball as fb
 
 from .contact_scenes import stepped
+
+Z = np.array([0.0, 0.0, 1.0])
 
 
 def row(masses, speeds, e, gap=0.0, planar=False):
@@ -133,3 +136,41 @@ def total_momentum(m, run):
         P = P + b.mass * v
         H = H + b.mass * np.cross(x, v) + np.einsum("tij,jk,tlk,tl->ti", R, b.inertia, R, w)
     return P, H
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.7, 2.2, -1.9])
+@pytest.mark.parametrize("law", ["moreau", "poisson"])
+def test_a_ball_that_hits_the_floor_askew_in_space(law, heading):
+    """Moreau: both slips of the surface go back by e, and v+ = v - 2/7 (1 + e) u along the floor; Poisson: they end."""
+    e, r = 0.6, 0.1
+    d = np.array([np.cos(heading), np.sin(heading), 0.0])
+    m = fb.Mechanism("ball", gravity=(0, 0, 0))
+    m.add(fb.Ground("floor", shape=fb.Plane()), fb.Contact(friction=5.0, restitution=e))
+    m.add(fb.Body("ball", shape=fb.Sphere(radius=r), mass=2, position=(0, 0, r), velocity=tuple(0.5 * d - Z)))
+    run = m.simulate(0.05, outputs=2, method=fb.Stepping(step=1e-3, restitution=law))
+    back = e if law == "moreau" else 0.0
+    v = (0.5 - 2 / 7 * (1 + back) * 0.5) * d + e * Z
+    assert run["ball"].velocity[-1] == pytest.approx(v, abs=1e-6)
+    turning = 5 / 7 * (1 + back) * 0.5 / r
+    assert run["ball"].angular_velocity[-1] == pytest.approx(turning * np.cross(Z, d), abs=1e-5)
+
+
+@pytest.mark.parametrize("turned", [(0, 0, 0), (0.4, -0.7, 1.1)])
+def test_a_smooth_blow_beside_the_centre_of_a_body_with_products_of_inertia(turned):
+    """p = -(1 + e) u / (1 / m + (r x n) J^-1 (r x n)), J with all six of its numbers, in axes that are turned."""
+    e, radius = 0.5, 0.1
+    R = Rotation.from_rotvec(turned).as_matrix()
+    J = np.array([[0.04, 0.01, -0.006], [0.01, 0.05, 0.008], [-0.006, 0.008, 0.06]])
+    com = np.array([0.05, -0.03, 0.02])
+    m = fb.Mechanism("stone", gravity=(0, 0, 0))
+    m.add(fb.Ground("floor", shape=fb.Plane()), fb.Contact(friction=0.0, restitution=e))
+    m.add(
+        fb.Body("stone", mass=2, inertia=J, com=tuple(com), shape=fb.Sphere(radius=radius), orientation=R,
+                position=(0, 0, radius), velocity=(0, 0, -1), angular_velocity=(0, 0, 0))
+    )  # fmt: skip
+    run = m.simulate(0.03, outputs=[0.0, 1e-4, 0.03], method=fb.Stepping(step=1e-4))
+    arm = np.cross(-radius * Z - R @ com, Z)
+    turn = R @ np.linalg.solve(J, R.T @ arm)
+    p = (1 + e) / (1 / 2 + arm @ turn)
+    assert run["stone"].angular_velocity[1] == pytest.approx(p * turn, abs=1e-4)
+    assert run["energy.kinetic"][-1] == pytest.approx(1 - p * 1 + 0.5 * p * p * (1 / 2 + arm @ turn), rel=1e-9)
