@@ -81,7 +81,7 @@ def _turned(e: Any, R: Numbers, shift: Numbers, angle: float, planar: bool) -> A
                 own[k] = _points(own[k], R, shift)
         for k in ("axis", "axes", "normal"):
             v = getattr(e, k, None)
-            if v is not None and not isinstance(v, str):
+            if v is not None and not isinstance(v, str) and not (planar and np.shape(v)[-1] == 3):
                 own[k] = _points(v, R, nothing)
     if kind in ("Body", "Ground", "Bushing"):
         if kind != "Bushing":

@@ -11,7 +11,7 @@ import numpy as np
 
 import flyball as fb
 
-from .poses import Array, Motion, Z, turn
+from .poses import Array, Motion, Uncounted, Z, turn
 from .scaling import NAME
 
 Gap = tuple[str, Array]
@@ -45,9 +45,6 @@ def _parallel(x: Motion, e: Any) -> Iterator[Gap]:
 
 
 def _same_turn(x: Motion, e: Any) -> Iterator[Gap]:
-    if x.m.planar:
-        yield "turned", np.abs(np.sin(turn(x, e.body_i, e.body_j, Z) / 2))
-        return
     relative = np.stack([x.direction(e.body_i, d) - x.direction(e.body_j, d) for d in np.eye(3)])
     yield "turned", np.abs(relative).max(axis=(0, 2))
 
@@ -146,7 +143,10 @@ def coordinate(x: Motion, name: str) -> Array | None:
         return None
     kind = type(e).__name__
     if what == "angle" and kind in ("Revolute", "Cylindrical", "Screw") and e.at is not None:
-        return turn(x, e.body_i, e.body_j, _axis(x, e)) + e.angle
+        try:
+            return turn(x, e.body_i, e.body_j, _axis(x, e)) + e.angle
+        except Uncounted:
+            return None
     if what == "displacement" and kind in ("Prismatic", "Translational", "Cylindrical", "Screw", "PointOnLine") and e.at:
         return dots(_apart(x, e), x.direction(e.body_i, e.axis)) + e.displacement
     return None
@@ -184,8 +184,10 @@ def gaps(x: Motion) -> Iterator[tuple[str, str, Array]]:
         if e.at is None or type(e).__name__ not in JOINTS or not {e.body_i, e.body_j} <= set(x.drawn):
             continue
         for measure in JOINTS[type(e).__name__]:
-            for what, gap in measure(x, e):
-                yield e.title, what, gap
+            try:
+                yield from ((e.title, what, gap) for what, gap in measure(x, e))
+            except Uncounted:
+                continue
     for e in x.m.couplings:
         yield from _coupled(x, e)
     for e in x.m.drivers:

@@ -17,7 +17,7 @@ EXACT = 1e-9  # of what is computed twice from the same poses, relative to its t
 HELD = 1e-6  # gaps relative to the mechanism's size; rates of slip to its fastest point
 BALANCED = 1e-6  # force = mass x acceleration, relative to the largest force or torque
 DRIFT = 3e-6  # energies and momenta over a motion at rtol 1e-9, relative to what moved
-JUMPS = ("events", "limits")
+SLOW = 1e-3  # of the size, or of a radian, over the whole motion: no speed that is compared with is less
 
 
 @dataclass
@@ -269,6 +269,8 @@ def springs(x: Motion) -> tuple[dict[str, Array], bool]:
 
 def powers(x: Motion) -> Iterator[Finding]:
     """Joints at rest do no work: what a reaction gives one body it takes from the other."""
+    fast = max((np.abs(x.of(b.name, "velocity")).max() for b in x.m.bodies), default=0.0)
+    spin = max((np.abs(x.of(b.name, "angular_velocity")).max() for b in x.m.bodies), default=0.0)
     for e in x.m.joints:
         if e.at is None or type(e).__name__ not in ONE_POINT or type(e).__name__ == "KnifeEdge":
             continue
@@ -281,7 +283,8 @@ def powers(x: Motion) -> Iterator[Finding]:
         v, w = x.speed(e.body_j, e.at), x.of(e.body_j, "angular_velocity") - x.of(e.body_i, "angular_velocity")
         v = v - x.of(e.body_i, "velocity") - np.cross(x.of(e.body_i, "angular_velocity"), place - x.of(e.body_i, "position"))
         power = dots(force, v) + dots(torque, w)
-        terms = (norms(force) * (norms(x.speed(e.body_j, e.at)) + norms(v)) + norms(torque) * norms(w)).max()
+        terms = norms(force).max() * (fast + spin * x_size(x)) + norms(torque).max() * spin
+        terms = terms + (norms(force).max() * x_size(x) + norms(torque).max()) * SLOW / (x.t[-1] - x.t[0])
         if not np.abs(power).max() <= 1e-6 * terms + 1e-12:
             yield Finding("power of a reaction", e.title, float(np.abs(power).max()), 1e-6 * terms)
 
@@ -367,7 +370,7 @@ def outside(m: fb.Mechanism) -> bool:
 
 def derivatives(x: Motion) -> Iterator[Finding]:
     """Velocities are the rates of positions, accelerations those of velocities, as far as outputs lie close."""
-    if x.n < 9 or x.run.events:
+    if x.n < 9 or x.run.events or any(c.period is not None for c in x.m.controllers):
         return
     for b in x.m.bodies:
         for what, rate in (("position", "velocity"), ("velocity", "acceleration"), ("angular_velocity", "angular_acceleration")):

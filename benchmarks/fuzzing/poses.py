@@ -127,6 +127,10 @@ class Motion:
         return P, L
 
 
+class Uncounted(KeyError):
+    """Outputs are too far apart to count turns by."""
+
+
 def turn(motion: Motion, i: str, j: str, axis: Any) -> Array:
     """Angle by which j has turned relative to i about an axis since the drawn configuration, turns counted."""
     a = spatial(axis) / np.linalg.norm(spatial(axis))
@@ -136,6 +140,8 @@ def turn(motion: Motion, i: str, j: str, axis: Any) -> Array:
     other = np.cross(motion.direction(i, a), on_i)
     raw = np.arctan2(np.einsum("ni,ni->n", on_j, other), np.einsum("ni,ni->n", on_j, on_i))
     w = np.einsum("ni,ni->n", motion.of(j, "angular_velocity") - motion.of(i, "angular_velocity"), motion.direction(i, a))
+    if np.abs(w).max() * np.diff(motion.t).max(initial=0.0) > 1.5:
+        raise Uncounted(f"{i} and {j}")
     return _unwrapped(raw, w, motion.t)
 
 

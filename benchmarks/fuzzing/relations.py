@@ -25,6 +25,7 @@ NUDGE = 1e-7  # relative change of masses, gravity and speeds by which the motio
 GROWTH = 1e3  # beyond this growth of a change nothing is compared: 1e-12 would come to 1e-9
 AGREE = 3e-6  # of the motion's size, times the growth: what runs at RTOL may differ by
 AGREE_STEPS = 1e-4  # of motions by impulses, whose solver stops at a residual
+SLOW = 0.1  # of its reach, or of a radian, over the whole motion: speeds are compared with no less
 STEPS = 20_000
 
 Simulated = Callable[..., fb.Result]
@@ -74,13 +75,14 @@ def state(run: fb.Result, m: fb.Mechanism) -> dict[str, np.ndarray]:
     return out
 
 
-def sizes(now: dict[str, np.ndarray]) -> dict[str, float]:
+def sizes(now: dict[str, np.ndarray], t_end: float) -> dict[str, float]:
     """By which differences are measured: how far things move, how fast they are, a radian."""
     far = max((np.ptp(v, axis=0).max() for k, v in now.items() if k.endswith("position")), default=0.0)
     reach = max((np.abs(v).max() for k, v in now.items() if k.endswith("position")), default=0.0)
     fast = max((np.abs(v).max() for k, v in now.items() if k.endswith(" velocity")), default=0.0)
     turns = max((np.abs(v).max() for k, v in now.items() if k.endswith("angular_velocity")), default=0.0)
-    return {"position": far + 1e-3 * reach + 1e-9, "rotation": 1.0, "velocity": fast + 1e-3 * turns * reach + 1e-6, "angular_velocity": turns + 1e-3 * fast / max(reach, 1e-9) + 1e-6}
+    slow = SLOW / t_end
+    return {"position": far + 1e-3 * reach + 1e-9, "rotation": 1.0, "velocity": fast + slow * reach, "angular_velocity": turns + slow}
 
 
 def difference(a: dict[str, np.ndarray], b: dict[str, np.ndarray], size: dict[str, float]) -> tuple[np.ndarray, str]:
@@ -123,7 +125,7 @@ def base(m: fb.Mechanism, t_end: float, options: dict[str, Any], outputs: int) -
     try:
         other = simulated(nudged(m), t_end, times, options)
         now = state(run, m)
-        d, _ = difference(now, state(other, m), sizes(now))
+        d, _ = difference(now, state(other, m), sizes(now, t_end))
         growth = np.full(len(run.t), np.inf)
         growth[: len(d)] = np.maximum.accumulate(d) / NUDGE
     except (fb.FlyballError, ValueError):
@@ -282,7 +284,7 @@ RELATIONS: dict[str, Relation] = {
 def compared(b: Base, chosen: list[str], seed: int) -> Iterator[tuple[str, str, Finding | None]]:
     """(relation, outcome, finding) of each relation; outcomes: agrees, differs, unsupported, beyond, refused, raised."""
     now = state(b.run, b.mechanism)
-    size = sizes(now)
+    size = sizes(now, b.t_end)
     h = b.horizon
     for name in chosen:
         if h < 2:

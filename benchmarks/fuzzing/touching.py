@@ -12,7 +12,7 @@ import numpy as np
 import flyball as fb
 
 from .gaps import dots, norms
-from .physics import ANGULAR, BALANCED, DRIFT, Finding, constraints, energies, momenta, springs, x_size
+from .physics import ANGULAR, BALANCED, DRIFT, SLOW, Finding, constraints, energies, momenta, springs, x_size
 from .poses import Array, Motion, spatial
 
 OVERLAP = 1e-6  # of the size, from touch to touch
@@ -28,7 +28,7 @@ Z = np.array([0.0, 0.0, 1.0])
 
 def by_steps(x: Motion) -> bool:
     """Whether the motion was stepped by impulses."""
-    return "impulses" in str(x.run.health.method)
+    return str(x.run.health.method).startswith("steps by impulses")
 
 
 def corners(x: Motion, name: str, edges: Any) -> Array:
@@ -144,7 +144,7 @@ def cones(x: Motion) -> Iterator[Finding]:
     if over.max() > tol:
         k = int(over.argmax())
         yield Finding("outside the cone", f"{list(c.names())[k]} at {x.t[c.when[k]]:.6g} s", float(over.max()), tol)
-    fast = max(np.abs(x.of(b.name, "velocity")).max() for b in x.m.bodies)
+    fast = max(np.abs(x.of(b.name, "velocity")).max() for b in x.m.bodies) + SLOW * x_size(x) / (x.t[-1] - x.t[0])
     names, worst, where = list(c.names()), 0.0, 0
     for k in range(len(c)):
         if pressed[k] <= 10 * tol or steps:
