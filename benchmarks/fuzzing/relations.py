@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import random
+import re
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator
@@ -306,6 +307,24 @@ def compared(b: Base, chosen: list[str], seed: int) -> Iterator[tuple[str, str, 
         yield name, *_outcome(b, run, m, back, name, now, size, h)
 
 
+SAME_EVENTS = ("coordinates", "dop853", "rk45", "radau", "axes", "order", "parameters", "file")
+NOTED = 1e-4  # of the whole time: instants may differ by
+
+
+def _happened(b: Base, run: Any, h: int) -> str:
+    """What happened in one of the runs and not in the other, well before the end of what is compared."""
+    if isinstance(b.options.get("method"), fb.Stepping):
+        return ""
+    near = NOTED * b.t_end
+    lists = [[(sorted(re.split(r"[-,\s]+", x.name)), x.kind, x.t) for x in r.events] for r in (b.run, run)]
+    for one, two, which in ((*lists, "only at first"), (*lists[::-1], "only then")):
+        for name, kind, t in one:
+            alike = any((name, kind) == (n, k) and abs(t - s) <= near for n, k, s in two)
+            if t < b.run.t[h - 1] - 10 * near and not alike:
+                return f"{' '.join(name)} {kind} at {t:.6g} s {which}"
+    return ""
+
+
 def _outcome(b: Base, run: Any, m: fb.Mechanism, back: Any, name: str, now: dict, size: dict, h: int) -> tuple:
     if len(run.t) != len(b.run.t):
         return "differs", Finding(name, f"ends after {len(run.t)} of {len(b.run.t)} outputs", np.nan, 0.0)
@@ -317,7 +336,8 @@ def _outcome(b: Base, run: Any, m: fb.Mechanism, back: Any, name: str, now: dict
     ratio = d / allowed
     k = int(np.nanargmax(np.where(np.isfinite(ratio), ratio, np.inf)))
     if np.isfinite(ratio).all() and ratio.max() <= 1.0:
-        return "agrees", None
+        other = _happened(b, run, h) if name in SAME_EVENTS else ""
+        return ("differs", Finding(f"{name}, events", other, np.nan, 0.0)) if other else ("agrees", None)
     if doubts(run):
         return "warned", None
     return "differs", Finding(name, f"{what} at {b.run.t[k]:.6g} s", float(d[k]), float(allowed[k]))

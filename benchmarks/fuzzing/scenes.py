@@ -198,7 +198,75 @@ def soft(d: Dice) -> Case:
     return case
 
 
-SCENES = {f.__name__: f for f in (dropped, rolling, bouncing, colliding, boxes, sliding, piled, capsules, jointed, soft)}
+def slowed(d: Dice) -> Case:
+    """A ball that rolls or spins against rolling and spinning friction, in steps: known in closed form."""
+    d.planar = False
+    case, m = _space(d, "slowed", 1.0, method=_steps(1e-3))
+    _floor(d, m)
+    r = d.number(0.05, 0.2)
+    v = d.number(0.2, 2.0) if d.chance(0.7) else 0.0
+    spin = 0.0 if v else d.number(1.0, 9.0)
+    _ball(d, m, "b", r, (0.0, 0.0, r), velocity=(v, 0.0, 0.0), angular_velocity=(0.0, v / r, spin))
+    m.add(fb.Contact(friction=0.8, rolling_friction=d.size(1e-4, 2e-2) if v else 0.0, spinning_friction=0.0 if v else d.size(1e-4, 1e-2)))
+    return case
+
+
+def carried(d: Dice) -> Case:
+    """A box laid on a belt, in steps: it slides until it goes with the belt."""
+    d.planar = False
+    case, m = _space(d, "carried", 1.0, method=_steps(1e-3))
+    m.add(fb.Material("belt", friction=d.number(0.1, 0.6), surface_velocity=(d.number(-2, 2), d.number(-1, 1), 0.0)))
+    m.add(fb.Material("dry", friction=1.0), fb.Ground("floor", shape=fb.Plane(), material="belt"))
+    _box(d, m, "a", (0.4, 0.4, 0.02), (0.0, 0.0, 0.01), velocity=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 0.0), material="dry")
+    m.add(fb.Contact())
+    return case
+
+
+def planked(d: Dice) -> Case:
+    """A plank on a hinge with a spring, on which a ball falls."""
+    case, m = _space(d, "planked", 0.6)
+    axis = {} if d.planar else {"axis": (0, 1, 0)}
+    edges = (1.2, 0.05, 0.4) if d.planar else (1.2, 0.4, 0.05)
+    _box(d, m, "plank", edges, (0.0, 0.0) if d.planar else (0.0, 0.0, 0.0))
+    m.add(fb.Revolute("J", "ground", "plank", at=(0.0, 0.0) if d.planar else (0.0, 0.0, 0.0), **axis))
+    m.add(fb.TorsionalSpringDamper("T", "J", stiffness=d.size(5, 100), damping=d.pick([0.0, 0.3])))
+    for k in range(d.whole(1, 2)):
+        r = d.number(0.04, 0.1)
+        x = d.number(0.15, 0.5) * (-1) ** k
+        _ball(d, m, f"b{k}", r, _over(d, x, 0.025 + r + d.number(0.01, 0.3)), velocity=d.vector(0.3), angular_velocity=_spin(d, 3.0))
+    m.add(_contact(d))
+    return case
+
+
+def walled(d: Dice) -> Case:
+    """A ball, or two, between a floor and walls."""
+    case, m = _space(d, "walled", 1.0)
+    _floor(d, m)
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        p = (side * 0.6, 0.0) if d.planar else (side * 0.6, 0.0, 0.0)
+        m.add(fb.Ground(name, shape=fb.Plane(normal=(-side, 0.0, 0.0)), position=p))
+    for k in range(d.whole(1, 2)):
+        r = d.number(0.05, 0.12)
+        _ball(d, m, f"b{k}", r, _over(d, 0.6 * k - 0.3, r + d.number(0.02, 0.5)), velocity=d.vector(3.0), angular_velocity=_spin(d, 5.0))
+    m.add(_contact(d))
+    return case
+
+
+def thrown(d: Dice) -> Case:
+    """A box and a ball in free flight meet: momenta."""
+    case, m = _space(d, "thrown", 0.8)
+    m.gravity = (0.0,) * len(m.gravity)
+    lean = {"angle": d.number(-1, 1)} if d.planar else {"orientation": tuple(d.number(-1, 1) for _ in range(3))}
+    edges = tuple(d.number(0.2, 0.5) for _ in range(3))
+    origin = (0.0, 0.0) if d.planar else (0.0, 0.0, 0.0)
+    _box(d, m, "a", edges, origin, velocity=d.vector(0.2), angular_velocity=_spin(d, 2.0), **lean)
+    away = (0.8, *(d.number(-0.1, 0.1) for _ in range(len(origin) - 1)))
+    _ball(d, m, "b", d.number(0.05, 0.15), away, velocity=(-2.0, *(0.0,) * (len(origin) - 1)), angular_velocity=_spin(d, 5.0))
+    m.add(_contact(d))
+    return case
+
+
+SCENES = {f.__name__: f for f in (dropped, rolling, bouncing, colliding, boxes, sliding, piled, capsules, jointed, soft, slowed, carried, planked, walled, thrown)}
 
 
 def made(family: str, seed: int) -> Case:
