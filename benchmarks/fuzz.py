@@ -1,85 +1,73 @@
-"""Thousands of random mechanisms: how many run in good health, how many are refused and how, what is the worst.
+"""Thousands of random mechanisms and contact scenes, judged from outside: which agree, are refused, warned of, or wrong.
 
-A mechanism comes from the name of its family and a seed alone; what breaks is listed with both.
-Usage: ``python fuzz.py``, or ``python fuzz.py --families loops friction --first 1000 --count 500``.
+Judges are formulas for poses and velocities (`fuzzing/physics.py`, `fuzzing/touching.py`), and the same motion by other
+ways (`fuzzing/relations.py`). A case comes from the name of its family and a seed alone.
+Usage: ``python fuzz.py``, or ``python fuzz.py --families loops dropped --first 1000 --count 50 --relations 13``.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
-import time
-import warnings
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import timing
-
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from tests.robust.families import FAMILIES, made
-from tests.robust.verdict import Verdict, judge
+import timing
+from fuzzing.content import KNOWN, NEW
+from fuzzing.relations import RELATIONS
+from fuzzing.scenes import SCENES
+from fuzzing.verdicts import ALL, KINDS, Verdict, judged
 
-import flyball as fb
-
-KINDS = ("healthy", "warned", "ModelError", "AssemblyError", "SimulationError", "broken")
-COLUMNS = {
-    "family": "family",
-    **{k: k for k in KINDS},
-    "violation": "worst violation",
-    "energy": "worst energy",
-    "residual": "worst G vdot",
-    "slowest": "slowest [s]",
-    "seconds": "seconds",
-}
+COLUMNS = {"family": "family", **{k: k for k in KINDS}, "compared": "compared", "seconds": "seconds"}
+GROUPS = {"mechanisms": [*NEW, *KNOWN], "new": list(NEW), "known": list(KNOWN), "contact": list(SCENES)}
 
 
-def family(name: str, seeds: range, listed: list[str]) -> dict[str, Any]:
-    """One row of the table; what breaks or draws a warning is added to the list."""
+def family(name: str, seeds: range, arguments: argparse.Namespace, listed: list[Verdict]) -> dict[str, Any]:
+    """One row of the table; what does not agree is kept."""
     count: Counter[str] = Counter()
-    row: dict[str, Any] = {"family": name, "violation": 0.0, "energy": 0.0, "residual": 0.0, "slowest": 0.0}
-    begin = time.process_time()
+    seconds, compared = 0.0, 0
     for seed in seeds:
-        verdict = judged(name, seed)
+        verdict = judged(name, seed, arguments.relations, arguments.only)
         count[verdict.kind] += 1
-        if verdict.kind in ("broken", "warned"):
-            listed.append(f"{name} {seed}: {verdict.kind}: {verdict.text}")
-        if verdict.kind == "healthy":
-            for key in ("violation", "energy", "residual"):
-                row[key] = max(row[key], getattr(verdict, key))
-        row["slowest"] = max(row["slowest"], verdict.seconds)
-    return row | {k: count[k] for k in KINDS} | {"seconds": time.process_time() - begin}
+        seconds += verdict.seconds
+        compared += sum(v in ("agrees", "differs") for v in verdict.outcomes.values())
+        if verdict.kind in ("wrong", "uneven") or (arguments.all and verdict.kind != "agrees"):
+            listed.append(verdict)
+            print("\n".join(lines(verdict)), flush=True)
+    return {"family": name, **{k: count[k] for k in KINDS}, "compared": compared, "seconds": seconds}
 
 
-def judged(name: str, seed: int) -> Verdict:
-    """The verdict on one mechanism, however it fails."""
-    try:
-        return judge(made(name, seed))
-    except Exception as error:
-        return Verdict("broken", f"cannot be built: {type(error).__name__}: {error}")
+def lines(v: Verdict) -> list[str]:
+    """What is said of a case."""
+    return [f"{v.family} {v.seed} {v.kind}: {f}" for f in v.findings]
 
 
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--families", nargs="*", choices=list(FAMILIES), default=list(FAMILIES), metavar="NAME")
+    names = [*GROUPS, *ALL]
+    parser.add_argument("--families", nargs="*", choices=names, default=["mechanisms", "contact"], metavar="NAME")
     parser.add_argument("--first", type=int, default=0, help="first seed (0)")
-    parser.add_argument("--count", type=int, default=840, help="seeds of each family (840: ten thousand in all)")
-    parser.add_argument("--json", metavar="FILE", help="write the rows")
+    parser.add_argument("--count", type=int, default=100, help="seeds of each family (100: 3000 mechanisms)")
+    parser.add_argument("--relations", type=int, default=4, help="other ways in which each motion is computed (4; 13: all)")
+    parser.add_argument("--only", nargs="*", choices=list(RELATIONS), metavar="NAME", help="these ways and no others")
+    parser.add_argument("--all", action="store_true", help="list what is refused and warned of, too")
+    parser.add_argument("--json", metavar="FILE", help="write rows and verdicts")
     arguments = parser.parse_args()
-    warnings.simplefilter("ignore", fb.PerformanceNotice)
-    judge(made("chains", 0))  # what is not compiled yet is compiled here
-    listed: list[str] = []
+    chosen = [f for name in arguments.families for f in GROUPS.get(name, [name])]
+    listed: list[Verdict] = []
     seeds = range(arguments.first, arguments.first + arguments.count)
-    rows = [family(name, seeds, listed) for name in arguments.families]
-    total: dict[str, Any] = {"family": "all"}
-    total |= {k: sum(r[k] for r in rows) for k in (*KINDS, "seconds")}
-    total |= {k: max(r[k] for r in rows) for k in ("violation", "energy", "residual", "slowest")}
-    print(timing.table([*rows, total], COLUMNS))
-    for line in listed:
-        print(line)
-    timing.write_json(arguments.json, [*rows, total])
+    rows = [family(name, seeds, arguments, listed) for name in dict.fromkeys(chosen)]
+    rows.append({"family": "all"} | {k: sum(r[k] for r in rows) for k in list(COLUMNS)[1:]})
+    print(timing.table(rows, COLUMNS))
+    told = [{"family": v.family, "seed": v.seed, "kind": v.kind, "findings": list(map(str, v.findings))} for v in listed]
+    timing.write_json(arguments.json, [*rows, *told])
 
 
 if __name__ == "__main__":

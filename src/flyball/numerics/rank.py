@@ -9,6 +9,20 @@ import numpy as np
 TOLERANCE = 1e-8  # singular values below this part of the largest count as zero; rows scaled to unit length
 
 
+def svd(A: np.ndarray, full: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Singular values and vectors: U, d, V^T of A = U diag(d) V^T.
+
+    NumPy's algorithm, divide and conquer (LAPACK's ``gesdd``), does not converge for some finite matrices with many equal
+    singular values beside rounding; the implicit QR iteration (``gesvd``), which is slower, does.
+    """
+    try:
+        return np.linalg.svd(A, full_matrices=full)
+    except np.linalg.LinAlgError:
+        from scipy.linalg import svd as by_iteration
+
+        return by_iteration(A, full_matrices=full, lapack_driver="gesvd")
+
+
 class Parts(NamedTuple):
     """Orthonormal bases of the four spaces of a matrix A (n, m) of rank r."""
 
@@ -38,7 +52,7 @@ def parts(A: np.ndarray, tolerance: float = TOLERANCE, size: float | None = None
     n, m = A.shape
     if not A.size:
         return Parts(np.zeros((n, 0)), np.eye(n), np.zeros((m, 0)), np.eye(m), np.zeros(0))
-    U, d, Vt = np.linalg.svd(A, full_matrices=True)
+    U, d, Vt = svd(A, full=True)
     r = _counted(d, tolerance, size)
     return Parts(U[:, :r], U[:, r:], Vt[:r].T, Vt[r:].T, d[:r])
 
@@ -52,7 +66,7 @@ def span(A: np.ndarray, tolerance: float = TOLERANCE, size: float | None = None)
     """An orthonormal basis (n, r) of what the columns span; as for `parts`, for few columns."""
     if not A.size:
         return A[:, :0]
-    U, d, _ = np.linalg.svd(A, full_matrices=False)
+    U, d, _ = svd(A)
     return U[:, : _counted(d, tolerance, size)]
 
 

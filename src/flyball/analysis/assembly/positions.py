@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...numerics.rank import svd
 from ...tables.system import G_VALUE, NV, V0
 from ..compiled import Compiled
 
@@ -85,7 +86,7 @@ def _step(c: Compiled, r: np.ndarray, rows, R, damping: float) -> np.ndarray:
     B = rows @ c.sparse_jacobian() @ R
     if B.shape[0] <= DENSE:
         used = np.unique(B.indices)
-        U, s, Vt = np.linalg.svd(B[:, used].toarray(), full_matrices=False)
+        U, s, Vt = svd(B[:, used].toarray())
         largest = s.max(initial=0.0) or 1.0
         keep = s > NO_PART * largest
         x = np.zeros(B.shape[1])

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...model.model import Model
+from ...numerics.rank import svd
 from ...tables.system import NU
 from ..compiled import Compiled, compiled
 from .described import Given, described, deviation, given, gradient
@@ -193,7 +194,7 @@ def _norm(A: np.ndarray) -> float:
 
 def _pseudo_inverse(A: np.ndarray, none: float) -> tuple[np.ndarray, np.ndarray]:
     """(basis of the row space, pseudo-inverse); singular values up to ``none`` are none."""
-    U, s, Vt = np.linalg.svd(A, full_matrices=False)
+    U, s, Vt = svd(A)
     keep = s > none
     V = Vt[keep].T
     return V, (V / s[keep]) @ U[:, keep].T

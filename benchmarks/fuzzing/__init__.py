@@ -1,0 +1,1 @@
+"""Random mechanisms and contact scenes, and judges that do not rely on the program's own judgement."""

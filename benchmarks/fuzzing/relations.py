@@ -1,0 +1,343 @@
+"""The same motion by other ways: coordinates, methods, units, axes, names, order, halves, parameters, files."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import random
+import re
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import flyball as fb
+
+from . import changes
+from .physics import Finding
+from .poses import matrix
+from .scaling import Scale, Unsupported, scaled
+
+RTOL, ATOL = 1e-9, 1e-11
+NUDGE = 1e-7  # relative change of masses, gravity and speeds by which the motion's sensitivity is measured
+GROWTH = 1e3  # beyond this growth of a change nothing is compared: 1e-12 would come to 1e-9
+AGREE = 3e-6  # of the motion's size, times the growth: what runs at RTOL may differ by
+AGREE_STEPS = 1e-4  # of motions by impulses, whose solver stops at a residual
+SLOW = 0.1  # of its reach, or of a radian, over the whole motion: speeds are compared with no less
+STEPS = 20_000
+
+Simulated = Callable[..., fb.Result]
+
+
+@dataclass
+class Base:
+    """A motion, and how much a change of its start has grown by each output time."""
+
+    mechanism: fb.Mechanism
+    run: fb.Result
+    t_end: float
+    options: dict[str, Any]
+    growth: np.ndarray
+
+    @property
+    def horizon(self) -> int:
+        """Number of output times up to which motions are compared."""
+        beyond = np.flatnonzero(self.growth > GROWTH)
+        return int(beyond[0]) if len(beyond) else len(self.growth)
+
+
+def doubts(run: Any) -> list[str]:
+    """What a result says against itself; that given velocities are not possible says nothing against the motion."""
+    warned = getattr(getattr(run, "health", None), "warnings", ())
+    return [w for w in warned if "the nearest was taken" not in w]
+
+
+def simulated(m: fb.Mechanism, t_end: float, times: Any, options: dict[str, Any], **other: Any) -> fb.Result:
+    """A run with the harness's tolerances."""
+    every = {"rtol": RTOL, "atol": ATOL, "max_steps": STEPS, "progress": False} | options | other
+    if isinstance(every.get("method"), fb.Stepping):
+        every = {k: v for k, v in every.items() if k not in ("rtol", "atol", "max_steps")}
+    return m.simulate(t_end, outputs=times, **every)
+
+
+def state(run: fb.Result, m: fb.Mechanism) -> dict[str, np.ndarray]:
+    """Positions, rotations and velocities of all bodies over time."""
+    out = {}
+    for b in m.bodies:
+        r = run[b.name]
+        n = len(run.t)
+        out[f"{b.name} position"] = np.asarray(r.position).reshape(n, -1)
+        out[f"{b.name} rotation"] = np.asarray(r.rotation).reshape(n, -1)
+        out[f"{b.name} velocity"] = np.asarray(r.velocity).reshape(n, -1)
+        out[f"{b.name} angular_velocity"] = np.asarray(r.angular_velocity).reshape(n, -1)
+    return out
+
+
+def sizes(now: dict[str, np.ndarray], t_end: float) -> dict[str, float]:
+    """By which differences are measured: how far things move, how fast they are, a radian."""
+    far = max((np.ptp(v, axis=0).max() for k, v in now.items() if k.endswith("position")), default=0.0)
+    reach = max((np.abs(v).max() for k, v in now.items() if k.endswith("position")), default=0.0)
+    fast = max((np.abs(v).max() for k, v in now.items() if k.endswith(" velocity")), default=0.0)
+    turns = max((np.abs(v).max() for k, v in now.items() if k.endswith("angular_velocity")), default=0.0)
+    slow = SLOW / t_end
+    return {"position": far + 1e-3 * reach + 1e-9, "rotation": 1.0, "velocity": fast + slow * reach, "angular_velocity": turns + slow}
+
+
+def difference(a: dict[str, np.ndarray], b: dict[str, np.ndarray], size: dict[str, float]) -> tuple[np.ndarray, str]:
+    """Largest relative difference at each time, and of what it is the largest."""
+    worst, name, top = None, "", -1.0
+    for k, v in a.items():
+        d = np.abs(v - b[k]).max(axis=1) / size[k.split()[-1]]
+        worst = d if worst is None else np.maximum(worst, d)
+        if d.max() > top:
+            top, name = d.max(), k
+    return (np.zeros(1) if worst is None else worst), name
+
+
+def nudged(m: fb.Mechanism) -> fb.Mechanism:
+    """Masses, gravity and velocities changed by a ten-millionth."""
+    dice = random.Random(1)
+
+    def by(v: Any) -> Any:
+        if isinstance(v, tuple):
+            return tuple(by(c) for c in v)
+        return v * (1.0 + NUDGE * dice.uniform(-1, 1)) if isinstance(v, float | int) else v
+
+    def of(e: Any) -> Any:
+        if not isinstance(e, fb.Body):
+            return e
+        own = changes.fields(e)
+        for k in ("mass", "density", "velocity", "angular_velocity"):
+            if own.get(k) is not None and not (k == "mass" and e.inertia is None and e.shape is None):
+                own[k] = by(own[k])
+        return type(e)(**own)
+
+    return changes.again(m, of, gravity=by(tuple(m.gravity)))
+
+
+def base(m: fb.Mechanism, t_end: float, options: dict[str, Any], outputs: int) -> Base:
+    """The motion as it is described, and its sensitivity."""
+    times = np.linspace(0.0, t_end, outputs)
+    run = simulated(m, t_end, times, options)
+    growth = np.full(len(run.t), np.inf)
+    try:
+        other = simulated(nudged(m), t_end, times, options)
+        now = state(run, m)
+        d, _ = difference(now, state(other, m), sizes(now, t_end))
+        growth = np.full(len(run.t), np.inf)
+        growth[: len(d)] = np.maximum.accumulate(d) / NUDGE
+    except (fb.FlyballError, ValueError):
+        pass
+    return Base(m, run, t_end, options, growth)
+
+
+Relation = Callable[[Base, random.Random], tuple[fb.Result, fb.Mechanism, Callable[[dict], dict] | None]]
+
+
+def _again(b: Base, m: fb.Mechanism, back: Callable[[dict], dict] | None = None, **other: Any) -> tuple:
+    return simulated(m, b.t_end, np.asarray(b.run.t), b.options, **other), m, back
+
+
+def has_functions(m: fb.Mechanism) -> bool:
+    """Whether any law is a Python function."""
+    values = [v for e in m.elements() for v in changes.fields(e).values()]
+    return any(callable(x) for v in values for x in (v if isinstance(v, tuple) else (v,)))
+
+
+def other_coordinates(b: Base, dice: random.Random) -> tuple:
+    if "coordinates" in b.options or isinstance(b.options.get("method"), fb.Stepping):
+        raise Unsupported("coordinates are given")
+    used = "joint" if str(b.run.health.coordinates).startswith("joint") else "absolute"
+    return _again(b, b.mechanism, coordinates="absolute" if used == "joint" else "joint")
+
+
+def _method(name: str) -> Relation:
+    def relation(b: Base, dice: random.Random) -> tuple:
+        if b.options.get("stabilization", "projection") != "projection" and name == "radau":
+            raise Unsupported("radau projects")
+        if name == "radau" and has_functions(b.mechanism):
+            raise Unsupported("Python functions have no derivatives")
+        return _again(b, b.mechanism, method=name)
+
+    return relation
+
+
+def other_units(b: Base, dice: random.Random) -> tuple:
+    s = Scale(*(10.0 ** dice.uniform(-2, 2) for _ in range(3)))
+    m = scaled(b.mechanism, s)
+    times = np.asarray(b.run.t) * s.time
+    options = {"atol": None} | {k: v for k, v in b.options.items() if k not in ("atol", "max_step", "step")}
+    options["atol"] = ATOL * min(1.0, s.length, s.length / s.time, 1.0 / s.time)
+    method = options.get("method")
+    if isinstance(method, fb.Stepping):
+        options["method"] = dataclasses.replace(method, step=method.step * s.time, tolerance=method.tolerance * s.length / s.time)
+    run = simulated(m, b.t_end * s.time, times, options)
+    per = {"position": s.length, "rotation": 1.0, "velocity": s.length / s.time, "angular_velocity": 1.0 / s.time}
+    return run, m, lambda d: {k: v / per[k.split()[-1]] for k, v in d.items()}
+
+
+def _turn_back(R: np.ndarray, shift: np.ndarray, planar: bool) -> Callable[[dict], dict]:
+    """What the turned world's motion is in the axes of the first."""
+    full = np.eye(3)
+    full[: len(R), : len(R)] = R
+    sign = np.linalg.det(R)
+
+    def back(d: dict) -> dict:
+        out = {}
+        for k, v in d.items():
+            what = k.split()[-1]
+            if what == "rotation":
+                a = v.reshape(-1, 3, 3)
+                out[k] = (full.T @ a if sign > 0 else full.T @ a @ full).reshape(v.shape)
+            elif what == "angular_velocity":
+                out[k] = sign * v if planar else sign * (v @ R)
+            else:
+                out[k] = (v - (shift if what == "position" else 0.0)) @ R
+        return out
+
+    return back
+
+
+def other_axes(b: Base, dice: random.Random) -> tuple:
+    n = 2 if b.mechanism.planar else 3
+    shift = np.array([dice.uniform(-3, 3) for _ in range(n)])
+    if n == 2:
+        a = dice.uniform(-3, 3)
+        R = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
+    else:
+        R = matrix([dice.uniform(-3, 3) for _ in range(3)])
+    back = _turn_back(R, shift, n == 2)
+    m = changes.turned(b.mechanism, R, shift)
+    start = {k: v[:1] for k, v in state(b.run, b.mechanism).items()}
+    del start
+    run = simulated(m, b.t_end, np.asarray(b.run.t), b.options)
+    # bodies' own axes turn with the world: R' = R R_0
+    return run, m, back
+
+
+def mirror(b: Base, dice: random.Random) -> tuple:
+    n = 2 if b.mechanism.planar else 3
+    S = np.diag([1.0, -1.0]) if n == 2 else np.diag([-1.0, 1.0, 1.0])
+    back = _turn_back(S, np.zeros(n), n == 2)
+    return _again(b, changes.mirrored(b.mechanism), back)
+
+
+def rename(b: Base, dice: random.Random) -> tuple:
+    m, new = changes.renamed(b.mechanism)
+    run = simulated(m, b.t_end, np.asarray(b.run.t), b.options)
+    old = {v: k for k, v in new.items()}
+    return run, m, lambda d: {f"{old[k.split()[0]]} {k.split()[-1]}": v for k, v in d.items()}
+
+
+def reorder(b: Base, dice: random.Random) -> tuple:
+    return _again(b, changes.reordered(b.mechanism, dice.randrange(10**6)))
+
+
+def swap(b: Base, dice: random.Random) -> tuple:
+    return _again(b, changes.swapped(b.mechanism))
+
+
+def parameters(b: Base, dice: random.Random) -> tuple:
+    return _again(b, changes.with_parameters(b.mechanism))
+
+
+def file(b: Base, dice: random.Random) -> tuple:
+    if has_functions(b.mechanism):
+        raise Unsupported("a file holds no Python function")
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "m.toml")
+        b.mechanism.save(path)
+        m = fb.load(path)
+    if m != b.mechanism:
+        raise AssertionError("what is read back is another mechanism")
+    return _again(b, m)
+
+
+def halves(b: Base, dice: random.Random) -> tuple:
+    times = np.asarray(b.run.t)
+    k = len(times) // 2
+    if isinstance(b.options.get("method"), fb.Stepping):
+        raise Unsupported("another step in the middle")
+    middle = 0.5 * (times[k] + times[k + 1])
+    first = simulated(b.mechanism, float(middle), times[: k + 1], b.options)
+    second = simulated(b.mechanism, b.t_end, np.r_[middle, times[k + 1 :]], b.options, start=first)
+    one, two = state(first, b.mechanism), state(second, b.mechanism)
+    joined = {n: np.concatenate([one[n], two[n][1:]]) for n in one}
+    return _Joined(np.r_[np.asarray(first.t), np.asarray(second.t)[1:]], joined), b.mechanism, None
+
+
+@dataclass
+class _Joined:
+    t: np.ndarray
+    states: dict[str, np.ndarray]
+
+
+RELATIONS: dict[str, Relation] = {
+    "coordinates": other_coordinates, "dop853": _method("dop853"), "rk45": _method("rk45"), "radau": _method("radau"),
+    "units": other_units, "axes": other_axes, "mirror": mirror, "names": rename, "order": reorder, "swap": swap,
+    "halves": halves, "parameters": parameters, "file": file,
+}  # fmt: skip
+
+
+def compared(b: Base, chosen: list[str], seed: int) -> Iterator[tuple[str, str, Finding | None]]:
+    """(relation, outcome, finding) of each relation; outcomes: agrees, differs, unsupported, beyond, refused, raised."""
+    now = state(b.run, b.mechanism)
+    size = sizes(now, b.t_end)
+    h = b.horizon
+    for name in chosen:
+        if h < 2:
+            yield name, "beyond", None
+            continue
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                run, m, back = RELATIONS[name](b, random.Random(f"{name} {seed}"))
+        except Unsupported:
+            yield name, "unsupported", None
+            continue
+        except fb.FlyballError as error:
+            yield name, "refused", Finding(name, f"{type(error).__name__}: {str(error)[:300]}", np.nan, 0.0)
+            continue
+        except Exception as error:
+            yield name, "raised", Finding(name, f"raised {type(error).__name__}: {str(error)[:300]}", np.nan, 0.0)
+            continue
+        yield name, *_outcome(b, run, m, back, name, now, size, h)
+
+
+SAME_EVENTS = ("coordinates", "dop853", "rk45", "radau", "axes", "order", "parameters", "file")
+NOTED = 1e-4  # of the whole time: instants may differ by
+
+
+def _happened(b: Base, run: Any, h: int) -> str:
+    """What happened in one of the runs and not in the other, well before the end of what is compared."""
+    if isinstance(b.options.get("method"), fb.Stepping):
+        return ""
+    near = NOTED * b.t_end
+    lists = [[(sorted(re.split(r"[-,\s]+", x.name)), x.kind, x.t) for x in r.events] for r in (b.run, run)]
+    for one, two, which in ((*lists, "only at first"), (*lists[::-1], "only then")):
+        for name, kind, t in one:
+            alike = any((name, kind) == (n, k) and abs(t - s) <= near for n, k, s in two)
+            if t < b.run.t[h - 1] - 10 * near and not alike:
+                return f"{' '.join(name)} {kind} at {t:.6g} s {which}"
+    return ""
+
+
+def _outcome(b: Base, run: Any, m: fb.Mechanism, back: Any, name: str, now: dict, size: dict, h: int) -> tuple:
+    if len(run.t) != len(b.run.t):
+        return "differs", Finding(name, f"ends after {len(run.t)} of {len(b.run.t)} outputs", np.nan, 0.0)
+    other = run.states if isinstance(run, _Joined) else state(run, m)
+    other = back(other) if back else other
+    d, what = difference({k: v[:h] for k, v in now.items()}, {k: v[:h] for k, v in other.items()}, size)
+    steps = isinstance(b.options.get("method"), fb.Stepping)
+    allowed = (AGREE_STEPS if steps else AGREE) * np.maximum(1.0, b.growth[:h])
+    ratio = d / allowed
+    k = int(np.nanargmax(np.where(np.isfinite(ratio), ratio, np.inf)))
+    if np.isfinite(ratio).all() and ratio.max() <= 1.0:
+        other = _happened(b, run, h) if name in SAME_EVENTS else ""
+        return ("differs", Finding(f"{name}, events", other, np.nan, 0.0)) if other else ("agrees", None)
+    if doubts(run):
+        return "warned", None
+    return "differs", Finding(name, f"{what} at {b.run.t[k]:.6g} s", float(d[k]), float(allowed[k]))

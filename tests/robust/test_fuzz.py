@@ -1,0 +1,92 @@
+"""A fixed sample of the fuzz in `benchmarks/fuzz.py`: its judges know nothing of the program's own judgement."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+from fuzzing import content, physics, poses, relations, scenes, touching, verdicts
+
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::flyball.errors.StartWarning", "ignore::flyball.errors.PerformanceNotice"
+)
+MECHANISMS = [(family, seed) for family in content.NEW for seed in ((101,) if family == "eventful" else (100,))]
+CONTACT = [(family, seed) for family in scenes.SCENES if family != "soft" for seed in (100,)]
+
+
+@pytest.mark.parametrize(("family", "seed"), [*MECHANISMS, *CONTACT])
+def test_nothing_is_wrong_in_silence(family, seed):
+    """``python benchmarks/fuzz.py --families FAMILY --first SEED --count 1 --relations 13`` shows a failure again."""
+    verdict = verdicts.judged(family, seed, 3)
+    assert verdict.kind in ("agrees", "refused", "warned"), [str(f) for f in verdict.findings]
+
+
+def _lossless(seed=101):
+    case = content.made("lossless", seed)
+    return case.mechanism, relations.base(case.mechanism, case.t_end, {}, 41)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "relation"),
+    [
+        ("velocity", "energy"),
+        ("position", "constraint"),
+        ("acceleration", "force = mass x acceleration"),
+        ("force", "force = mass x acceleration"),
+    ],
+)
+def test_a_judge_sees_what_is_spoilt(spoil, relation, monkeypatch):
+    """A thousandth more or less of one quantity of one body, or of one joint's force, does not pass."""
+    m, base = _lossless()
+    read = poses.Motion._read
+    if spoil == "force":
+        class View:
+            def __init__(self, of):
+                self.of = of
+
+            def __getattr__(self, name):
+                return np.asarray(getattr(self.of, name)) * (1.001 if name == "force" else 1.0)
+
+        class Spoilt:
+            def __getitem__(self, name):
+                return View(base.run[name]) if name == m.joints[0].name else base.run[name]
+
+            def __getattr__(self, name):
+                return getattr(base.run, name)
+
+        found = physics.findings(Spoilt(), m)
+    else:
+        first = m.bodies[0].name
+
+        def spoilt(self, body, what):
+            x = read(self, body, what)
+            return x * 1.001 if (body, what) == (first, spoil) else x
+
+        monkeypatch.setattr(poses.Motion, "_read", spoilt)
+        found = physics.findings(base.run, m)
+    assert any(relation in f.relation for f in found), [str(f) for f in found]
+
+
+def test_a_relation_sees_another_motion():
+    """Gravity that is a thousandth stronger in the second description is found."""
+    m, base = _lossless()
+    other = relations.changes.again(m, lambda e: e, gravity=tuple(1.001 * g - 0.01 for g in m.gravity))
+    changed = replace(base, mechanism=other)
+    outcomes = [x[1] for x in relations.compared(changed, ["order", "parameters"], 1)]
+    assert outcomes == ["differs", "differs"]
+
+
+def test_contact_judges_see_friction_outside_its_cone():
+    case = scenes.made("rolling", 100)
+    base = relations.base(case.mechanism, case.t_end, {}, 41)
+    assert not touching.findings(base.run, case.mechanism, "rolling")
+    x = poses.Motion(base.run, case.mechanism)
+    contacts = base.run.contacts
+    sideways = contacts.force - contacts.normal_force[:, None] * contacts.normal
+    contacts.force[:] = contacts.force + 0.01 * sideways
+    found = [*touching.cones(x), *touching.balances(x)]
+    assert {"outside the cone", "force = mass x acceleration"} <= {f.relation for f in found}
