@@ -117,7 +117,14 @@ def again(P, c, before, o, first):
         return (0.0, 0.0, 0.0)
     x = along(P, c, load3(before, o, first))
     n, s, t = load3(P.frame, c, 0), load3(P.frame, c, 3), load3(P.frame, c, 6)
-    return (x[0] / dot(n, n), x[1] / dot(s, s), x[2] / dot(t, t))
+    return (x[0] / dot(n, n), coefficient(x[1], s), coefficient(x[2], t))
+
+
+@formula
+def coefficient(x, row):
+    """Product x of a vector and a row over the row's square; 0 along a row that is zero, where friction is none."""
+    square = dot(row, row)
+    return x / square if square > 0.0 else 0.0 * x
 
 
 @formula
