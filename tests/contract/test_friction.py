@@ -358,3 +358,29 @@ def test_friction_of_a_screw_says_what_it_needs():
         m.add(fb.JointFriction("f", "A", coordinate="thread", static=0.1, radius=0.01))
     plain = fb.JointFriction("rub", "thread", static=0.15, radius=0.01)
     assert m.replace(plain).coordinate == m.changed({"rub": plain})["rub"].coordinate == "thread"
+
+
+@pytest.mark.parametrize("law", [{}, {"stick_speed": 1e-3}])
+def test_more_frictions_than_newton_takes_steps(law):
+    """A hundred pendulums, one hung on another: each friction is its law at its own joint's load, from rest on."""
+    rng = np.random.default_rng(0)
+    m, tips = fb.Mechanism("tree", gravity=(0, 0, -G)), {"ground": np.zeros(3)}
+    for k in range(100):
+        on = str(rng.choice(list(tips)))
+        base, d = tips[on], rng.normal(size=3)
+        d *= 0.1 / np.linalg.norm(d)
+        tips[f"b{k}"] = base + d
+        m.add(fb.Body(f"b{k}", mass=1, inertia=(1e-3,) * 3, position=base + d / 2))
+        m.add(fb.Revolute(f"j{k}", on, f"b{k}", at=base, axis=rng.normal(size=3)))
+        m.add(fb.JointFriction(f"f{k}", f"j{k}", static=0.2, radius=0.02, **law))
+    r = m.simulate(1e-3, outputs=2)
+    for k in range(100):
+        force, axis = r[f"j{k}"].reaction(axes="joint")[0], np.array([0.0, 0.0, 1.0])
+        thrust = force @ axis
+        load = np.linalg.norm(force - np.outer(thrust, axis), axis=1) + np.abs(thrust)
+        most = 0.02 * 0.2 * load
+        assert (np.abs(r[f"f{k}"].friction) <= most * (1 + 1e-6)).all()
+        slides = np.abs(r[f"j{k}"].rate[-1]) > 1e-9
+        if slides:
+            want = -most[-1] * way(law, 0.02 * r[f"j{k}"].rate)[-1]
+            assert r[f"f{k}"].friction[-1] == pytest.approx(want, rel=1e-6)

@@ -44,8 +44,7 @@ from .records import load
 from .rows import measured, on_second
 from .sliding import slides
 
-SUBSTITUTIONS = 80
-AGAIN = 40  # after as many, once more from no load at all
+NEWTON = 40  # steps of Newton's method, once the slopes are known
 CONVERGED = 1e-12  # relative
 NOTHING = 0.1  # times the largest force and CONVERGED: changes of loads below this are none
 TRIAL = 0.05  # part of the way to the returned load that tells the slope
@@ -144,6 +143,12 @@ def force_scale(S, W):
 
 
 @formula
+def tries(W):
+    """Solves after which loads are sought once more, from none at all: one for the slope of each, then Newton's."""
+    return W.sensed.shape[0] - INVERSE_JACOBIAN + NEWTON
+
+
+@formula
 def improve(S, W, attempt):
     """Next loads. ``attempt`` counts from 0 within one evaluation.
 
@@ -151,7 +156,7 @@ def improve(S, W, attempt):
     each load by itself and kept from one evaluation to the next.
     """
     first, last = 2 * measured(S), loads_end(S, W)
-    if attempt == AGAIN:
+    if attempt == tries(W):
         W.info[LEARNT] = FORGOTTEN
         for n in range(first, last):
             W.sensed[LOAD, n] = 0.0

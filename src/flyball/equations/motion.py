@@ -51,7 +51,7 @@ from ..tables.system import (
 )
 from .control import control
 from .dispatch import progress, remember
-from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
+from .friction import BLURRED, CONVERGED, improve, learnt, returned, tries
 from .loads import efforts, forces, gather, inertial
 from .made import run
 from .partition import exchange
@@ -140,7 +140,8 @@ def balance(S, W, t, p, work, factored):
     x = W.vel[X_SOLVED]
     change = 1e300
     # joints with friction need the solution to know their loads: again until these return themselves
-    for attempt in range(SUBSTITUTIONS):
+    most = 2 * tries(W)
+    for attempt in range(most):
         control(S, W, t, p[S.kinds[COORDINATES] + W.vel.shape[1] :], work)
         loaded(S, W, t, p, work)
         if (
@@ -158,7 +159,7 @@ def balance(S, W, t, p, work, factored):
         change = returned(S, W)
         if change <= CONVERGED or (change <= BLURRED and change > 0.5 * last and learnt(S, W)):
             break
-        if attempt == SUBSTITUTIONS - 1:
+        if attempt == most - 1:
             W.info[STATUS] = JAMMED if finite(x) == 0 else NOT_FINITE
             return W.info[STATUS], factored
         improve(S, W, attempt)
