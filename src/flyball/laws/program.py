@@ -36,7 +36,7 @@ from .opcodes import (
     WHERE,
     WHOLE_POWER,
 )
-from .sides import BETWEEN_SIDES, SIDE, Corners, on_one_side
+from .sides import BETWEEN_SIDES, SIDE, Corners, on_one_side, whole
 
 _FUNCTIONS = ("neg", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs")
 _UNARY = {name: NEGATE + k for k, name in enumerate((*_FUNCTIONS, "sign", "cubic", "quintic", "not"))}
@@ -45,7 +45,6 @@ _BINARY = {
     **{"min": MINIMUM, "max": MAXIMUM, "<": LESS, "<=": LESS_EQUAL, "and": MINIMUM, "or": MAXIMUM},
 }
 AMONG = 64  # constants in which a literal is looked for
-_LARGEST_WHOLE_POWER = 64
 _NONE: Mapping[str, int] = MappingProxyType({})
 
 
@@ -232,9 +231,9 @@ class _Writer:
 
     def write_operation(self, node: Node, constant: bool) -> None:
         for arg in node.args:
-            if not (node.kind == "**" and arg is node.args[1] and _is_whole(arg)):
+            if not (node.kind == "**" and arg is node.args[1] and whole(arg)):
                 self.write(arg, constant)
-        if node.kind == "**" and _is_whole(node.args[1]):
+        if node.kind == "**" and whole(node.args[1]):
             self.emit(WHOLE_POWER, int(node.args[1].value), 0)
         elif node.kind in _UNARY:
             self.emit(CALL, _UNARY[node.kind], 0)
@@ -266,11 +265,6 @@ class _Writer:
 
 
 _SHAPES = {"step": "cubic", "step5": "quintic"}
-
-
-def _is_whole(node: Node) -> bool:
-    """Whether an exponent is a small whole number, written out."""
-    return node.kind == "number" and node.value == int(node.value) and abs(node.value) <= _LARGEST_WHOLE_POWER
 
 
 def _expand(node: Node, varying: Collection[str]) -> Node:

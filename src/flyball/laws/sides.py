@@ -6,10 +6,16 @@ goes on smoothly beyond the corner, and a step may end on it. Between -1 and 1 s
 
 What is made of sides is affine in each of them, and goes on so beyond 1 and -1: there the side is looked for that would
 hold the motion where none does any more, by which it is seen that it leaves.
+
+A branch is continued beyond its corner only within the domain of the functions in it (`DOMAINS`): where the law as
+written is defined, but the argument of the branch continued is not in the domain, the function keeps its value at the
+domain's boundary, and at a pole the law is as written. So ``max(-x, 0)**1.5`` is 0 beyond its corner on either side. A law that leaves its domain as written
+is nan, as ever.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from typing import Any
@@ -17,13 +23,34 @@ from typing import Any
 from ..model.grammar import Node
 
 SIDE, BETWEEN_SIDES = "side", "between sides"
+LARGEST_WHOLE_POWER = 64
 Corners = Callable[[Node], tuple[int, float]]
 """Of what decides (a node) the place of the number to be read, and its sign."""
 _TRUTHS = ("<", "<=", "and", "or", "not")
+DOMAINS: dict[str, tuple[tuple[str, float], ...]] = {
+    "sqrt": (("<", 0.0),),
+    "**": (("<", 0.0),),
+    "log": (("<", sys.float_info.min),),
+    "asin": (("<", -1.0), (">", 1.0)),
+    "acos": (("<", -1.0), (">", 1.0)),
+}
+"""Functions that are not defined for all numbers, and where not: below or above which arguments."""
 
 
-def on_one_side(node: Node, moving: Collection[str], corners: Corners) -> Node:
-    """The tree with a side in place of each decision by what moves; ``moving`` are names of inputs and sensors."""
+def on_one_side(node: Node, moving: Collection[str], corners: Corners, taken: Node | None = None) -> Node:
+    """The tree with a side in place of each decision by what moves.
+
+    Parameters
+    ----------
+    node : Node
+        Tree of a law.
+    moving : collection of str
+        Names of inputs and sensors.
+    corners : callable
+        Where the side of each corner is found.
+    taken : Node, optional
+        Condition under which the law as written takes this part of it; without it, always.
+    """
     if not _moves(node, moving):
         return node
     if node.kind in _TRUTHS:
@@ -32,11 +59,14 @@ def on_one_side(node: Node, moving: Collection[str], corners: Corners) -> Node:
         return node
     if node.kind == "where":
         condition, a, b = node.args
-        a, b = on_one_side(a, moving, corners), on_one_side(b, moving, corners)
         if not _moves(condition, moving):
+            a, b = on_one_side(a, moving, corners, taken), on_one_side(b, moving, corners, taken)
             return _made(node, "where", condition, a, b)
-        return _made(node, BETWEEN_SIDES, _truth(condition, moving, corners), a, b)
-    args = tuple(on_one_side(arg, moving, corners) for arg in node.args)
+        yes, no = _both(taken, condition), _both(taken, _made(condition, "not", condition))
+        a, b = on_one_side(a, moving, corners, yes), on_one_side(b, moving, corners, no)
+        branches = _without_poles(a, b, no, moving), _without_poles(b, a, yes, moving)
+        return _made(node, BETWEEN_SIDES, _truth(condition, moving, corners), *branches)
+    args = tuple(on_one_side(arg, moving, corners, taken) for arg in node.args)
     if node.kind in ("abs", "sign") and _moves(node.args[0], moving):
         if _of_sides_alone(args, moving):
             return _affine(_made(node, node.kind, *args))
@@ -56,7 +86,53 @@ def on_one_side(node: Node, moving: Collection[str], corners: Corners) -> Node:
         return out
     if node.kind == "table" and _moves(node.args[0], moving):
         corners(Node("table", args, node.value, node.start, node.stop))  # continuous: it only has to be watched
-    return Node(node.kind, args, node.value, node.start, node.stop)
+    return _in_domain(Node(node.kind, args, node.value, node.start, node.stop), node, moving, taken)
+
+
+def _in_domain(node: Node, written: Node, moving: Collection[str], taken: Node | None) -> Node:
+    """A function that keeps its value at the boundary of its domain where only a branch continued has left that.
+
+    ``written`` is the function in the law as written. Where that is evaluated, and outside its domain, it is nan.
+    """
+    bounds = DOMAINS.get(node.kind, ())
+    if not bounds or not _moves(node.args[0], moving) or (node.kind == "**" and whole(node.args[1])):
+        return node
+    x, *others = node.args
+    sided = any(n.kind == SIDE for n in x.walk())
+    out = node
+    for order, limit in bounds if sided or taken else ():
+        bound = _made(node, "number", value=limit)
+        outside = [_made(node, "<", *pair) for pair in ((x, bound), (written.args[0], bound))]
+        if order == ">":
+            outside = [replace(n, args=n.args[::-1]) for n in outside]
+        wrong = _both(taken, outside[1])
+        continued = _both(outside[0], _made(node, "not", wrong))
+        out = _made(node, "where", continued, _made(node, node.kind, bound, *others), out)
+    return out
+
+
+def _without_poles(branch: Node, other: Node, elsewhere: Node, moving: Collection[str]) -> Node:
+    """A branch that is the other one where a divisor in it is zero and the law as written takes the other one.
+
+    A step may end right on the corner of ``where(x > 0, sin(x)/x, 1)``.
+    """
+    out = branch
+    for n in branch.walk():
+        inverse = n.kind == "**" and whole(n.args[1]) and n.args[1].value < 0
+        if (n.kind == "/" or inverse) and _moves(x := n.args[n.kind == "/"], moving):
+            zero = _made(n, "number", value=0.0)
+            nothing = _both(_made(n, "<=", x, zero), _made(n, "<=", zero, x))
+            out = _made(n, "where", _both(elsewhere, nothing), other, out)
+    return out
+
+
+def whole(node: Node) -> bool:
+    """Whether an exponent is a small whole number, written out."""
+    return node.kind == "number" and node.value == int(node.value) and abs(node.value) <= LARGEST_WHOLE_POWER
+
+
+def _both(a: Node | None, b: Node) -> Node:
+    return b if a is None else _made(b, "and", a, b)
 
 
 def difference(a: Node, b: Node) -> Node:
@@ -144,5 +220,5 @@ def _moves(node: Node, moving: Collection[str]) -> bool:
     return any(n.kind == SIDE or (n.kind == "name" and n.value in moving) for n in node.walk())
 
 
-def _made(like: Node, kind: str, *args: Node) -> Node:
-    return Node(kind, args, None, like.start, like.stop)
+def _made(like: Node, kind: str, *args: Node, value: float | None = None) -> Node:
+    return Node(kind, args, value, like.start, like.stop)

@@ -236,10 +236,16 @@ def attempt(callbacks, S, K, c, h):
             K.count[FRESH] = -1
     tolerances(c, K)
     if K.count[FRESH] < 0:
-        for i in range(K.v.shape[1]):
-            K.d[START, i] = 0.0
-            K.a[START, i] = K.past[TRUE, i]
-        status = renewed(callbacks, S, K, c, c.real[T], START)
+        if K.count[BEFORE] == 0:  # the slopes of laws at a corner are those of no other place: see `radau`
+            place(K, h)
+            predict(K, h)
+            ends(callbacks, S, K, h)
+            status = renewed(callbacks, S, K, c, c.real[T] + h, END)
+        else:
+            for i in range(K.v.shape[1]):
+                K.d[START, i] = 0.0
+                K.a[START, i] = K.past[TRUE, i]
+            status = renewed(callbacks, S, K, c, c.real[T], START)
         if status != 0:
             return status, 0.0, 1.0
         K.count[FRESH] = 1

@@ -79,22 +79,41 @@ def rest(K, c):
 
 
 @formula
+def differentiate(linearise, S, K, c, h):
+    """The numbers of the Jacobian, in row START. Returns a status.
+
+    It is that of where the step begins. In the first step of a stretch it is that of where the step is expected to
+    end: a stretch may begin at the corner of a law, where its slope may be infinite (sqrt(x) at 0), and with that
+    Newton's corrections, and the estimated error, would be next to nothing whatever the equations miss.
+    """
+    if K.count[BEFORE] == 1:
+        return linearise(c.real[T], START, S, K, c)
+    last = K.d.shape[0] - 2
+    for i in range(K.v.shape[1]):
+        K.a[last, i] = K.a[START, i]
+    status = linearise(c.real[T] + h, last, S, K, c)
+    for e in range(K.J.shape[1]):
+        K.J[START, e] = K.J[last, e]
+    return status
+
+
+@formula
 def attempt(callbacks, S, K, c, h):
     """One step of width h into c.y[NEW]. Returns (status, error, factor that a failed iteration asks for)."""
     residual, linearise, compose, arrive = callbacks[:4]
     begin(c, K)
+    rest(K, c)
+    predict(K, h)
     if c.real[GROW] <= 1.0 and K.count[FRESH] == 0 and (c.count[TROUBLE] != 0 or K.real[THETA] > K.real[SERVES]):
         K.count[FRESH] = -1
     if K.count[FRESH] < 1 and not (K.count[FRESH] == 0 and K.real[WIDTH] > 0.0):
-        rest(K, c)
-        if linearise(c.real[T], START, S, K, c) != 0:
+        if differentiate(linearise, S, K, c, h) != 0:
             return SINGULAR, 0.0, 0.5
         K.count[JACOBIANS] += 1
         K.count[FRESH] = 1
         K.real[WIDTH] = 0.0
     if K.real[WIDTH] != h and factor(K, h) != 0:
         return SINGULAR, 0.0, 0.5
-    predict(K, h)
     status, asked = iterate(residual, S, K, c, h)
     if status != 0:
         if K.count[FRESH] == 1:

@@ -44,11 +44,11 @@ def begin(c, K):
 
 @formula
 def predict(K, h):
-    """Start values of the stages: velocities and multipliers go on as in the step before."""
+    """Start values of the stages: all goes on as in the step before, or by its rate where a stretch begins."""
     nv = K.v.shape[1]
     for i in range(nv):
         for k in range(STAGES):
-            K.v[k, i] = K.v[START, i]
+            K.v[k, i] = K.v[START, i] + C[k] * h * K.a[START, i]
         if K.count[BEFORE] == 1:
             b1, b2, b3 = coefficients(K.before_v, i, K.before_v[START, i])
             for k in range(STAGES):
@@ -69,7 +69,7 @@ def predict(K, h):
             K.rate[k, i] = K.rate[START, i]
     for i in range(K.tol_x.shape[0]):
         for k in range(STAGES):
-            K.z[k, i] = K.z[START, i]
+            K.z[k, i] = K.z[START, i] + C[k] * h * K.rate[START, i]
         if K.count[BEFORE] == 1:
             b1, b2, b3 = coefficients(K.before_x, i, K.before_x[START, i])
             for k in range(STAGES):

@@ -1,0 +1,67 @@
+"""Laws that clamp what they are a function of, to stay in its domain: a branch is not continued beyond that.
+
+The positions expected are SciPy's, DOP853 at rtol = 1e-12, atol = 1e-14 and steps of at most 1 ms.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+import flyball as fb
+
+FROM_A_TENTH = {
+    "-100*abs(value)**1.5*sign(value)": 0.05892637804776968,
+    "-3*rate*abs(rate)**0.75 - 100*value": -0.03622296649304908,
+    "-rate*exp(-abs(rate)**0.5) - 100*value": -0.0690405633038552,
+    "-100*sqrt(max(value, 0)) + 50*sqrt(max(-value, 0))": -0.08700245339890823,
+    "where(value > 0, -100*sqrt(value), 50*sqrt(-value))": -0.08700245339890823,
+    "-100*asin(min(max(30*value, -1), 1))": 0.09470607463496632,
+    "-10*sign(value)*sqrt(abs(value)) - rate": 0.0566452516335034,
+}
+
+
+def end(law: str, gravity: float = 0.0, **options: object) -> float:
+    """Where a mass of 1 kg is after 1 s, from rest at 0.1 m."""
+    m = fb.Mechanism(planar=True, gravity=(-gravity, 0))
+    m.add(fb.Body("b", mass=1, inertia=1, position=(0.1, 0)))
+    m.add(fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0), displacement=0.1))
+    m.add(fb.Actuator("k", "x.displacement", force=law))
+    return float(m.simulate(1, **options)["x.displacement"][-1])
+
+
+@pytest.mark.parametrize("law", FROM_A_TENTH)
+def test_motion_through_an_end_of_a_domain(law):
+    for coordinates in ("joint", "absolute"):
+        assert end(law, rtol=1e-9, coordinates=coordinates) == pytest.approx(FROM_A_TENTH[law], abs=1e-8)
+    assert end(law, rtol=1e-9, method="rk45") == pytest.approx(FROM_A_TENTH[law], abs=1e-8)
+    assert end(law, method="dop853", step=1e-3) == pytest.approx(FROM_A_TENTH[law], abs=2e-4)
+
+
+@pytest.mark.parametrize("law", FROM_A_TENTH)
+def test_implicit_step_from_an_infinite_slope(law):
+    """With the slope at the corner Newton's corrections, and the estimated error, were nothing: no force acted."""
+    assert end(law, rtol=1e-9, method="radau") == pytest.approx(FROM_A_TENTH[law], abs=1e-6)
+
+
+def test_an_implicit_method_of_fixed_steps_begins_anew_beyond_the_corner():
+    for law in ("-100*sqrt(max(value, 0)) + 50*sqrt(max(-value, 0))", "-10*sign(value)*sqrt(abs(value)) - rate"):
+        assert end(law, method="generalised-alpha", step=1e-3) == pytest.approx(FROM_A_TENTH[law], abs=1e-3)
+
+
+@pytest.mark.parametrize("method", ["auto", "rk45", "radau"])
+def test_hertzian_contact_written_as_a_law(method):
+    x = end("1e5*max(-value, 0)**1.5", gravity=9.81, rtol=1e-9, method=method)
+    assert x == pytest.approx(0.0873828584, abs=1e-7)
+
+
+def test_a_law_that_leaves_its_domain_as_written_is_refused():
+    for law in ("sqrt(value) - 1", "where(value > -0.05, -10 - sqrt(value), 0)"):
+        with pytest.raises(fb.SimulationError, match="Actuator 'k'"):
+            end(law, gravity=9.81)
+
+
+def test_a_branch_with_a_pole_at_its_corner():
+    """sin(x)/x where a step ends right on x = 0: the value of the law as written."""
+    law = "-100*value*where(value > 0, sin(value)/value, 1)"
+    smooth = end("-100*where(value > 0, sin(value), value)", rtol=1e-10)
+    assert end(law, rtol=1e-10) == pytest.approx(smooth, abs=1e-8)
