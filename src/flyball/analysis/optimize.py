@@ -227,7 +227,7 @@ class Search:
             first = float(function(begin))
         except (TypeError, ValueError) as error:
             raise ModelError(
-                f"minimize: {function!r} must make one number of the array {begin.shape} of the quantities at the times; "
+                f"minimize: {function!r} must make one number of an array {begin.shape}, quantities at times; "
                 f"{type(error).__name__}: {error}"
             ) from error
 
