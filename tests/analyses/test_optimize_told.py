@@ -1,5 +1,6 @@
 """What a search says at its end: in our words, and a zero slope is not called found."""
 
+import numpy as np
 import pytest
 
 import flyball as fb
@@ -40,3 +41,30 @@ def test_an_interrupt_keeps_the_best(how):
     assert not best.success
     assert best.cost < best.start_cost
     assert best.values[0, 0] == pytest.approx(-9.81 / best.parameters["k"], rel=1e-9)
+
+
+def slider_crank():
+    """A driven crank of 0.1 m and a rod of b: shorter than 0.1 m it locks before the crank is upright."""
+    m = fb.Mechanism("press", planar=True, parameters={"b": 0.3})
+    m.add(fb.Body("crank", mass=1, inertia=1), fb.Body("rod", mass=1, inertia=1, position=(0.1, 0)))
+    m.add(fb.Body("s", mass=1, inertia=1, position=("0.1+b", 0)), fb.Frame("e", "rod", position=("b", 0)))
+    m.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Revolute("B", "crank", "rod", at=(0.1, 0)))
+    m.add(fb.Revolute("C", "e", "s"), fb.Prismatic("G", "ground", "s", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Driver("mo", "A.angle", "2*t"))
+    return m
+
+
+def test_a_search_steps_back_where_the_mechanism_locks():
+    """The slider as near as it goes: a rod of 0.1 m, as long as the crank."""
+    motion = {"analysis": "motion", "t_end": 1, "outputs": 5}
+    found = slider_crank().optimize(["s.x"], ["b"], target=np.full((5, 1), 0.02), evaluations=15, **motion)
+    assert 0.1 < found.parameters["b"] < 0.11
+    assert found.cost < 0.2 * found.start_cost
+    assert "could not be computed and the search stepped back; the last with b = 0.0" in found.message
+    short = slider_crank().changed({})
+    short.parameters["b"] = 0.09
+    with pytest.raises(fb.SimulationError, match=r"with b = 0\.09: .* stop at t = 0\.5\d* s"):
+        short.optimize(["s.x"], ["b"], target=np.full((5, 1), 0.02), **motion)
+    with pytest.raises(fb.SimulationError, match=r"stop at t = 0\.5\d* s") as error:
+        short.sensitivity(["s.x"], ["b"], analysis="motion", t_end=1)
+    assert error.value.t == pytest.approx(0.5 * np.arcsin(0.9), abs=1e-3)

@@ -62,6 +62,7 @@ def test_a_full_disk_is_said_and_leaves_what_was_there(tmp_path):
     """No room for more than 64 bytes in a file: HDF5 ended the process by a segmentation fault, pages were left half."""
     for ending, write in writers(pendulum()):
         path = tmp_path / f"x{ending}"
+        write(path)  # all modules are imported by then: Python would leave half of their compiled files
         path.write_text("what was there before")
         limits = resource.getrlimit(resource.RLIMIT_FSIZE)
         resource.setrlimit(resource.RLIMIT_FSIZE, (64, limits[1]))

@@ -46,6 +46,7 @@ def test_means_are_over_time_however_output_times_are_spread():
     np.testing.assert_allclose(s["mean(b.vx)"], a / 2, rtol=1e-9)  # exact: it is linear; alike they gave 0.27 a
     np.testing.assert_allclose(s["mean(b.x)"], a * np.trapezoid(t**2 / 2, t), rtol=1e-8)
     np.testing.assert_allclose(s["rms(b.vx)"], a * np.sqrt(np.trapezoid(t**2, t)), rtol=1e-8)
+    assert dict(s.lines())["mean, rms"] == "over time by the trapezoidal rule between the output times"
 
 
 def test_functions_of_results():

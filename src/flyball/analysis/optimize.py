@@ -13,7 +13,7 @@ from ..model.expressions import number
 from ..model.model import Model, listing, suggest
 from ..results.optimum import Optimum
 from .options import count as at_least
-from .options import positive
+from .options import names, positive
 from .progress import Tell, shown
 from .sensitivity import DerivativeOptions, SensitivityOptions, sensitivity
 from .untouched import refuse_contact
@@ -39,8 +39,19 @@ class OptimizeOptions(DerivativeOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.to, str) or not self.to:
+        if not isinstance(self.to, Mapping):
+            object.__setattr__(self, "to", names(self.to, "to"))
+        if not self.to:
             raise ModelError("to names the parameters, for instance to=['crank'] or to={'crank': (0.1, '30 cm')}")
+        for name, bounds in self.to.items() if isinstance(self.to, Mapping) else ():
+            if isinstance(bounds, str) or not isinstance(bounds, Sequence) or len(bounds) != 2:
+                raise ModelError(
+                    f"bounds of {name!r} are two numbers or None, for instance (0.1, None), not {bounds!r}"
+                )
+        weights = _floats(self.weights, "weights")
+        if not np.isfinite(weights).all():
+            raise ModelError(f"weights are finite numbers, not {self.weights!r}")
+        object.__setattr__(self, "weights", weights)
         if (self.target is None) == (self.minimize is None):
             raise ModelError("give either a target or a function to minimize")
         if self.minimize is not None and not (np.ndim(self.weights) == 0 and self.weights == 1.0):
@@ -212,7 +223,13 @@ class Search:
 
         x0 = self.start / self.scale
         begin = self.at(x0).values
-        first = float(function(begin))
+        try:
+            first = float(function(begin))
+        except (TypeError, ValueError) as error:
+            raise ModelError(
+                f"minimize: {function!r} must make one number of an array {begin.shape}, quantities at times; "
+                f"{type(error).__name__}: {error}"
+            ) from error
 
         def cost(x: np.ndarray) -> tuple[float, np.ndarray]:
             try:
@@ -261,10 +278,9 @@ def _goal(target: Any, values: np.ndarray, of: Sequence[str], analysis: str) -> 
         If it does not fit them.
     """
     parts = [number(x, {}, None, "target") if isinstance(x, str) else x for x in np.asarray(target, object).ravel()]
-    try:
-        goal = np.array(parts, complex if analysis == "modes" else float)
-    except (TypeError, ValueError):
-        raise ModelError(f"target: {target!r} are no numbers") from None
+    goal = _floats(parts, "target", complex if analysis == "modes" else float)
+    if not np.isfinite(goal).all():
+        raise ModelError(f"target: finite numbers are wanted, not {target!r}")
     if analysis == "modes":
         order = np.lexsort((values[0].real, values[0].imag))
         if len(goal) < values.shape[1]:
@@ -280,6 +296,20 @@ def _goal(target: Any, values: np.ndarray, of: Sequence[str], analysis: str) -> 
         f"the target has the shape {np.shape(target)}, which does not fit {', '.join(of)}{times}; give one number for "
         f"each quantity{', a row for each time (outputs=)' if times else ''}"
     )
+
+
+def _floats(values: Any, name: str, kind: type = float) -> np.ndarray:
+    """An array of numbers.
+
+    Raises
+    ------
+    ModelError
+        If it is none.
+    """
+    try:
+        return np.array(values, kind)
+    except (TypeError, ValueError, OverflowError):
+        raise ModelError(f"{name}: {values!r} are no numbers") from None
 
 
 def _slope(function: Callable[[np.ndarray], float], values: np.ndarray) -> np.ndarray:

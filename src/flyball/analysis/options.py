@@ -6,6 +6,7 @@ the method alone (`flyball.methods`); ``tests/program/test_options.py`` holds th
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, fields
 from numbers import Number
@@ -16,6 +17,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.expressions import number
 
+LARGEST = np.iinfo(np.int64).max  # whole number that compiled code counts to
 TIMES = ("t", "t_start", "t_end")
 _LISTS = (list, tuple, np.ndarray)
 
@@ -119,7 +121,7 @@ def _function(value: Any, name: str) -> Any:
 
 
 def _mapping(value: Any, name: str) -> Any:
-    if not isinstance(value, Mapping):
+    if not isinstance(value, Mapping) or not all(isinstance(k, str) for k in value):
         raise ModelError(f"{name} maps names to what is given for each, not {value!r}")
     return value
 
@@ -198,7 +200,7 @@ def numbers(value: Any, name: str) -> np.ndarray:
     """
     try:
         found = np.array(np.nan) if np.iscomplexobj(value) else np.array(value, float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         found = np.array(np.nan)
     if found.ndim != 1 or not np.isfinite(found).all():
         raise ModelError(f"{name} are finite numbers, for instance {name}=[1.0, 2.0], not {value!r}")
@@ -217,6 +219,7 @@ def positive(value: Any, name: str) -> None:
         return
     if isinstance(value, bool) or not isinstance(value, Number) or isinstance(value, complex) or not value > 0:  # type: ignore[operator]
         raise ModelError(f"{name} must be greater than 0, got {value!r}")
+    number(value, {}, None, name)  # not too large
 
 
 def count(value: Any, name: str, least: int = 1) -> None:
@@ -227,7 +230,12 @@ def count(value: Any, name: str, least: int = 1) -> None:
     ModelError
         If it is none.
     """
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
+    try:
+        whole = operator.index(value)
+    except TypeError:
+        whole = None
+    if isinstance(value, bool) or whole is None:
         raise ModelError(f"{name} must be a whole number, not {value!r}")
-    if value < least:
-        raise ModelError(f"{name} must be at least {least}, got {value!r}")
+    if not least <= whole <= LARGEST:
+        bound = f"at least {least}" if whole < least else f"at most {LARGEST}"
+        raise ModelError(f"{name} must be {bound}, got {value!r}")

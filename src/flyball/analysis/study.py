@@ -71,9 +71,9 @@ class StudyOptions(SimulateOptions):
         super().__post_init__()
         if not self.vary:
             raise ModelError("vary names no parameter; for instance vary={'stiffness': [1e3, 1e4]}")
-        if not self.of:
+        if not isinstance(self.of, (Sequence, Mapping)) or not self.of:
             raise ModelError("of names no quantity; for instance of=['max(slider.x)']")
-        if not callable(self.analysis) and self.analysis not in ANALYSES:
+        if not callable(self.analysis) and (not isinstance(self.analysis, str) or self.analysis not in ANALYSES):
             named = [*ANALYSES, "a function of the mechanism and its parameters"]
             raise ModelError(
                 f"unknown analysis {self.analysis!r}{suggest(str(self.analysis), ANALYSES)}; {listing(named)}"
@@ -93,6 +93,10 @@ class StudyOptions(SimulateOptions):
             count(self.threads, "threads")
             if self.executor is not None:
                 raise ModelError("threads does nothing where an executor computes the runs; leave one of them out")
+        if self.about is not None and not isinstance(self.about, str):
+            raise ModelError(f"about is 'equilibrium' or None, not {self.about!r}")
+        if self.file is not None and not isinstance(self.file, (str, PathLike)):
+            raise ModelError(f"file is the path of a file, not {self.file!r}")
         if self.file is not None and not Path(self.file).absolute().parent.is_dir():
             raise ModelError(f"file={os.fspath(self.file)!r}: there is no such folder")
         if self.executor is not None and not isinstance(self.executor, Executor):

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import AnalysisError, FlyballError, ModelError
+from ..errors import AnalysisError, FlyballError
 
 DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
 
@@ -105,7 +105,6 @@ def table(lines: list[tuple[str, str]]) -> None:
 
 def make_folder(folder: Path) -> None:
     """Make a folder, its parents too."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ModelError(f"cannot make the folder {str(folder)!r}: {error.strerror}") from None
+    from ..model.writing import make_folder as make
+
+    make(folder)

@@ -92,6 +92,8 @@ def thawed(state: Mapping[str, Any]) -> dict[str, Any]:
 
 def changed(model: Model, parts: Mapping[str, Element | None]) -> Any:
     """A copy with other parts under these names, or (None) without them."""
+    if not isinstance(parts, Mapping):
+        raise ModelError(f"parts maps names to parts, or to None to leave one out: {{'A': None}}; not {parts!r}")
     out = copied(model)
     for category in CATEGORIES:
         if category != Initial.category:  # these bear the names of what they are about

@@ -341,7 +341,8 @@ def field_with(e: Element, *values: str) -> str:
     """The field that holds one of these texts, for messages: "body_i: "; nothing if there is none."""
     for f in dataclasses.fields(e):
         given = getattr(e, f.name)
-        if f.name != "name" and any(given == v or (isinstance(given, tuple) and v in given) for v in values):
+        texts = given if isinstance(given, tuple) else (given,)
+        if f.name != "name" and any(isinstance(x, str) and x in values for x in texts):
             return f"{f.name}: "
     return ""
 

@@ -8,6 +8,7 @@ call tables by name, and a Python function may stand in place of a law (`model.f
 from __future__ import annotations
 
 import operator
+import sys
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
@@ -236,7 +237,10 @@ def _number(value: Any, env: Mapping[str, Any], dimension: str | None, names: Co
     if isinstance(value, bool | np.bool_):
         raise ModelError(f"{value} is true or false, a number is wanted; write 1 or 0 if you mean that")
     if isinstance(value, Real):
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError:
+            raise ModelError(f"{_short(value)} is too large; the largest number is {sys.float_info.max:.3g}") from None
     if isinstance(value, Complex):
         return complex(value)
     if isinstance(value, Expression):
@@ -249,6 +253,15 @@ def _number(value: Any, env: Mapping[str, Any], dimension: str | None, names: Co
             "or an expression of parameters"
         )
     return _of_text(value, env, dimension, names)
+
+
+def _short(value: Any) -> str:
+    """A number as it is, or its first digits and how many there are."""
+    try:
+        text = str(value)
+    except ValueError:  # Python writes no whole numbers of so many digits
+        return "this whole number"
+    return text if len(text) <= 30 else f"{text[:10]}... ({len(text)} digits)"
 
 
 def _evaluated(x: Expression, env: Mapping[str, Any]) -> Any:

@@ -6,8 +6,10 @@ import difflib
 from collections.abc import Iterable
 
 
-def suggest(name: str, known: Iterable[str]) -> str:
-    """' (did you mean ...?)' where something close is known."""
+def suggest(name: object, known: Iterable[str]) -> str:
+    """' (did you mean ...?)' where something close is known; what is no text is close to nothing."""
+    if not isinstance(name, str):
+        return ""
     names = list(known)
     same = [k for k in names if k.lower() == name.lower() and k != name]
     close = same or difflib.get_close_matches(name, names, 1)

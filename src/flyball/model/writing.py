@@ -25,10 +25,7 @@ def ending(path: str | os.PathLike, known: Sequence[str]) -> str:
     ModelError
         If it is another, or the path is none.
     """
-    try:
-        at = Path(path)
-    except TypeError:
-        raise ModelError(f"the path of a file is a text or a path, not {path!r}") from None
+    at = _path(path)
     found = at.suffix.lower()
     if found in known:
         return found
@@ -37,6 +34,33 @@ def ending(path: str | os.PathLike, known: Sequence[str]) -> str:
     said = f"the ending {found!r} is not known here" if found else "its name has no ending"
     other = next((f"; {how} writes {found}" for kinds, how in ELSEWHERE.items() if found in kinds), "")
     raise ModelError(f"cannot write {os.fspath(path)!r}: {said}; it must be {' or '.join(known)}{other}")
+
+
+def _path(path: str | os.PathLike) -> Path:
+    """A path that files can have."""
+    try:
+        os.fsencode(path)
+        if "\0" in os.fspath(path):
+            raise ValueError
+        return Path(path)
+    except (TypeError, ValueError):
+        raise ModelError(f"the path of a file is a text or a path, not {path!r}") from None
+
+
+def make_folder(path: str | os.PathLike) -> Path:
+    """A folder, made with its parents where it is not there.
+
+    Raises
+    ------
+    ModelError
+        If that cannot be done.
+    """
+    folder = _path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ModelError(f"cannot make the folder {str(folder)!r}: {error.strerror}") from None
+    return folder
 
 
 def _device(path: Path) -> bool:
@@ -57,7 +81,7 @@ def replacing(path: str | os.PathLike, known: Sequence[str] = ()) -> Iterator[Bi
     """
     if known:
         ending(path, known)
-    place = Path(path).resolve()
+    place = _path(path).resolve()
     try:
         if _device(place):
             with open(place, "wb") as file:
@@ -73,7 +97,7 @@ def replacing(path: str | os.PathLike, known: Sequence[str] = ()) -> Iterator[Bi
         finally:
             part.unlink(missing_ok=True)
     except OSError as error:
-        raise cannot_write(Path(path), error) from None
+        raise cannot_write(path, error) from None
 
 
 def write(path: str | os.PathLike, data: str | bytes | memoryview, known: Sequence[str] = ()) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import NamedTuple
 
 from ...errors import ModelError
@@ -74,18 +75,20 @@ class SimulateOptions(Integration):
             return
         if self.method != ALPHA:
             raise ModelError(f"rho_inf is a number of method={ALPHA!r}; with method={self.method!r} it does nothing")
-        if isinstance(self.rho_inf, bool) or not 0.0 <= self.rho_inf <= 1.0:
+        if isinstance(self.rho_inf, bool) or not isinstance(self.rho_inf, Real) or not 0.0 <= self.rho_inf <= 1.0:
             raise ModelError(f"rho_inf is a number from 0 (swings too fast for a step go at once) to 1 (no swing is "
                              f"damped), got {self.rho_inf!r}")  # fmt: skip
 
     def check_method(self) -> None:
         """An integrator, steps by impulses, or what suits the model."""
-        if isinstance(self.method, Stepping) or self.method in (AUTO, IMPULSE, *IMPLICIT):
+        if isinstance(self.method, Stepping):
+            return
+        if isinstance(self.method, str) and self.method in (AUTO, IMPULSE, *IMPLICIT):
             return
         known = [*sorted(TABLEAUX), *IMPLICIT, IMPULSE, AUTO]
         meant = CALLED.get(str(self.method).lower())
-        if self.method not in TABLEAUX:
-            hint = f" (did you mean {meant!r}?)" if meant else suggest(str(self.method), known)
+        if not isinstance(self.method, str) or self.method not in TABLEAUX:
+            hint = f" (did you mean {meant!r}?)" if meant else suggest(self.method, known)
             raise ModelError(
                 f"unknown method {self.method!r}{hint}; choose one of {', '.join(known)}, or a Stepping, for contact"
             )

@@ -50,7 +50,7 @@ def check_specialize(value: Any) -> None:
     ModelError
         If it is none of True, False and ``"auto"``.
     """
-    if not isinstance(value, bool) and value != AUTO:
+    if not isinstance(value, (bool, str)) or value not in (True, False, AUTO):
         raise ModelError(f"specialize is True, False or {AUTO!r}, not {value!r}")
 
 

@@ -40,7 +40,7 @@ def readings(
             if not isinstance(title, str) or not callable(function):
                 raise ModelError(f"of maps names to functions of a run's answer, not {title!r} to {function!r}")
         return tuple(Reading(title, FUNCTION, title, "", function) for title, function in of.items())
-    if isinstance(of, str) or not isinstance(of, (Sequence, np.ndarray)):
+    if isinstance(of, (str, bytes)) or not isinstance(of, Sequence) or not all(isinstance(x, str) for x in of):
         raise ModelError(f"of is a list of names, for instance of=['max(slider.x)'], not {of!r}")
     if len(set(of)) < len(of):
         raise ModelError(f"of names something twice: {', '.join(map(str, of))}")

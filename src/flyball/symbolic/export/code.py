@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from ...graph.printers.python import python_functions, python_module, told_const
 from ...graph.printers.routine import Routine
 from ...graph.printers.tables import opaque
 from ...model.words import suggest
-from ...model.writing import write
+from ...model.writing import make_folder, write
 from .functions import Functions
 from .words import constants, head
 
@@ -91,15 +92,16 @@ class Code:
 
     def written(self, folder: str | Path) -> Code:
         """Write the files to a folder, which is made where it is not there; the same code, which names them."""
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = make_folder(folder)
         for name, text in self.texts.items():
             write(folder / name, text)
         written = [folder / name for name in self.texts]
         if self.language == "casadi":
             for name, f in self.functions.items():
                 written.append(folder / f"{self.name}_{name}.casadi")
-                f.save(str(written[-1]))
+                with TemporaryDirectory() as aside:  # CasADi writes files by itself
+                    f.save(str(Path(aside) / name))
+                    write(written[-1], (Path(aside) / name).read_bytes())
         return replace(self, files=tuple(written))
 
     def lines(self) -> list[tuple[str, str]]:
