@@ -135,6 +135,25 @@ def test_a_damper_of_any_strength_slows_down_and_never_throws_back(coordinates, 
         assert s.twist("cart")[0][0] == pytest.approx(wanted, rel=1e-7, abs=1e-9)
 
 
+@pytest.mark.parametrize("z", [2.0, 100.0])
+@pytest.mark.parametrize("coordinates", LAYERS)
+def test_a_damper_between_two_carts_keeps_their_momentum(coordinates, z):
+    """By the same rule with the reduced mass, 1.2 kg of 2 kg and 3 kg: their speeds tend to the mean one."""
+    h, masses, reduced = 0.01, (2.0, 3.0), 1.2
+    m = fb.Mechanism("carts", planar=True, gravity=(0, 0))
+    for name, mass, x, v in zip("ab", masses, (0.0, 1.0), (1.0, -1.0), strict=True):
+        m.add(fb.Body(name, mass=mass, inertia=1.0, position=(x, 0), velocity=(v, 0)))
+        m.add(fb.Prismatic(name.upper(), "ground", name, at=(x, 0), axis=(1, 0)))
+    m.add(fb.SpringDamper("d", "a", "b", at=((0, 0), (1, 0)), damping=z * reduced / h))
+    s = Stepped(m, h, coordinates)
+    b = (z / 4) ** 2 / (1 + (z / 4) ** 2)
+    s.step(2)
+    apart = 2.0 * ((1 - (1 - b) * z / 2) / (1 + (1 + b) * z / 2)) ** 2
+    mean = (2.0 - 3.0) / 5.0
+    speeds = [s.twist(name)[0][0] for name in "ab"]
+    assert speeds == pytest.approx([mean + 0.6 * apart, mean - 0.4 * apart], abs=1e-8)
+
+
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
 def test_a_pendulum_on_a_stiff_spring_keeps_its_length_and_energy(ratio):
     """The spring is as long as its force says, 3 m g / k at most: no energy of a curved way is in it."""
