@@ -126,13 +126,14 @@ def test_diagonal_blocks_by_definition(kind):
             np.testing.assert_allclose(diagonal_turning(P, c), block[3:, 3:][upper], atol=1e-13)
 
 
-@pytest.mark.parametrize("kind", ["nodes", "smooth", "soft", "groups and lines"])
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", ["nodes", "smooth", "soft", "groups and lines", "lines"])
 @pytest.mark.parametrize("coulomb", [0, 1])
-def test_residuals_by_definition(kind, coulomb):
+def test_residuals_by_definition(kind, coulomb, seed):
     """The largest |p - P(p - s u)| / s, s = 3 / trace of the diagonal block, u_n with mu |u_t| by Coulomb's law."""
-    P, X, _, O, _ = random_problem(5, **KINDS[kind])
+    P, X, _, O, _ = random_problem(seed, **(KINDS | {"lines": {"nc": 0, "ng": 2, "nl": 3}})[kind])
     _, DK, N, b = dense(P, X)
-    rng, nc = np.random.default_rng(1), P.size[0]
+    rng, nc = np.random.default_rng(seed), P.size[0]
     X.p[:], X.line[:] = rng.standard_normal(X.p.shape) + (1, 0, 0), rng.standard_normal(X.line.shape)
     p = impulses(P, X)
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
@@ -175,7 +176,7 @@ def test_the_nearest_point_with_rolling_and_spinning_friction(bounds):
         most = rest[0] + mu * (circle @ rest[1:3]).max() + rho * (circle @ rest[4:]).max() + sigma * abs(rest[3])
         assert most <= 1e-12
         inside += y[0] > 0.0
-    assert 20 < inside
+    assert inside > 20
 
 
 @pytest.mark.parametrize("name", SOLVERS)
