@@ -9,6 +9,7 @@ from scipy.optimize import nnls
 
 from flyball.numerics.cone.apgd import apgd
 from flyball.numerics.cone.barzilai_borwein import barzilai_borwein
+from flyball.numerics.cone.diagonal import diagonal, diagonal_turning
 from flyball.numerics.cone.gauss_seidel import gauss_seidel
 from flyball.numerics.cone.jacobi import jacobi
 from flyball.numerics.cone.lean import lean
@@ -23,6 +24,8 @@ from flyball.numerics.cone.problem import (
     MOST,
     RESIDUAL,
 )
+from flyball.numerics.cone.projection import projected_turning
+from flyball.numerics.cone.residual import residuals
 from flyball.numerics.cone.rooms import rooms
 from flyball.numerics.cone.solve import solve
 from tests.cone.problems import KINDS, cone_lack, dense, impulses, random_problem
@@ -107,6 +110,73 @@ def test_a_cut_solve_makes_no_energy(kind, name):
         solve(SOLVERS[name], P, X, W, O, F)
         p = impulses(P, X)
         assert 0.5 * p @ N @ p + b @ p < 1e-10
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_diagonal_blocks_by_definition(kind):
+    """What a contact's own impulses and torques change its own velocities by, as six numbers each, without compliance."""
+    P, X, *_ = random_problem(8, **KINDS[kind])
+    D, DK, *_ = dense(P, X)
+    r = 6 if len(P.turn) else 3
+    upper = np.triu_indices(3)
+    for c in range(P.size[0]):
+        block = (D @ DK.T)[c * r : c * r + r, c * r : c * r + r]
+        np.testing.assert_allclose(diagonal(P, c), block[:3, :3][upper], atol=1e-13)
+        if r == 6:
+            np.testing.assert_allclose(diagonal_turning(P, c), block[3:, 3:][upper], atol=1e-13)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", ["nodes", "smooth", "soft", "groups and lines", "lines"])
+@pytest.mark.parametrize("coulomb", [0, 1])
+def test_residuals_by_definition(kind, coulomb, seed):
+    """The largest |p - P(p - s u)| / s, s = 3 / trace of the diagonal block, u_n with mu |u_t| by Coulomb's law."""
+    P, X, _, O, _ = random_problem(seed, **(KINDS | {"lines": {"nc": 0, "ng": 2, "nl": 3}})[kind])
+    _, DK, N, b = dense(P, X)
+    rng, nc = np.random.default_rng(seed), P.size[0]
+    X.p[:], X.line[:] = rng.standard_normal(X.p.shape) + (1, 0, 0), rng.standard_normal(X.line.shape)
+    p = impulses(P, X)
+    free = np.concatenate([X.v[:, :6].ravel(), X.wide])
+    (v, wide), w = (X.v.copy(), X.wide.copy()), free + DK.T @ p
+    v[:, :6], wide[:] = w[: v[:, :6].size].reshape(-1, 6), w[v[:, :6].size :]
+    O.count[COULOMB] = coulomb
+    found = residuals(P, X, O, (v, wide, X.v, X.wide))
+    u, lack, rates = N @ p + b, [], []
+    for c in range(nc):
+        k = slice(3 * c, 3 * c + 3)
+        size, mu = 3 / np.trace(N[k, k]), P.mu[c]
+        y = p[k] - size * (u[k] + (coulomb * mu * np.linalg.norm(u[k][1:]), 0, 0))
+        t = np.linalg.norm(y[1:])
+        edge = np.array([1, *(mu * y[1:] / t)])
+        near = y if t <= mu * y[0] else max(0.0, edge @ y) / (edge @ edge) * edge
+        lack.append(np.linalg.norm(near - p[k]))
+        rates.append(lack[-1] / size)
+    for k, line in enumerate(P.line_x, 3 * nc):
+        size = 1 / N[k, k]
+        lack.append(abs(np.clip(p[k] - size * u[k], *line[2:4]) - p[k]))
+        rates.append(lack[-1] / size)
+    largest = max([*np.linalg.norm(X.p, axis=1), *np.abs(X.line)])
+    np.testing.assert_allclose(found, [max(rates), max(lack) / largest, b @ p, p @ N @ p], rtol=1e-12)
+
+
+@pytest.mark.parametrize("bounds", [(0.5, 0.2, 0.05), (0.3, 0.02, 0.4), (1.5, 0.7, 0.7)])
+def test_the_nearest_point_with_rolling_and_spinning_friction(bounds):
+    """What is left is square on it, and has a positive part along no ray of the cone (Moreau's decomposition)."""
+    mu, rho, sigma = bounds
+    rng = np.random.default_rng(2)
+    a = np.linspace(0.0, 2 * np.pi, 60, endpoint=False)
+    circle = np.c_[np.cos(a), np.sin(a)]
+    inside = 0
+    for x in rng.standard_normal((200, 6)) * (1, 1, 1, 0.5, 0.5, 0.5) + (0.5, 0, 0, 0, 0, 0):
+        y = np.ravel(projected_turning(mu, rho, sigma, 0.0, tuple(x[:3]), tuple(x[3:])))
+        rest = x - y
+        assert np.linalg.norm(y[1:3]) <= mu * y[0] + 1e-12 and np.linalg.norm(y[4:]) <= rho * y[0] + 1e-12
+        assert abs(y[3]) <= sigma * y[0] + 1e-12
+        assert rest @ y == pytest.approx(0.0, abs=1e-12)
+        most = rest[0] + mu * (circle @ rest[1:3]).max() + rho * (circle @ rest[4:]).max() + sigma * abs(rest[3])
+        assert most <= 1e-12
+        inside += y[0] > 0.0
+    assert inside > 20
 
 
 @pytest.mark.parametrize("name", SOLVERS)

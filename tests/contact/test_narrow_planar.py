@@ -139,3 +139,24 @@ def test_segments_that_cross_and_meet():
     found = contacts(segment(1, 0.1), segment(1, 0.1), (O, I), ((0.5, 0.19, 0), I), 1)
     np.testing.assert_allclose(np.sort(found[:, 0]), [-0.5, 1], atol=1e-9)
     np.testing.assert_allclose(found[:, 6], -0.01, atol=1e-12)
+
+
+@pytest.mark.parametrize("exchange", [False, True])
+@pytest.mark.parametrize("rounding", [0.0, 0.05])
+@pytest.mark.parametrize("case", ["two corners", "the second's corner", "the first's corner"])
+def test_corner_to_corner_and_corner_to_side(case, rounding, exchange):
+    """The point is midway between the surfaces where they are nearest, whichever of the two squares has the corner."""
+    here, tip = (O, I), 1.5 - np.sqrt(0.5)  # of a square that stands on a corner, beside the other one
+    there = ((1.5, 0.1, 0), turn(np.pi / 4))
+    first, second, p, q = {
+        "two corners": (here, ((1.2, 1.3, 0), I), (0.5, 0.5), (0.7, 0.8)),
+        "the second's corner": (here, there, (0.5, 0.1), (tip, 0.1)),
+        "the first's corner": (there, here, (tip, 0.1), (0.5, 0.1)),
+    }[case]
+    way = np.subtract(q, p)
+    far = np.linalg.norm(way)
+    square = rectangle(0.5, 0.5, rounding)
+    (found,) = contacts(square, square, first, second, reach=far - 2 * rounding + 1e-3, exchange=exchange)
+    assert found[:2] == pytest.approx(np.add(p, q) / 2, abs=1e-12)
+    assert found[3:5] == pytest.approx(way / far, abs=1e-12)
+    assert found[6] == pytest.approx(far - 2 * rounding, abs=1e-12)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.stepping.joined import LOST
 from tests.layers import LAYERS
 
 from .stepped import Stepped
@@ -46,17 +47,19 @@ def test_a_double_pendulum_stays_between_its_stops(coordinates):
     assert energy[-1] < 0.9 * abs(energy[0]) + 1.0
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
-def test_a_slide_bounces_off_its_stop(e):
-    """It leaves with e times the speed that it comes with."""
+def test_a_slide_bounces_off_its_stop(e, side):
+    """It leaves with e times the speed that it comes with, and (1 - e^2) m v^2 / 2 is lost."""
     m = fb.Mechanism("slide", planar=True)
-    m.add(fb.Body("block", mass=2.0, inertia=0.1, position=(0, 0), velocity=(1.0, 0.0)))
+    m.add(fb.Body("block", mass=2.0, inertia=0.1, position=(0, 0), velocity=(side, 0.0)))
     m.add(fb.Prismatic("rail", "ground", "block", at=(0, 0), axis=(1, 0)))
     m.add(fb.CoordinateSpring("stop", "rail.displacement"))
-    s = Stepped(m, 0.003, "joint", stops={"stop": (-np.inf, 0.1, e)})
+    s = Stepped(m, 0.003, "joint", stops={"stop": (-np.inf, 0.1, e) if side > 0.0 else (-0.1, np.inf, e)})
     s.step(60)
-    assert s.v[0] == pytest.approx(-e, abs=1e-9)
-    assert s.q[0] <= 0.1 + 1e-9
+    assert s.v[0] == pytest.approx(-side * e, abs=1e-9)
+    assert side * s.q[0] <= 0.1 + 1e-9
+    assert s.A.real[LOST] == pytest.approx(1 - e * e, abs=1e-9)
 
 
 @pytest.mark.parametrize("share", [0.5, 1.5])
@@ -129,7 +132,26 @@ def test_a_damper_of_any_strength_slows_down_and_never_throws_back(coordinates, 
     for n in range(1, 4):
         s.step()
         wanted = ((1 - (1 - b) * z / 2) / (1 + (1 + b) * z / 2)) ** n
-        assert s.twist("cart")[0][0] == pytest.approx(wanted, rel=1e-7)
+        assert s.twist("cart")[0][0] == pytest.approx(wanted, rel=1e-7, abs=1e-9)
+
+
+@pytest.mark.parametrize("z", [2.0, 100.0])
+@pytest.mark.parametrize("coordinates", LAYERS)
+def test_a_damper_between_two_carts_keeps_their_momentum(coordinates, z):
+    """By the same rule with the reduced mass, 1.2 kg of 2 kg and 3 kg: their speeds tend to the mean one."""
+    h, masses, reduced = 0.01, (2.0, 3.0), 1.2
+    m = fb.Mechanism("carts", planar=True, gravity=(0, 0))
+    for name, mass, x, v in zip("ab", masses, (0.0, 1.0), (1.0, -1.0), strict=True):
+        m.add(fb.Body(name, mass=mass, inertia=1.0, position=(x, 0), velocity=(v, 0)))
+        m.add(fb.Prismatic(name.upper(), "ground", name, at=(x, 0), axis=(1, 0)))
+    m.add(fb.SpringDamper("d", "a", "b", at=((0, 0), (1, 0)), damping=z * reduced / h))
+    s = Stepped(m, h, coordinates)
+    b = (z / 4) ** 2 / (1 + (z / 4) ** 2)
+    s.step(2)
+    apart = 2.0 * ((1 - (1 - b) * z / 2) / (1 + (1 + b) * z / 2)) ** 2
+    mean = (2.0 - 3.0) / 5.0
+    speeds = [s.twist(name)[0][0] for name in "ab"]
+    assert speeds == pytest.approx([mean + 0.6 * apart, mean - 0.4 * apart], abs=1e-8)
 
 
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
