@@ -29,6 +29,7 @@ FEW, EACH = (
 FINE = 3e-2  # times the root of rtol, the same where rtol is so small that a digit more or less is no matter
 MOST, ROUGH = 1e-2, 5.0  # part of the energy moved that no number of steps excuses, or so many times a rough rtol
 ROUGHEST = 2e-2  # part of the energy moved that no tolerance excuses
+DISSIPATED = 0.1  # part of what impacts and friction dissipate, beside which a numerical loss changes a motion little
 SLIGHT = 1e-6  # part of the energy present that the rounding of solves may take where hardly anything moves
 PIECES, ROWS = 64, 4  # stretches that the balance is judged by at most, and rows of output in each at least
 NEARLY = 0.99  # part of what is to be expected from which on a motion among many is looked at by itself
@@ -67,7 +68,9 @@ def of_impulses(result: Result) -> tuple[str, ...]:
     own = result.health.contact.doubts if result.health.contact else ()
     present = np.max(np.abs(result.energy.kinetic) + np.abs(result.energy.potential), initial=0.0)
     held = max(float(present), float(whole(result).weight * result.values.length))
-    if not lost > max(MOST * energy_moved(result), SLIGHT * held):
+    losses = result.energy.exchanged("friction_loss") + result.energy.exchanged("impact_loss")
+    dissipated = float(np.max(losses, initial=0.0))
+    if not lost > max(MOST * energy_moved(result), DISSIPATED * dissipated, SLIGHT * held):
         return own
     what = "took" if taken[int(np.argmax(np.abs(taken)))] > 0.0 else "gave"
     text = (
