@@ -306,7 +306,7 @@ def places(x: Values) -> np.ndarray:
     """
     s = x.structure
     z = np.zeros(len(s.states), x.q.dtype)
-    z[: len(s.controls)] = initial(s.model, x.env)
+    z[: len(s.controls)] = initial(s, x.numbers)
     for t in s.terms:
         if t.hint >= 0 and isinstance(t.owner, (Body, Frame)):
             z[t.hint] = x.poses.turned(t.owner)

@@ -53,7 +53,7 @@ NEAR = 1e-9  # of a period: a time that is an instant
 AFTER = 8.0 * 2.0**-52  # of a time: more than an instant is off, by rounding, from the time that it stands for
 ROWS = 64  # of output that are taken at once
 ENGINE, S_, W_, R_, CLOCK, SHEET, PLAN, LOWER = range(8)
-WAIT, AGAIN = range(2)  # entries of Samples.lower
+WAIT, AGAIN, TAKEN, REFUSED = range(4)  # entries of Samples.lower
 SELDOM = 1024  # intervals after which the lower order is tried again, at most
 
 
@@ -65,7 +65,9 @@ class Samples(NamedTuple):
     row: np.ndarray  # (nu, 4): clock, state, law, whether all others come first; in order
     value: np.ndarray  # (nu,): scratch
     end: np.ndarray  # (1,): end of the motion [s], at which nothing is sampled any more
-    lower: np.ndarray  # (2,): intervals until the lower order is tried, 0: it is taken, -1: never; how many if it fails
+    # intervals until the lower order is tried, 0: it is taken, -1: never; how many if it fails; steps taken and refused
+    # when this interval began, which may go on in another call
+    lower: np.ndarray  # (4,)
 
 
 @formula
@@ -162,13 +164,14 @@ def sampled_kernel(address, S, W, R, clock, sheet, P, lower, out):
 def by_engine(A, rows):
     """The engine's own loop, which writes to its sheet; by the lower order where that is as good."""
     clock, lower = A[CLOCK], A[PLAN].lower
-    taken, refused = clock.count[ACCEPTED], clock.count[REJECTED]
+    if clock.count[STARTED] != 1:
+        lower[TAKEN], lower[REFUSED] = clock.count[ACCEPTED], clock.count[REJECTED]
     if lower[WAIT] == 0:
         n = enter(A[ENGINE], A[S_], A[W_], A[LOWER], clock, A[SHEET], INTEGRATE)
     else:
         n = enter(A[ENGINE], A[S_], A[W_], A[R_], clock, A[SHEET], INTEGRATE)
     if clock.count[STATUS] == DONE and lower[WAIT] >= 0:
-        at_once = clock.count[ACCEPTED] == taken + 1 and clock.count[REJECTED] == refused
+        at_once = clock.count[ACCEPTED] == lower[TAKEN] + 1 and clock.count[REJECTED] == lower[REFUSED]
         if lower[WAIT] > 0:
             lower[WAIT] = lower[WAIT] - 1 if at_once else lower[AGAIN]
         elif at_once and clock.real[ERROR] * clock.real[SPAN] <= clock.real[TRIED]:

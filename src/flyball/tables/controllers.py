@@ -6,10 +6,10 @@ stand in the code as negative numbers, from `CONTROLS` downwards.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from ..model.controller import Controller
-from ..model.element import resolve
 from ..model.model import Model
 from ..model.wiring import given, signal, wired
 from .specs import Structure, ints
@@ -54,7 +54,7 @@ def table(s: Structure) -> None:
             s.ordered += [(e, ordered, [s.law(given(s.model, e, name), ()) for name in ordered])]
 
 
-def initial(model: Model, env: Any) -> list[Any]:
-    """What the states begin with, at these values of the parameters."""
-    found = {e.name: {x.name: x.initial for x in e.states(resolve(e, env))} for e in model.controllers}
-    return [found[x.controller.name].get(x.state, 0.0) for x in wired(model)]
+def initial(s: Structure, numbers: Mapping[str, Any]) -> list[Any]:
+    """What the states begin with; ``numbers`` are those of elements, by name."""
+    found = {e.name: {x.name: x.initial for x in e.states(numbers[e.name])} for e in s.model.controllers}
+    return [found[x.controller.name].get(x.state, 0.0) for x in s.controls]

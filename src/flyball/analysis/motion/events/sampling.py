@@ -42,6 +42,6 @@ def sampling(c: Compiled, R: Tableau, lower: bool, span: tuple[float, float], ro
         np.array(table, np.int64),
         np.zeros(len(table)),
         np.array([span[1]]),
-        np.array([1 if lower else -1, 1], np.int64),
+        np.array([1 if lower else -1, 1, 0, 0], np.int64),
     )
     return Sampling(plan, R, tableau(LOWER), *rows)
