@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion import stiff
 from flyball.analysis.motion.fastest import fastest
 from flyball.analysis.motion.start import begin
 from flyball.numerics.arnoldi import largest
@@ -141,33 +140,13 @@ def on_mounts(bodies):
     return m
 
 
-def test_what_is_left_is_counted_by_what_it_costs(monkeypatch):
+def test_what_is_left_is_counted_by_what_it_costs():
     """As many steps for sixteen bodies as for one, and each is dearer: they go over, one does not."""
-    monkeypatch.setattr(stiff, "READY", stiff.LONG)
     one, many = (on_mounts(n).simulate(5.0, rtol=1e-3, outputs=3) for n in (1, 16))
     assert one.health.method == ""
     assert many.health.method.startswith("dop853; radau from t = 0.0")
     rest = 1.0 / 2e4  # the way of 1 m/s until it is damped away; the spring brings it back in 2 s
     assert np.abs(many["x7"].position[-1] - (7 + rest * np.exp(-2.5), 0, 0)).max() < 1e-5
-
-
-def test_less_has_to_be_left_where_the_implicit_method_is_loaded(monkeypatch):
-    """In a motion by itself; runs of a study depend on nothing that was computed before them."""
-    bushing(1000.0).simulate(1e-3, outputs=2, method="radau")
-    m = on_mounts(1)
-    first, again = (m.simulate(5.0, rtol=1e-3, outputs=3) for _ in range(2))
-    assert first.health.method.startswith("dop853; radau from t = 0.")
-    assert np.array_equal(first.q, again.q)
-    rest = 1.0 / 2e4
-    assert np.abs(first["x0"].position[-1] - (rest * np.exp(-2.5), 0, 0)).max() < 1e-5
-    m = bushing(1000.0)
-    asked = {"t_end": 0.2, "outputs": 2, "specialize": False}
-    runs = m.study({"c": [1000.0, 1100.0]}, of=["x.x"], **asked)
-    assert "radau" in m.simulate(**asked).health.method
-    monkeypatch.setattr(stiff, "READY", stiff.LONG)
-    alone = m.simulate(**asked)
-    assert alone.health.method == ""
-    assert np.array_equal(runs.values["x.x"][0], alone["x"].position[:, 0])
 
 
 def test_it_comes_back_where_nothing_is_stiff_any_more():

@@ -28,7 +28,6 @@ from .motion.impulse.ending import INTERRUPTED
 from .motion.options import output_times
 from .motion.part import Part
 from .motion.start import start_time
-from .motion.stiff import long
 from .progress import Tell, shown
 from .simulate import Span, simulate, told
 
@@ -47,7 +46,7 @@ class CheckpointOptions(SimulateOptions):
 
 def checkpointed(model: Model, o: CheckpointOptions) -> Result:
     """The motion; kept in a file on the way if that is asked for."""
-    return simulate(model, o, long()) if o.checkpoint is None else _kept(model, o)
+    return simulate(model, o) if o.checkpoint is None else _kept(model, o)
 
 
 def _kept(model: Model, o: CheckpointOptions) -> Result:

@@ -42,7 +42,7 @@ from .motion.outcome import outcome
 from .motion.part import Part, whole
 from .motion.samples import refuse_too_often
 from .motion.start import Start, begin, start_time
-from .motion.stiff import EXPLICIT, LONG, Pace
+from .motion.stiff import EXPLICIT, Pace
 from .motion.touches import with_places
 from .progress import Tell, shown
 from .watched import remark_friction
@@ -53,17 +53,14 @@ UNMADE = {"partitioning": "partitioning chooses coordinates on the way, which ma
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 
 
-def simulate(model: Model, o: SimulateOptions, long: float = LONG) -> Result:
-    """The motion by the method asked for, or by the one that suits the model: see `Mechanism.simulate`.
-
-    ``long`` is what an explicit method must have left [ns] for it to go on by an implicit one, where none is asked for.
-    """
+def simulate(model: Model, o: SimulateOptions) -> Result:
+    """The motion by the method asked for, or by the one that suits the model: see `Mechanism.simulate`."""
     model = model.snapshot()
     t_start = start_time(o.t_start, o.start)
     span = (t_start, o.t_end, output_times(t_start, o.t_end, o.outputs))
     way = chosen(model, o)
     try:
-        return told(model, way.options, span, way.why, o.method == AUTO, long=long)
+        return told(model, way.options, span, way.why, o.method == AUTO)
     except (ModelError, SimulationError) as error:
         if way.instead is None or not unresolved(error):
             raise
@@ -77,9 +74,7 @@ Span = tuple[float, float, np.ndarray]
 """Start and end of a motion [s], and its output times."""
 
 
-def told(
-    model: Model, o: SimulateOptions, span: Span, why: str, auto: bool, part: Part | None = None, long: float = LONG
-) -> Result:
+def told(model: Model, o: SimulateOptions, span: Span, why: str, auto: bool, part: Part | None = None) -> Result:
     """The motion, or a part of it, which says by what it was computed, and why; ``auto``: methods may change.
 
     Raises
@@ -89,7 +84,7 @@ def told(
     """
     part = part or whole()
     try:
-        result = _computed(model, o, span, long if auto else None, part)
+        result = _computed(model, o, span, auto, part)
     except SimulationError as error:
         if isinstance(error.result, Result):
             _tell(error.result, why)
@@ -104,8 +99,8 @@ def _tell(result: Result, why: str) -> None:
     result.health.method = "; ".join(x for x in (why, result.health.method) if x)
 
 
-def _computed(model: Model, o: SimulateOptions, span: Span, long: float | None, part: Part) -> Result:
-    """The motion, or a part of it, by a method that is chosen; ``long`` as for `simulate`, None: it does not change."""
+def _computed(model: Model, o: SimulateOptions, span: Span, auto: bool, part: Part) -> Result:
+    """The motion, or a part of it, by a method that is chosen."""
     started = time.perf_counter()
     t_start, _, times = span
     announce_motion(model, not isinstance(o.method, Stepping), o.method)
@@ -130,8 +125,8 @@ def _computed(model: Model, o: SimulateOptions, span: Span, long: float | None, 
     begun.engine = Engine(begun.assembly.compiled, made, UNMADE.get(o.stabilization, ""))
     if o.method in IMPLICIT:
         begun.engine.told = f"{TABLES}: {o.method} goes through the tables"
-    mixed = long is not None and o.stabilization == "projection" and o.step is None
-    begun.pace = Pace(float(o.t_end), AUTO if mixed else str(o.method), partial(unsuited, begun), long or LONG)
+    mixed = auto and o.stabilization == "projection" and o.step is None
+    begun.pace = Pace(float(o.t_end), AUTO if mixed else str(o.method), partial(unsuited, begun))
     begun.pace.goes_on(begun.carried.get("by", ""))
     follow = o.stabilization == "projection" and not watched(begun) and _held(begun)
     with shown(o.progress, "simulating") as tell:

@@ -14,23 +14,20 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ...constraints.modes import BRANCH
-from ...equations.implicit import radau_steps
 from ...numerics.integrators import clock as ex
 from ...tables.system import MODE, OFF, SWITCH_KIND
 from ..compiled import Compiled
 from .account import kind
 from .fastest import bend, fastest
-from .part import WEIGHT
 
 AUTO, EXPLICIT, IMPLICIT = "auto", "dop853", "radau"
 NEVER = 2**60  # steps
 STAGES = 12  # of a step of the explicit method
 EVERY = 100  # steps of it between two looks
 LOOK, LITTLE = 8e5, 0.01  # what a look takes [ns], and part of the time that looks may take where they find nothing
-SELDOM = 60  # steps of the implicit method, at first
+SELDOM = 60  # steps of the implicit method
 IN_A_ROW = 2  # looks that say the same
 LONG = 4e8  # that the explicit method has left at least [ns], as estimated: what it takes to load the implicit one
-READY = 5e7  # the same where that is loaded: some looks, of which a part of motions are found not to be stiff
 LEAST = 270.0  # that an evaluation takes [ns], with the loop about it
 EDGE = 3.5  # h rho of wide steps that are hardly stable any more
 WHOLE = 0.3  # part of the state; what swings so far is the motion itself, at whatever tolerance
@@ -64,8 +61,6 @@ class Pace:
         That is asked for; ``"auto"``: whichever suits.
     why_not : callable
         Says why it cannot go on by the implicit method, in words; empty: it can.
-    long : float [ns]
-        What the explicit method must have left for that.
 
     Attributes
     ----------
@@ -79,8 +74,8 @@ class Pace:
         What it has gone over to.
     """
 
-    def __init__(self, t_end: float, method: str, why_not: Callable[[], str], long: float = LONG) -> None:
-        self.t_end, self.mixed, self.why_not, self.long = t_end, method == AUTO, why_not, long
+    def __init__(self, t_end: float, method: str, why_not: Callable[[], str]) -> None:
+        self.t_end, self.mixed, self.why_not = t_end, method == AUTO, why_not
         self.told: list[str] = []
         self.asked = self.back = self.now = ""
         self._goes_on = False
@@ -101,8 +96,8 @@ class Pace:
         self._mark(clock)
         if not lately.width > 0.0 or not self._speaks_for_another(c, clock, lately, now):
             self.row = 0
-            step = STAGES * each(c) * (WEIGHT if now == IMPLICIT else 1.0)
-            self.every = max(self.every, min(2 * self.every, int(LOOK / (LITTLE * step))))
+            if now == EXPLICIT:
+                self.every = max(self.every, min(2 * self.every, int(LOOK / (LITTLE * STAGES * each(c)))))
             return ""
         self.row, self.every = self.row + 1, self.often
         if self.row < IN_A_ROW:
@@ -154,7 +149,7 @@ class Pace:
     def _speaks_for_another(self, c: Compiled, clock: ex.Clock, lately: Lately, now: str) -> bool:
         if now == EXPLICIT:
             left = STAGES * (self.t_end - float(clock.real[ex.T])) / (lately.width * (1.0 - lately.refused))
-            if left * each(c) < self.long:
+            if left * each(c) < LONG:
                 return False
             fast = fastest(c, clock, 1.0 / lately.width)
             self.rate = abs(fast)
@@ -174,14 +169,6 @@ class Pace:
     def _mark(self, clock: ex.Clock) -> None:
         done = int(clock.count[ex.ACCEPTED])
         self.last = done + int(clock.count[ex.REJECTED]), done, float(clock.real[ex.T])
-
-
-def long() -> float:
-    """What the explicit method must have left [ns] in a motion by itself: less where this process has the implicit one.
-
-    Motions of a study, and parts of one, all have the same `LONG`, so that none depends on what was computed before it.
-    """
-    return READY if radau_steps.used else LONG
 
 
 def each(c: Compiled) -> float:
