@@ -95,3 +95,8 @@ def test_size_of_an_angle_passes_half_a_turn():
 
     catch = "0.01*step(abs(atan2(sin(th-pi), cos(th-pi))), 0.3, 1, 0.5, 0) - 0.001*w"
     assert swing(catch) == pytest.approx(swing("-0.001*w"), abs=1e-8)
+
+
+def test_the_text_of_a_law_without_a_value_is_told():
+    with pytest.raises(fb.SimulationError, match=r"in force = -5 - sqrt\(value\)"):
+        end("-5 - sqrt(value)")
