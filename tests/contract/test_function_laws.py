@@ -19,8 +19,10 @@ from flyball.errors import ExpressionError, PerformanceNotice
 from flyball.laws.call import STACK_RESERVE
 from flyball.laws.evaluation import evaluate
 from flyball.laws.functions import fault, forget, interrupts_kept
+from flyball.laws.native import native
 from flyball.laws.program import compile_law
 from flyball.model.expressions import Expression, law_expression
+from flyball.model.function import Call
 
 PARAMETERS = {"k": 3.0}
 INPUTS = ("t", "length", "rate")
@@ -368,3 +370,17 @@ def test_elements_take_functions_where_laws_stand():
     motor = fb.Motor("m", "A", torque=pull)
     assert motor.torque is pull
     assert fb.SpringDamper("s", "a", "b", force=pull).force is pull
+
+
+def test_equal_functions_are_compiled_once():
+    """Each by what decides its code: operations, constants, enclosed numbers with their types; not by its place."""
+
+    def made(c):
+        return lambda t: c * t
+
+    functions = [made(2.0), made(2.0), made(3.0), made(2), made(-0.0), made(0.0)]
+    codes = [native(Call(f, ("t",), "", "")) for f in functions]
+    assert codes[0].address == codes[1].address
+    assert len({x.address for x in codes}) == 5
+    for f, x in zip(functions, codes, strict=True):
+        assert x.python(1.5) == f(1.5)

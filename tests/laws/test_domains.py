@@ -65,3 +65,38 @@ def test_a_branch_with_a_pole_at_its_corner():
     law = "-100*value*where(value > 0, sin(value)/value, 1)"
     smooth = end("-100*where(value > 0, sin(value), value)", rtol=1e-10)
     assert end(law, rtol=1e-10) == pytest.approx(smooth, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("rate", "initial", "value"),
+    [
+        ("-sign(p)*sqrt(abs(p))", 0.04, 0.0),  # empties in 0.4 s, and stays
+        ("t - sign(p)*sqrt(abs(p))", 0.0, 0.25),  # p = t^2/4
+        ("-3*sign(p)*sqrt(abs(p)) + 4*sin(5*t)", 1.0, -0.4054908500460201),  # by SciPy, as above
+    ],
+)
+def test_orifice_in_a_state(rate, initial, value):
+    m = fb.Mechanism(planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.State("p", rate=rate, initial=initial), fb.Actuator("k", "x.displacement", force="p"))
+    for options in ({}, {"method": "radau"}, {"method": "rk45"}, {"coordinates": "absolute"}):
+        assert m.simulate(1, **options)["p"].output[-1] == pytest.approx(value, abs=2e-7)
+
+
+def test_size_of_an_angle_passes_half_a_turn():
+    """|atan2(y, x)| has a corner there, though atan2(y, x) jumps; here even that has no effect."""
+
+    def swing(torque: str) -> float:
+        m = fb.Mechanism(planar=True, gravity=(0, -9.81))
+        m.add(fb.Body("rod", mass=0.1, inertia=1e-3, position=(0, -0.15)))
+        m.add(fb.Revolute("B", "ground", "rod", at=(0, 0)), fb.Initial("B.angle", value="2 deg"))
+        m.add(fb.Sensor("th", "B.angle"), fb.Sensor("w", "B.rate"), fb.Motor("M", "B", torque=torque))
+        return float(m.simulate(3, rtol=1e-9)["B.angle"][-1])
+
+    catch = "0.01*step(abs(atan2(sin(th-pi), cos(th-pi))), 0.3, 1, 0.5, 0) - 0.001*w"
+    assert swing(catch) == pytest.approx(swing("-0.001*w"), abs=1e-8)
+
+
+def test_the_text_of_a_law_without_a_value_is_told():
+    with pytest.raises(fb.SimulationError, match=r"in force = -5 - sqrt\(value\)"):
+        end("-5 - sqrt(value)")

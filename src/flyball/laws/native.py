@@ -24,6 +24,7 @@ from ..model.function import MOST, Call, function_name
 from .call import NATIVE
 
 _made: WeakKeyDictionary[FunctionType, dict[int, Native]] = WeakKeyDictionary()
+_alike: WeakValueDictionary[Any, Native] = WeakValueDictionary()  # compiled functions, by all that decides their code
 _told: WeakValueDictionary[int, Any] = WeakValueDictionary()
 
 
@@ -37,12 +38,16 @@ class Native:
         self.python, self.count = python, count
         self.original: Callable[[], Any] = lambda: None  # the function that ``python`` is a twin of, if it lives
         self.outside: tuple[Any, ...] = ()
+        self.equal: Native | None = None
+        key = None
         self.reason = ""
         self.raised: list[Exception] = []  # the last exception of a call from compiled code, where it can be known
         if isinstance(python, FunctionType):
             self.outside = _outside(python, set())
+            key = _decisive(python, count, self.outside)
+            self.equal = _alike.get(key)  # its code serves this one, and lives as long
             try:
-                self._code = _compiled(python, count)
+                self._code = self.equal._code if self.equal else _compiled(python, count)
             except Exception as error:  # Numba gives up in many ways
                 self.reason = _short(error)
         else:
@@ -51,7 +56,9 @@ class Native:
             self._code = _callback(python, count, self.raised)
         code = self._code
         self.address = code.address if hasattr(code, "address") else ctypes.cast(code, ctypes.c_void_p).value or 0
-        NATIVE[self.address] = self
+        NATIVE.setdefault(self.address, self)
+        if key is not None and not self.reason and not self.equal:
+            _alike[key] = self
 
     @property
     def stale(self) -> bool:
@@ -196,8 +203,23 @@ def _outside(function: FunctionType, done: set[int]) -> tuple[Any, ...]:
     return tuple(out)
 
 
+def _decisive(function: FunctionType, count: int, outside: tuple[Any, ...]) -> tuple[Any, ...] | None:
+    """All that decides what a function is compiled to, but not where it stands; None if that has no hash."""
+    code = function.__code__.replace(co_filename="", co_name="", co_qualname="", co_firstlineno=1, co_linetable=b"")
+    by_keyword = function.__kwdefaults__ or {}
+    given = (*(function.__defaults__ or ()), *by_keyword.values())
+    key = (count, code, tuple(by_keyword), *((type(x), _frozen(x)) for x in given), *outside[2:])
+    try:
+        hash(key)
+    except TypeError:
+        return None
+    return key
+
+
 def _frozen(value: Any) -> Any:
-    """A value as it is now: of an array a copy of its numbers."""
+    """A value as it is now: of an array a copy of its numbers, of a number all its bits."""
+    if isinstance(value, float):
+        return value.hex()
     return (value.dtype, value.shape, value.tobytes()) if isinstance(value, np.ndarray) else value
 
 
@@ -218,14 +240,15 @@ def _short(error: Exception) -> str:
 def _tell(asked: Call, function: Any, reason: str) -> None:
     """Say once for each function that it is called back in Python."""
     owner = getattr(function, "__func__", function)
+    owner = getattr(owner, "__code__", owner)  # a function made in a loop is one
     if _told.get(id(owner)) is owner:
         return
     with suppress(TypeError):  # of what cannot be referred to weakly it is told again
         _told[id(owner)] = owner
     warn(
         f"{asked.where + ': ' if asked.where else ''}the Python function '{function_name(function)}' cannot "
-        f"be compiled ({reason}). It is called back in Python: each call takes about a microsecond where compiled code "
-        f"takes ten nanoseconds, and simulations on several threads wait for each other there. Use only numbers, "
-        f"arrays, math and NumPy in it, or give an expression or a Table",
+        f"be compiled ({reason}). It is called back in Python: a call takes microseconds, with arrays tens of them, "
+        f"where compiled code takes some ten nanoseconds, and simulations on several threads wait for each other "
+        f"there. Use only numbers, arrays, math and NumPy in it, or give an expression or a Table",
         PerformanceNotice,
     )

@@ -9,8 +9,8 @@ hold the motion where none does any more, by which it is seen that it leaves.
 
 A branch is continued beyond its corner only within the domain of the functions in it (`DOMAINS`): where the law as
 written is defined, but the argument of the branch continued is not in the domain, the function keeps its value at the
-domain's boundary, and at a pole the law is as written. So ``max(-x, 0)**1.5`` is 0 beyond its corner on either side. A law that leaves its domain as written
-is nan, as ever.
+domain's boundary, and at a pole the law is as written. So ``max(-x, 0)**1.5`` is 0 beyond its corner on either side. A
+law that leaves its domain as written is nan, as ever.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def on_one_side(node: Node, moving: Collection[str], corners: Corners, taken: No
         return node
     if node.kind in _TRUTHS:
         return _truth(node, moving, corners)
-    if _smooth_square(node):  # u |u|: its slope has no jump
+    if _smooth_square(node) or _signed_root(node):  # u |u|, sign(u) |u|**p: their slopes have no jump
         return node
     if node.kind == "where":
         condition, a, b = node.args
@@ -66,6 +66,9 @@ def on_one_side(node: Node, moving: Collection[str], corners: Corners, taken: No
         a, b = on_one_side(a, moving, corners, yes), on_one_side(b, moving, corners, no)
         branches = _without_poles(a, b, no, moving), _without_poles(b, a, yes, moving)
         return _made(node, BETWEEN_SIDES, _truth(condition, moving, corners), *branches)
+    if node.kind == "abs" and node.args[0].kind == "atan2":  # |atan2(y, x)| = atan2(|y|, x), which does not jump
+        y, x = node.args[0].args
+        return on_one_side(_made(node, "atan2", _made(node, "abs", y), x), moving, corners, taken)
     args = tuple(on_one_side(arg, moving, corners, taken) for arg in node.args)
     if node.kind in ("abs", "sign") and _moves(node.args[0], moving):
         if _of_sides_alone(args, moving):
@@ -198,6 +201,19 @@ def _smooth_square(node: Node) -> bool:
         return False
     a, b = node.args
     return any(v.kind == "abs" and any(_same(v.args[0], x) for x in _factors(u)) for u, v in ((a, b), (b, a)))
+
+
+def _signed_root(node: Node) -> bool:
+    """Whether a product is odd in u and zero with it: sign(u) times a power of abs(u) (the flow through an orifice)."""
+    factors = _factors(node) if node.kind == "*" else []
+    signs = [meaning(x.args[0]) for x in factors if x.kind == "sign"]
+    powers = [x for x in factors if x.kind == "sqrt" or (x.kind == "**" and _positive(x.args[1]))]
+    sizes = [y.args[0] for x in powers for y in _factors(x.args[0]) if y.kind == "abs"]
+    return len(signs) == 1 and any(meaning(u) == signs[0] for u in sizes)
+
+
+def _positive(node: Node) -> bool:
+    return node.kind == "number" and node.value > 0
 
 
 def _factors(node: Node) -> list[Node]:

@@ -16,6 +16,7 @@ from ...laws.evaluation import evaluate, evaluate_jet
 from ...laws.functions import fault
 from ...laws.opcodes import BY_TIME
 from ...model.body import Driver
+from ...model.element import Element, LawOf, fields_with
 from ...model.force import CoordinateForce
 from ...model.touch import Touch
 from ...numerics.integrators import clock as ex
@@ -54,6 +55,7 @@ NEAR = 1e-10  # part of the time span within which a law that jumps is looked fo
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
 LOCKED = 1e-3  # part of the accelerations asked for that no solution of the rows leaves open
 PARTED = 1e-6  # part of a rate or second derivative by which laws of one coordinate differ that disagree
+LONGEST = 200  # characters of a law's text in a message
 PARTS = ("value", "rate", "second derivative")
 SHARP = 10.0  # a law that changes this many times more than its own slope says has jumped
 
@@ -266,7 +268,7 @@ def broken_force(c: Compiled, t: float) -> str:
                 )
                 return (
                     f"the law of {e.title} gives {laws} for t = {t:.6g}{given}. Look for a division by zero or a range "
-                    f"that it leaves"
+                    f"that it leaves{_texts(e)}"
                 )
             pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
             out = (
@@ -277,6 +279,14 @@ def broken_force(c: Compiled, t: float) -> str:
             if not np.isfinite(out).all():
                 return f"the force of {e.title} is no number. {e.fails}"
     return ""
+
+
+def _texts(e: Element) -> str:
+    """What the laws of a force are as given, the beginning of long ones."""
+    given = {name: getattr(e, name) for name in fields_with(e.__class__, LawOf)}
+    shown = {n: x if len(x) <= LONGEST else f"{x[:LONGEST]} ..." for n, x in given.items() if isinstance(x, str)}
+    texts = [f"{name} = {x}" for name, x in shown.items()]
+    return f", in {'; '.join(texts)}" if texts else ""
 
 
 def _locked(a: Assembly, base: Assembly, clock: ex.Clock) -> str:
