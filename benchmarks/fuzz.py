@@ -1,4 +1,4 @@
-"""Thousands of random mechanisms and contact scenes, judged from outside: which agree, are refused, warned of, or wrong.
+"""Thousands of random mechanisms and contact scenes, judged from outside: which agree, are refused, warned of, wrong.
 
 Judges are formulas for poses and velocities (`fuzzing/physics.py`, `fuzzing/touching.py`), and the same motion by other
 ways (`fuzzing/relations.py`). A case comes from the name of its family and a seed alone.
@@ -55,7 +55,9 @@ def main() -> None:
     parser.add_argument("--families", nargs="*", choices=names, default=["mechanisms", "contact"], metavar="NAME")
     parser.add_argument("--first", type=int, default=0, help="first seed (0)")
     parser.add_argument("--count", type=int, default=100, help="seeds of each family (100: 3000 mechanisms)")
-    parser.add_argument("--relations", type=int, default=4, help="other ways in which each motion is computed (4; 13: all)")
+    parser.add_argument(
+        "--relations", type=int, default=4, help="other ways in which each motion is computed (4; 13: all)"
+    )
     parser.add_argument("--only", nargs="*", choices=list(RELATIONS), metavar="NAME", help="these ways and no others")
     parser.add_argument("--all", action="store_true", help="list what is refused and warned of, too")
     parser.add_argument("--json", metavar="FILE", help="write rows and verdicts")
@@ -66,7 +68,9 @@ def main() -> None:
     rows = [family(name, seeds, arguments, listed) for name in dict.fromkeys(chosen)]
     rows.append({"family": "all"} | {k: sum(r[k] for r in rows) for k in list(COLUMNS)[1:]})
     print(timing.table(rows, COLUMNS))
-    told = [{"family": v.family, "seed": v.seed, "kind": v.kind, "findings": list(map(str, v.findings))} for v in listed]
+    told = [
+        {"family": v.family, "seed": v.seed, "kind": v.kind, "findings": list(map(str, v.findings))} for v in listed
+    ]
     timing.write_json(arguments.json, [*rows, *told])
 
 

@@ -58,9 +58,7 @@ def turned(m: fb.Mechanism, R: Numbers, shift: Numbers) -> fb.Mechanism:
 
 def _points(value: Any, R: Numbers, shift: Numbers) -> Any:
     a = np.asarray(value, float)
-    return (
-        tuple((R @ a + shift).tolist()) if a.ndim == 1 else tuple(tuple((R @ p + shift).tolist()) for p in a)
-    )
+    return tuple((R @ a + shift).tolist()) if a.ndim == 1 else tuple(tuple((R @ p + shift).tolist()) for p in a)
 
 
 def _mixed(R: Numbers, laws: Any) -> Any:
@@ -201,7 +199,16 @@ def _mirrored_planar(m: fb.Mechanism) -> fb.Mechanism:
 
     def of(e: Any) -> Any:
         kind, own = type(e).__name__, fields(e)
-        known = ("Revolute", "Translational", "Prismatic", "PointOnLine", "Distance", "Fixed", "SpringDamper", "PointForce")
+        known = (
+            "Revolute",
+            "Translational",
+            "Prismatic",
+            "PointOnLine",
+            "Distance",
+            "Fixed",
+            "SpringDamper",
+            "PointForce",
+        )
         known += ("PointTorque", "Rope")
         if kind == "Body":
             if e.shape is not None:
@@ -243,7 +250,9 @@ def renamed(m: fb.Mechanism) -> tuple[fb.Mechanism, dict[str, str]]:
         if isinstance(value, str):
             if word(value) != value:
                 return word(value)
-            return NAME.sub(lambda x: word(x.group()), re.sub(r"([A-Za-z_]\w*)(?=\()", lambda x: new.get(x[1], x[1]), value))
+            return NAME.sub(
+                lambda x: word(x.group()), re.sub(r"([A-Za-z_]\w*)(?=\()", lambda x: new.get(x[1], x[1]), value)
+            )
         if callable(value) and hasattr(value, "written"):
             arguments, text = written(value)
             return python_law(tuple(map(word, arguments)), NAME.sub(lambda x: word(x.group()), text))
@@ -251,7 +260,18 @@ def renamed(m: fb.Mechanism) -> tuple[fb.Mechanism, dict[str, str]]:
             return type(value)(**{k: of(v) if k in ("on", "what") else v for k, v in fields(value).items()})
         return value
 
-    keep = ("coordinate", "axes", "interpolation", "beyond", "anti_windup", "direction", "law", "color", "x_unit", "y_unit")
+    keep = (
+        "coordinate",
+        "axes",
+        "interpolation",
+        "beyond",
+        "anti_windup",
+        "direction",
+        "law",
+        "color",
+        "x_unit",
+        "y_unit",
+    )
 
     def element(e: Any) -> Any:
         own = fields(e)
@@ -281,10 +301,13 @@ def swapped(m: fb.Mechanism) -> fb.Mechanism:
     """Every joint and spring between the same bodies the other way round, its coordinate kept by turning its axis."""
     used = {c.partition(".")[0] for c in coordinates_used(m)}
     used |= {e.name.partition(".")[0] for e in m.initial} | {f.joint for f in m.forces if hasattr(f, "joint")}
+    loaded = {f.joint for f in m.forces if isinstance(f, fb.JointFriction)}  # bending is about a point of body_j
     count = 0
 
     def of(e: Any) -> Any:
         nonlocal count
+        if e.name in loaded:
+            return e
         kind = type(e).__name__
         free = e.name not in used
         both = kind in ("Spherical", "Fixed", "Distance", "SpringDamper", "Orientation")

@@ -1,16 +1,17 @@
-"""New kinds of random mechanisms: controllers, Python functions, tables, events, what hangs on nothing, what is known."""
+"""New kinds of random mechanisms: controllers, functions, tables, events, bodies in free flight, gears, wheels."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-import flyball as fb
 from tests.robust.dice import Dice, plus
 from tests.robust.families import FAMILIES as KNOWN
 from tests.robust.families import Case, close, dress, start, tree
 from tests.robust.joints import coordinates
 from tests.robust.switching import switched
+
+import flyball as fb
 
 from .scaling import python_law
 
@@ -38,7 +39,11 @@ def _pid(d: Dice, c: str, name: str, sampled: bool) -> fb.PID:
     if sampled:
         more["period"] = d.pick([0.01, 0.02, 0.017])
     if d.chance(0.5):
-        more |= {"lower": -d.size(1, 20), "upper": d.size(1, 20), "anti_windup": d.pick(["clamping", "none", "back-calculation"])}
+        more |= {
+            "lower": -d.size(1, 20),
+            "upper": d.size(1, 20),
+            "anti_windup": d.pick(["clamping", "none", "back-calculation"]),
+        }
         if more["anti_windup"] == "back-calculation":
             more["tracking"] = 0.1
     setpoint = d.pick([f"{d.number(-0.5, 0.5)}", f"0.3*sin({d.number(2, 9)}*t)", "step(t, 0.05, 0.0, 0.3, 0.4)"])
@@ -56,9 +61,18 @@ def _filter(d: Dice, c: str, name: str, sampled: bool) -> Any:
             A, B = ((0.9, 0.1), (-0.2, 0.7)), ((0.0,), (0.3,))
         return fb.StateSpace(name, inputs=[f"{d.number(1, 9)}*({c})"], A=A, B=B, C=((1.0, 0.1),), D=((0.2,),), **period)
     if kind == 1:
-        return fb.Lag(name, of=f"-{d.number(1, 20)}*({c})", time=d.size(0.01, 0.3), gain=d.number(0.5, 2), lead=d.pick([0.0, 0.02]), **period)
+        return fb.Lag(
+            name,
+            of=f"-{d.number(1, 20)}*({c})",
+            time=d.size(0.01, 0.3),
+            gain=d.number(0.5, 2),
+            lead=d.pick([0.0, 0.02]),
+            **period,
+        )
     if kind == 2 and not sampled:
-        return fb.Transfer(name, of=f"-{d.number(1, 9)}*({c})", num=(d.number(1, 50),), den=(1.0, d.number(2, 20), d.number(10, 90)))
+        return fb.Transfer(
+            name, of=f"-{d.number(1, 9)}*({c})", num=(d.number(1, 50),), den=(1.0, d.number(2, 20), d.number(10, 90))
+        )
     if kind == 3 and not sampled:
         return fb.State(name, rate=f"-{name}*{d.number(1, 9)} - {d.number(1, 9)}*({c})", initial=d.number(-1, 1))
     return fb.Integrator(name, of=f"-{d.number(1, 9)}*({c})", gain=d.number(0.5, 5), **period)
@@ -119,12 +133,20 @@ def tables(d: Dice) -> Case:
         if beyond == "repeat":
             ys[-1] = ys[0]
         kind = d.pick(["cubic", "monotone", "linear"])
-        case.add(lambda k=k, xs=xs, ys=ys, kind=kind, beyond=beyond: fb.Table(f"tab{k}", x=xs, y=ys, interpolation=kind, beyond=beyond))
+        case.add(
+            lambda k=k, xs=xs, ys=ys, kind=kind, beyond=beyond: fb.Table(
+                f"tab{k}", x=xs, y=ys, interpolation=kind, beyond=beyond
+            )
+        )
     for k in range(d.whole(1, 2)):
         c = _coordinate(d, m)
         if c is not None:
             x = "angle" if c.endswith(".angle") and not isinstance(m[c[:-6]], fb.Planar) else "value"
-            case.add(lambda k=k, c=c, x=x: _effort(d, m, f"T{k}", c, f"{d.number(0.5, 4)}*tab{k % 2}({d.pick([x, '5*t - 1', '2*rate'])})"))
+            case.add(
+                lambda k=k, c=c, x=x: _effort(
+                    d, m, f"T{k}", c, f"{d.number(0.5, 4)}*tab{k % 2}({d.pick([x, '5*t - 1', '2*rate'])})"
+                )
+            )
     if d.chance(0.4) and (c := _coordinate(d, m)):
         case.add(lambda c=c: fb.Driver("D", c, f"{d.number(0.1, 0.5)}*tab0(4*t - 1) - {d.number(0.1, 0.5)}*tab0(-1)"))
     return case
@@ -133,12 +155,27 @@ def tables(d: Dice) -> Case:
 def isolated(d: Dice) -> Case:
     """Bodies in free flight, joined with one another and with springs, nothing with ground."""
     case, m = _case(d, "isolated", d.pick([0.5, 1.0, 2.0]))
-    n, kinds = d.whole(2, 4), (["Revolute", "Prismatic"] if d.planar else ["Revolute", "Spherical", "Universal", "Prismatic", "Cylindrical"])
+    n, kinds = (
+        d.whole(2, 4),
+        (["Revolute", "Prismatic"] if d.planar else ["Revolute", "Spherical", "Universal", "Prismatic", "Cylindrical"]),
+    )
     for k in range(n):
         mass, a = d.size(0.3, 3), d.number(0.05, 0.2)
-        inertia = mass * a * a if d.planar else tuple(mass * a * a * f for f in (d.number(0.8, 1.0), d.number(0.8, 1.0), 1.1))
+        inertia = (
+            mass * a * a if d.planar else tuple(mass * a * a * f for f in (d.number(0.8, 1.0), d.number(0.8, 1.0), 1.1))
+        )
         spin = d.number(-3, 3) if d.planar else d.vector(3.0)
-        m.add(fb.Body(f"b{k}", mass=mass, inertia=inertia, position=d.vector(0.5), velocity=d.vector(1.0), angular_velocity=spin, com=d.pick([None, d.vector(0.1)])))
+        m.add(
+            fb.Body(
+                f"b{k}",
+                mass=mass,
+                inertia=inertia,
+                position=d.vector(0.5),
+                velocity=d.vector(1.0),
+                angular_velocity=spin,
+                com=d.pick([None, d.vector(0.1)]),
+            )
+        )
     for k in range(1, n):
         p = d.near(m[f"b{k}"].position, 0.2)
         if d.chance(0.6):
@@ -146,11 +183,25 @@ def isolated(d: Dice) -> Case:
 
             case.add(lambda k=k, p=p: joint(d, f"J{k}", f"b{d.whole(0, k - 1)}", f"b{k}", p, kinds))
         else:
-            case.add(lambda k=k, p=p: fb.SpringDamper(f"S{k}", f"b{k - 1}", f"b{k}", at=(m[f"b{k - 1}"].position, p), stiffness=d.size(1, 300), damping=d.pick([0, 0.2]), length=d.pick([None, 0.3])))
+            case.add(
+                lambda k=k, p=p: fb.SpringDamper(
+                    f"S{k}",
+                    f"b{k - 1}",
+                    f"b{k}",
+                    at=(m[f"b{k - 1}"].position, p),
+                    stiffness=d.size(1, 300),
+                    damping=d.pick([0, 0.2]),
+                    length=d.pick([None, 0.3]),
+                )
+            )
     for c in coordinates(m):
         if d.chance(0.4) and c.endswith((".angle", ".displacement")):
             name = f"K{len(m.forces)}"
-            case.add(lambda c=c, name=name: fb.CoordinateSpring(name, c, stiffness=d.size(0.5, 50), damping=d.pick([0, 0.1]), rest=d.number(-0.5, 0.5)))
+            case.add(
+                lambda c=c, name=name: fb.CoordinateSpring(
+                    name, c, stiffness=d.size(0.5, 50), damping=d.pick([0, 0.1]), rest=d.number(-0.5, 0.5)
+                )
+            )
     return case
 
 
@@ -158,14 +209,26 @@ def lossless(d: Dice) -> Case:
     """Springs and weight only: energy is constant."""
     case, m = _case(d, "lossless", d.pick([0.5, 1.0]))
     tree(d, m, case, d.whole(1, 4), kinds=SIMPLE if d.planar else [*SIMPLE, "Spherical", "Universal", "Cylindrical"])
-    close(d, m, case, d.pick([0, 0, 1]), kinds=["Distance", "Revolute", "Distance"] if d.planar else ["Distance", "Spherical", "PointInPlane"])
+    close(
+        d,
+        m,
+        case,
+        d.pick([0, 0, 1]),
+        kinds=["Distance", "Revolute", "Distance"] if d.planar else ["Distance", "Spherical", "PointInPlane"],
+    )
     for k in range(d.whole(1, 3)):
         b = d.pick(m.bodies)
         ends = (plus(b.position, d.size(0.2, 1), d.direction()), d.near(b.position, 0.1))
-        case.add(lambda k=k, b=b, ends=ends: fb.SpringDamper(f"S{k}", "ground", b.name, at=ends, stiffness=d.size(1, 200), length=d.pick([None, d.size(0.1, 1)])))
+        case.add(
+            lambda k=k, b=b, ends=ends: fb.SpringDamper(
+                f"S{k}", "ground", b.name, at=ends, stiffness=d.size(1, 200), length=d.pick([None, d.size(0.1, 1)])
+            )
+        )
     for k, c in enumerate(coordinates(m)):
         if d.chance(0.3) and c.endswith((".angle", ".displacement")):
-            case.add(lambda k=k, c=c: fb.CoordinateSpring(f"C{k}", c, stiffness=d.size(0.5, 50), rest=d.number(-0.5, 0.5)))
+            case.add(
+                lambda k=k, c=c: fb.CoordinateSpring(f"C{k}", c, stiffness=d.size(0.5, 50), rest=d.number(-0.5, 0.5))
+            )
     return case
 
 
@@ -177,7 +240,14 @@ def gears(d: Dice) -> Case:
     turn = {} if d.planar else {"axis": (0, 0, 1)}
     for k in range(n):
         inertia = d.size(0.01, 0.3)
-        m.add(fb.Body(f"w{k}", mass=d.size(0.3, 3), inertia=inertia if d.planar else (inertia, inertia, 1.5 * inertia), position=flat(float(k), 0.0)))
+        m.add(
+            fb.Body(
+                f"w{k}",
+                mass=d.size(0.3, 3),
+                inertia=inertia if d.planar else (inertia, inertia, 1.5 * inertia),
+                position=flat(float(k), 0.0),
+            )
+        )
         m.add(fb.Revolute(f"A{k}", "ground", f"w{k}", at=flat(float(k), 0.0), **turn))
     m.add(fb.Body("rack", mass=d.size(0.3, 3), inertia=0.1 if d.planar else (0.1, 0.1, 0.1), position=flat(0.0, 1.0)))
     m.add(fb.Prismatic("G", "ground", "rack", at=flat(0.0, 1.0), axis=flat(*d.pick([(1, 0), (0, 1)]))))
@@ -185,9 +255,15 @@ def gears(d: Dice) -> Case:
         teeth = (d.whole(10, 60), d.whole(10, 60))
         kind = d.pick(["gear", "gear", "coupler"])
         if kind == "gear":
-            case.add(lambda k=k, teeth=teeth: fb.GearPair(f"mesh{k}", f"A{k - 1}", f"A{k}", teeth=teeth, internal=d.chance(0.3)))
+            case.add(
+                lambda k=k, teeth=teeth: fb.GearPair(
+                    f"mesh{k}", f"A{k - 1}", f"A{k}", teeth=teeth, internal=d.chance(0.3)
+                )
+            )
         else:
-            case.add(lambda k=k: fb.Coupler(f"mesh{k}", [f"A{k - 1}.angle", f"A{k}.angle"], weights=[1.0, d.number(-2, 2)]))
+            case.add(
+                lambda k=k: fb.Coupler(f"mesh{k}", [f"A{k - 1}.angle", f"A{k}.angle"], weights=[1.0, d.number(-2, 2)])
+            )
     if d.chance(0.7):
         case.add(lambda: fb.RackAndPinion("rp", "G", f"A{n - 1}", radius=d.size(0.05, 0.3)))
     if d.chance(0.5):
@@ -202,7 +278,16 @@ def wheels(d: Dice) -> Case:
     case, m = _case(d, "wheels", d.pick([0.5, 1.0]))
     if d.planar:
         r = d.size(0.05, 0.3)
-        m.add(fb.Body("w", mass=1, inertia=0.5 * r * r, position=(0, r), com=d.pick([None, (0.3 * r, 0)]), angular_velocity=d.number(-5, 5)))
+        m.add(
+            fb.Body(
+                "w",
+                mass=1,
+                inertia=0.5 * r * r,
+                position=(0, r),
+                com=d.pick([None, (0.3 * r, 0)]),
+                angular_velocity=d.number(-5, 5),
+            )
+        )
         m.add(fb.WheelOnLine("R", "ground", "w", at=(0, 0), axis=(1, 0), centre=(0, r)))
         m.add(fb.Body("p", mass=0.5, inertia=0.01, position=(0.0, r - 0.3)))
         m.add(fb.Revolute("H", "w", "p", at=(0, r)))
@@ -214,11 +299,28 @@ def wheels(d: Dice) -> Case:
     if kind == "ball":
         m.add(fb.Body("w", mass=1, inertia=(0.4 * r * r,) * 3, position=(0, 0, r), angular_velocity=d.vector(4)))
         m.add(fb.RollingBall("R", "ground", "w", at=(0, 0, r), radius=r))
-        case.add(lambda: fb.SpringDamper("S", "ground", "w", at=((1, 1, 1), (0, 0, r)), stiffness=5, damping=d.pick([0, 0.3])))
+        case.add(
+            lambda: fb.SpringDamper(
+                "S", "ground", "w", at=((1, 1, 1), (0, 0, r)), stiffness=5, damping=d.pick([0, 0.3])
+            )
+        )
     elif kind == "disk":
         lean = d.number(-0.5, 0.5)
-        m.add(fb.Body("w", mass=1, inertia=(0.5 * r * r, 0.25 * r * r, 0.25 * r * r), position=(0, 0, r * math.cos(lean)), orientation=(0, lean, 0), angular_velocity=(d.number(3, 9), 0, d.number(-1, 1))))
-        m.add(fb.RollingDisk("R", "ground", "w", at=(0, 0, r * math.cos(lean)), axis=(math.cos(lean), 0, -math.sin(lean)), radius=r))
+        m.add(
+            fb.Body(
+                "w",
+                mass=1,
+                inertia=(0.5 * r * r, 0.25 * r * r, 0.25 * r * r),
+                position=(0, 0, r * math.cos(lean)),
+                orientation=(0, lean, 0),
+                angular_velocity=(d.number(3, 9), 0, d.number(-1, 1)),
+            )
+        )
+        m.add(
+            fb.RollingDisk(
+                "R", "ground", "w", at=(0, 0, r * math.cos(lean)), axis=(math.cos(lean), 0, -math.sin(lean)), radius=r
+            )
+        )
     else:
         m.add(fb.Body("w", mass=1, inertia=(0.02, 0.02, 0.02), com=d.pick([None, (0.02, 0, 0)])))
         m.add(fb.Screw("R", "ground", "w", at=(0, 0, 0), axis=d.direction(), lead=d.pick([-1, 1]) * d.size(0.05, 1)))
@@ -235,10 +337,18 @@ def eventful(d: Dice) -> Case:
         b = d.pick(m.bodies).name
         do: list[Any] = [fb.Impulse(b, d.vector(1.0))]
         c = _coordinate(d, m)
-        when = d.pick([f"t - {d.number(0.05, 0.3)}", f"{c} - {d.number(-0.1, 0.1)}", f"{c}_rate - {d.number(-0.5, 0.5)}"]) if c else "t - 0.1"
+        when = (
+            d.pick([f"t - {d.number(0.05, 0.3)}", f"{c} - {d.number(-0.1, 0.1)}", f"{c}_rate - {d.number(-0.5, 0.5)}"])
+            if c
+            else "t - 0.1"
+        )
         if c and d.chance(0.3):
             do.append(fb.Lock(c))
-        case.add(lambda k=k, when=when, do=do: fb.Event(f"E{k}", when, direction=d.pick(["rising", "falling", "either"]), do=do, times=d.pick([1, 2])))
+        case.add(
+            lambda k=k, when=when, do=do: fb.Event(
+                f"E{k}", when, direction=d.pick(["rising", "falling", "either"]), do=do, times=d.pick([1, 2])
+            )
+        )
     return case
 
 
@@ -255,13 +365,20 @@ def pendula(d: Dice) -> Case:
     if d.chance(0.5):
         case.add(lambda: fb.Initial("J0.angle", rate=d.number(-3, 3)))
     if d.chance(0.5):
-        case.add(lambda: fb.TorsionalSpringDamper("T", f"J{n - 1}", stiffness=d.size(1, 30), damping=d.pick([0, 0.3]), angle=d.pick([0.0, 0.7])))
+        case.add(
+            lambda: fb.TorsionalSpringDamper(
+                "T", f"J{n - 1}", stiffness=d.size(1, 30), damping=d.pick([0, 0.3]), angle=d.pick([0.0, 0.7])
+            )
+        )
     if d.chance(0.5):
         case.add(lambda: fb.Driver("D", f"J{n - 1}.angle", f"{m[f'J{n - 1}'].angle!r} + 0.4*sin(5*t)"))
     return case
 
 
-NEW = {f.__name__: f for f in (controllers, sampled, functions, tables, isolated, lossless, gears, wheels, eventful, pendula)}
+NEW = {
+    f.__name__: f
+    for f in (controllers, sampled, functions, tables, isolated, lossless, gears, wheels, eventful, pendula)
+}
 FAMILIES = {**NEW, **KNOWN}
 
 

@@ -124,7 +124,8 @@ def _edge(x: Motion, e: Any) -> Iterator[Gap]:
 
 
 JOINTS: dict[str, tuple[Callable, ...]] = {
-    "Revolute": (_common, _parallel), "Spherical": (_common,), "Fixed": (_common, _same_turn), "Cylindrical": (_line, _parallel),
+    "Revolute": (_common, _parallel), "Spherical": (_common,), "Fixed": (_common, _same_turn),
+    "Cylindrical": (_line, _parallel),
     "Universal": (_common, _crossed), "Prismatic": (_line, _same_turn), "Translational": (_line, _same_turn),
     "Orientation": (_same_turn,), "Planar": (_plane, _parallel), "PointInPlane": (_plane,), "PointOnLine": (_line,),
     "PinInSlot": (_line,), "Screw": (_line, _parallel, _thread), "Distance": (_distance,), "WheelOnLine": (_rolled,),
@@ -134,7 +135,7 @@ RATES = ("slip",)
 
 
 def coordinate(x: Motion, name: str) -> Array | None:
-    """A coordinate from poses, counted from the drawn configuration and its offset; None if it is none of the simple ones."""
+    """A coordinate from poses, counted from the drawn configuration and its offset; None if it is not simple."""
     part, _, what = name.partition(".")
     e = x.m.find(part)
     if isinstance(e, fb.Body):
@@ -147,7 +148,11 @@ def coordinate(x: Motion, name: str) -> Array | None:
             return turn(x, e.body_i, e.body_j, _axis(x, e)) + e.angle
         except Uncounted:
             return None
-    if what == "displacement" and kind in ("Prismatic", "Translational", "Cylindrical", "Screw", "PointOnLine") and e.at:
+    if (
+        what == "displacement"
+        and kind in ("Prismatic", "Translational", "Cylindrical", "Screw", "PointOnLine")
+        and e.at
+    ):
         return dots(_apart(x, e), x.direction(e.body_i, e.axis)) + e.displacement
     return None
 
@@ -206,9 +211,16 @@ def _modulo(d: Array, name: str) -> Array:
 
 def _coupled(x: Motion, e: Any) -> Iterator[tuple[str, str, Array]]:
     if isinstance(e, fb.GearPair):
+        one, two = x.m[e.joint_1], x.m[e.joint_2]
+        carrier = ({one.body_i, one.body_j} & {two.body_i, two.body_j}).pop()
+        way = np.prod([1.0 if j.body_i == carrier else -1.0 for j in (one, two)])
+        if not x.m.planar and np.dot(one.axis, two.axis) < 0.0:
+            way = -way
         z1, z2 = e.teeth
-        parts = [(z1, f"{e.joint_1}.angle"), (-z2 if e.internal else z2, f"{e.joint_2}.angle")]
+        parts = [(z1, f"{e.joint_1}.angle"), (way * (-z2 if e.internal else z2), f"{e.joint_2}.angle")]
     elif isinstance(e, fb.RackAndPinion):
+        if x.m[e.rack].body_i != x.m[e.pinion].body_i:
+            return
         parts = [(1.0, f"{e.rack}.displacement"), (-e.radius, f"{e.pinion}.angle")]
     elif e.value is None:
         parts = list(zip(e.weights, e.coordinates, strict=True))

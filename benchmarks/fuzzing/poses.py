@@ -82,7 +82,12 @@ class Motion:
         out = {}
         for b in self.m.bodies:
             told = self.run.model[b.name]
-            if told.mass is None or told.inertia is None or told.inertia_about is not None or told.inertia_axes is not None:
+            if (
+                told.mass is None
+                or told.inertia is None
+                or told.inertia_about is not None
+                or told.inertia_axes is not None
+            ):
                 continue
             i = np.asarray(told.inertia, float)
             tensor = np.diag([0.0, 0.0, float(i)]) if i.ndim == 0 else np.diag(i) if i.ndim == 1 else i
@@ -139,7 +144,9 @@ def turn(motion: Motion, i: str, j: str, axis: Any) -> Array:
     on_i, on_j = motion.direction(i, side), motion.direction(j, side)
     other = np.cross(motion.direction(i, a), on_i)
     raw = np.arctan2(np.einsum("ni,ni->n", on_j, other), np.einsum("ni,ni->n", on_j, on_i))
-    w = np.einsum("ni,ni->n", motion.of(j, "angular_velocity") - motion.of(i, "angular_velocity"), motion.direction(i, a))
+    w = np.einsum(
+        "ni,ni->n", motion.of(j, "angular_velocity") - motion.of(i, "angular_velocity"), motion.direction(i, a)
+    )
     if np.abs(w).max() * np.diff(motion.t).max(initial=0.0) > 1.5:
         raise Uncounted(f"{i} and {j}")
     return _unwrapped(raw, w, motion.t)

@@ -83,7 +83,12 @@ def sizes(now: dict[str, np.ndarray], t_end: float) -> dict[str, float]:
     fast = max((np.abs(v).max() for k, v in now.items() if k.endswith(" velocity")), default=0.0)
     turns = max((np.abs(v).max() for k, v in now.items() if k.endswith("angular_velocity")), default=0.0)
     slow = SLOW / t_end
-    return {"position": far + 1e-3 * reach + 1e-9, "rotation": 1.0, "velocity": fast + slow * reach, "angular_velocity": turns + slow}
+    return {
+        "position": far + 1e-3 * reach + 1e-9,
+        "rotation": 1.0,
+        "velocity": fast + slow * max(reach, 1e-6),
+        "angular_velocity": turns + slow,
+    }
 
 
 def difference(a: dict[str, np.ndarray], b: dict[str, np.ndarray], size: dict[str, float]) -> tuple[np.ndarray, str]:
@@ -173,7 +178,9 @@ def other_units(b: Base, dice: random.Random) -> tuple:
     options["atol"] = ATOL * min(1.0, s.length, s.length / s.time, 1.0 / s.time)
     method = options.get("method")
     if isinstance(method, fb.Stepping):
-        options["method"] = dataclasses.replace(method, step=method.step * s.time, tolerance=method.tolerance * s.length / s.time)
+        options["method"] = dataclasses.replace(
+            method, step=method.step * s.time, tolerance=method.tolerance * s.length / s.time
+        )
     run = simulated(m, b.t_end * s.time, times, options)
     per = {"position": s.length, "rotation": 1.0, "velocity": s.length / s.time, "angular_velocity": 1.0 / s.time}
     return run, m, lambda d: {k: v / per[k.split()[-1]] for k, v in d.items()}
@@ -283,7 +290,7 @@ RELATIONS: dict[str, Relation] = {
 
 
 def compared(b: Base, chosen: list[str], seed: int) -> Iterator[tuple[str, str, Finding | None]]:
-    """(relation, outcome, finding) of each relation; outcomes: agrees, differs, unsupported, beyond, refused, raised."""
+    """(relation, outcome, finding) of each: agrees, differs, unsupported, beyond, refused, raised."""
     now = state(b.run, b.mechanism)
     size = sizes(now, b.t_end)
     h = b.horizon

@@ -213,6 +213,8 @@ def _point(m: fb.Mechanism, e: Any, own: dict, s: Scale, laws: Laws) -> None:
 
 def _joint_friction(m: fb.Mechanism, e: Any, own: dict, s: Scale, laws: Laws) -> None:
     c = e.coordinate or ("displacement" if hasattr(m[e.joint], "displacement") else "angle")
+    if e.stick_speed is not None and e.kinetic is not None and e.stribeck_speed is None:
+        own["stribeck_speed"] = 0.01 * s.of("m/s")  # what it is unless given
     if "viscous" in own:
         own["viscous"] = times(own["viscous"], s.effort(c) / s.coordinate(c) * s.time)
 

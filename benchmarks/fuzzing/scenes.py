@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-
-import flyball as fb
 from tests.robust.dice import Dice
 from tests.robust.families import Case
+
+import flyball as fb
 
 G = 9.81
 
@@ -36,13 +36,26 @@ def _floor(d: Dice, m: fb.Mechanism, slope: float = 0.0) -> None:
 def _ball(d: Dice, m: fb.Mechanism, name: str, r: float, p: Any, **more: Any) -> None:
     mass = d.size(0.2, 5.0)
     inertia = 0.4 * mass * r * r
-    m.add(fb.Body(name, mass=mass, inertia=inertia if d.planar else (inertia,) * 3, shape=fb.Sphere(radius=r), position=p, **more))
+    m.add(
+        fb.Body(
+            name,
+            mass=mass,
+            inertia=inertia if d.planar else (inertia,) * 3,
+            shape=fb.Sphere(radius=r),
+            position=p,
+            **more,
+        )
+    )
 
 
 def _box(d: Dice, m: fb.Mechanism, name: str, edges: Any, p: Any, **more: Any) -> None:
     a, b, c = edges
     mass = d.size(0.2, 5.0)
-    inertia = mass / 12 * (a * a + b * b) if d.planar else tuple(mass / 12 * x for x in (b * b + c * c, a * a + c * c, a * a + b * b))
+    inertia = (
+        mass / 12 * (a * a + b * b)
+        if d.planar
+        else tuple(mass / 12 * x for x in (b * b + c * c, a * a + c * c, a * a + b * b))
+    )
     m.add(fb.Body(name, mass=mass, inertia=inertia, shape=fb.Box(edges=edges), position=p, **more))
 
 
@@ -60,7 +73,15 @@ def dropped(d: Dice) -> Case:
     _floor(d, m, d.pick([0.0, 0.0, 0.2]))
     for k in range(d.whole(1, 3)):
         r = d.number(0.05, 0.15)
-        _ball(d, m, f"b{k}", r, _over(d, 0.5 * k, r + 0.15 + d.number(0, 0.5)), velocity=d.vector(1.0), angular_velocity=_spin(d, 8.0))
+        _ball(
+            d,
+            m,
+            f"b{k}",
+            r,
+            _over(d, 0.5 * k, r + 0.15 + d.number(0, 0.5)),
+            velocity=d.vector(1.0),
+            angular_velocity=_spin(d, 8.0),
+        )
     m.add(_contact(d))
     return case
 
@@ -110,7 +131,16 @@ def boxes(d: Dice) -> Case:
     edges = (d.number(0.1, 0.3), d.number(0.1, 0.3), d.number(0.1, 0.3))
     half = 0.5 * np.linalg.norm(edges)
     lean = {"angle": d.number(-1, 1)} if d.planar else {"orientation": tuple(d.number(-1, 1) for _ in range(3))}
-    _box(d, m, "a", edges, _over(d, 0.0, half + 0.05 + d.number(0, 0.2)), velocity=d.vector(1.0), angular_velocity=_spin(d, 3.0), **lean)
+    _box(
+        d,
+        m,
+        "a",
+        edges,
+        _over(d, 0.0, half + 0.05 + d.number(0, 0.2)),
+        velocity=d.vector(1.0),
+        angular_velocity=_spin(d, 3.0),
+        **lean,
+    )
     m.add(_contact(d, restitution=d.pick([0.0, 0.4])))
     if d.chance(0.4):
         r = 0.08
@@ -129,7 +159,11 @@ def sliding(d: Dice) -> Case:
     if d.planar:
         p, lean, vel = (-0.05 * s, 0.05 * c), {"angle": slope, "angular_velocity": 0.0}, (v * c, v * s)
     else:
-        p, lean, vel = (-0.05 * s, 0.0, 0.05 * c), {"orientation": (0.0, -slope, 0.0), "angular_velocity": (0.0,) * 3}, (v * c, 0.0, v * s)
+        p, lean, vel = (
+            (-0.05 * s, 0.0, 0.05 * c),
+            {"orientation": (0.0, -slope, 0.0), "angular_velocity": (0.0,) * 3},
+            (v * c, 0.0, v * s),
+        )
     _box(d, m, "a", edges, p, velocity=vel, **lean)
     m.add(fb.Contact(friction=d.number(0.1, 0.8)))
     return case
@@ -159,7 +193,18 @@ def capsules(d: Dice) -> Case:
     a, b = 0.5 * mass * r * r, mass * (length + 2 * r) ** 2 / 12
     lean = {"angle": d.number(-3, 3)} if d.planar else {"orientation": tuple(d.number(-1, 1) for _ in range(3))}
     flat = {"orientation": (0.0, math.pi / 2, 0.0)} if d.planar else {}  # its axis in the plane, along x
-    m.add(fb.Body("c", mass=mass, inertia=b if d.planar else (b, b, a), shape=fb.Capsule(radius=r, length=length, **flat), position=_over(d, 0.0, length + r + 0.1), velocity=d.vector(1.0), angular_velocity=_spin(d, 3), **lean))
+    m.add(
+        fb.Body(
+            "c",
+            mass=mass,
+            inertia=b if d.planar else (b, b, a),
+            shape=fb.Capsule(radius=r, length=length, **flat),
+            position=_over(d, 0.0, length + r + 0.1),
+            velocity=d.vector(1.0),
+            angular_velocity=_spin(d, 3),
+            **lean,
+        )
+    )
     m.add(_contact(d, restitution=d.pick([0.0, 0.5])))
     return case
 
@@ -173,12 +218,24 @@ def jointed(d: Dice) -> Case:
     top = (0.0, h) if d.planar else (0.0, 0.0, h)
     a = d.number(-1.2, -0.2)
     length = h + d.number(-0.05, 0.1)
-    tip = (length * math.cos(a), h + length * math.sin(a)) if d.planar else (length * math.cos(a), 0.0, h + length * math.sin(a))
+    tip = (
+        (length * math.cos(a), h + length * math.sin(a))
+        if d.planar
+        else (length * math.cos(a), 0.0, h + length * math.sin(a))
+    )
     r = 0.05
     _ball(d, m, "bob", r, tip)
     m.add(fb.Revolute("J", "ground", "bob", at=top, **axis))
     if d.chance(0.5):
-        _ball(d, m, "b", 0.08, (d.number(-0.3, 0.2), 0.08 + d.number(0, 0.1)) if d.planar else (d.number(-0.3, 0.2), 0.0, 0.08 + d.number(0, 0.1)))
+        _ball(
+            d,
+            m,
+            "b",
+            0.08,
+            (d.number(-0.3, 0.2), 0.08 + d.number(0, 0.1))
+            if d.planar
+            else (d.number(-0.3, 0.2), 0.0, 0.08 + d.number(0, 0.1)),
+        )
     m.add(_contact(d))
     if d.chance(0.4):
         m.add(fb.TorsionalSpringDamper("T", "J", stiffness=2.0, damping=d.pick([0.0, 0.1])))
@@ -192,8 +249,12 @@ def soft(d: Dice) -> Case:
     r = 0.1
     for k in range(d.whole(1, 2)):
         _ball(d, m, f"b{k}", r, _over(d, 0.3 * k, r + 0.1 + 0.1 * k), velocity=d.vector(0.5))
-    law = d.pick([{"law": "linear", "stiffness": d.size(1e3, 1e4), "damping": d.pick([0.0, 2.0])}, {"law": "hertz", "stiffness": d.size(1e4, 1e5)},
-                  {"law": "hunt-crossley", "stiffness": d.size(1e4, 1e5), "dissipation": 0.2}])  # fmt: skip
+    laws = (
+        {"law": "linear", "stiffness": d.size(1e3, 1e4), "damping": d.pick([0.0, 2.0])},
+        {"law": "hertz", "stiffness": d.size(1e4, 1e5)},
+        {"law": "hunt-crossley", "stiffness": d.size(1e4, 1e5), "dissipation": 0.2},
+    )
+    law = d.pick(laws)
     m.add(fb.Contact(friction=d.pick([0.0, 0.3]), **law))
     return case
 
@@ -207,7 +268,13 @@ def slowed(d: Dice) -> Case:
     v = d.number(0.2, 2.0) if d.chance(0.7) else 0.0
     spin = 0.0 if v else d.number(1.0, 9.0)
     _ball(d, m, "b", r, (0.0, 0.0, r), velocity=(v, 0.0, 0.0), angular_velocity=(0.0, v / r, spin))
-    m.add(fb.Contact(friction=0.8, rolling_friction=d.size(1e-4, 2e-2) if v else 0.0, spinning_friction=0.0 if v else d.size(1e-4, 1e-2)))
+    m.add(
+        fb.Contact(
+            friction=0.8,
+            rolling_friction=d.size(1e-4, 2e-2) if v else 0.0,
+            spinning_friction=0.0 if v else d.size(1e-4, 1e-2),
+        )
+    )
     return case
 
 
@@ -217,7 +284,16 @@ def carried(d: Dice) -> Case:
     case, m = _space(d, "carried", 1.0, method=_steps(1e-3))
     m.add(fb.Material("belt", friction=d.number(0.1, 0.6), surface_velocity=(d.number(-2, 2), d.number(-1, 1), 0.0)))
     m.add(fb.Material("dry", friction=1.0), fb.Ground("floor", shape=fb.Plane(), material="belt"))
-    _box(d, m, "a", (0.4, 0.4, 0.02), (0.0, 0.0, 0.01), velocity=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 0.0), material="dry")
+    _box(
+        d,
+        m,
+        "a",
+        (0.4, 0.4, 0.02),
+        (0.0, 0.0, 0.01),
+        velocity=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, 0.0),
+        material="dry",
+    )
     m.add(fb.Contact())
     return case
 
@@ -233,7 +309,15 @@ def planked(d: Dice) -> Case:
     for k in range(d.whole(1, 2)):
         r = d.number(0.04, 0.1)
         x = d.number(0.15, 0.5) * (-1) ** k
-        _ball(d, m, f"b{k}", r, _over(d, x, 0.025 + r + d.number(0.01, 0.3)), velocity=d.vector(0.3), angular_velocity=_spin(d, 3.0))
+        _ball(
+            d,
+            m,
+            f"b{k}",
+            r,
+            _over(d, x, 0.025 + r + d.number(0.01, 0.3)),
+            velocity=d.vector(0.3),
+            angular_velocity=_spin(d, 3.0),
+        )
     m.add(_contact(d))
     return case
 
@@ -247,7 +331,15 @@ def walled(d: Dice) -> Case:
         m.add(fb.Ground(name, shape=fb.Plane(normal=(-side, 0.0, 0.0)), position=p))
     for k in range(d.whole(1, 2)):
         r = d.number(0.05, 0.12)
-        _ball(d, m, f"b{k}", r, _over(d, 0.6 * k - 0.3, r + d.number(0.02, 0.5)), velocity=d.vector(3.0), angular_velocity=_spin(d, 5.0))
+        _ball(
+            d,
+            m,
+            f"b{k}",
+            r,
+            _over(d, 0.6 * k - 0.3, r + d.number(0.02, 0.5)),
+            velocity=d.vector(3.0),
+            angular_velocity=_spin(d, 5.0),
+        )
     m.add(_contact(d))
     return case
 
@@ -261,12 +353,39 @@ def thrown(d: Dice) -> Case:
     origin = (0.0, 0.0) if d.planar else (0.0, 0.0, 0.0)
     _box(d, m, "a", edges, origin, velocity=d.vector(0.2), angular_velocity=_spin(d, 2.0), **lean)
     away = (0.8, *(d.number(-0.1, 0.1) for _ in range(len(origin) - 1)))
-    _ball(d, m, "b", d.number(0.05, 0.15), away, velocity=(-2.0, *(0.0,) * (len(origin) - 1)), angular_velocity=_spin(d, 5.0))
+    _ball(
+        d,
+        m,
+        "b",
+        d.number(0.05, 0.15),
+        away,
+        velocity=(-2.0, *(0.0,) * (len(origin) - 1)),
+        angular_velocity=_spin(d, 5.0),
+    )
     m.add(_contact(d))
     return case
 
 
-SCENES = {f.__name__: f for f in (dropped, rolling, bouncing, colliding, boxes, sliding, piled, capsules, jointed, soft, slowed, carried, planked, walled, thrown)}
+SCENES = {
+    f.__name__: f
+    for f in (
+        dropped,
+        rolling,
+        bouncing,
+        colliding,
+        boxes,
+        sliding,
+        piled,
+        capsules,
+        jointed,
+        soft,
+        slowed,
+        carried,
+        planked,
+        walled,
+        thrown,
+    )
+}
 
 
 def made(family: str, seed: int) -> Case:

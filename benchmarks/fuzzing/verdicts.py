@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-
-import flyball as fb
 from tests.robust.families import Case
 from tests.robust.verdict import judge as by_health
+
+import flyball as fb
 
 from . import content, physics, relations, scenes, touching
 from .physics import Finding
@@ -58,7 +58,9 @@ def _judged(family: str, seed: int, count: int, only: list[str] | None) -> Verdi
     except fb.FlyballError as error:
         return Verdict(family, seed, "refused", [Finding("base", str(error)[:200], np.nan, 0.0)])
     except Exception as error:
-        return Verdict(family, seed, "wrong", [Finding("base", f"raised {type(error).__name__}: {error}"[:300], np.nan, 0.0)])
+        return Verdict(
+            family, seed, "wrong", [Finding("base", f"raised {type(error).__name__}: {error}"[:300], np.nan, 0.0)]
+        )
     try:
         found = touching.findings(b.run, b.mechanism, family) if scene else physics.findings(b.run, b.mechanism)
         if any(f.relation == "derivative" for f in found):

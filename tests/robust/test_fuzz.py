@@ -44,6 +44,7 @@ def test_a_judge_sees_what_is_spoilt(spoil, relation, monkeypatch):
     m, base = _lossless()
     read = poses.Motion._read
     if spoil == "force":
+
         class View:
             def __init__(self, of):
                 self.of = of

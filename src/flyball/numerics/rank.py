@@ -12,8 +12,8 @@ TOLERANCE = 1e-8  # singular values below this part of the largest count as zero
 def svd(A: np.ndarray, full: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Singular values and vectors: U, d, V^T of A = U diag(d) V^T.
 
-    NumPy's algorithm, divide and conquer (LAPACK's ``gesdd``), does not converge for some finite matrices with many equal
-    singular values beside rounding; the implicit QR iteration (``gesvd``), which is slower, does.
+    NumPy's algorithm, divide and conquer (LAPACK's ``gesdd``), does not converge for some finite matrices with many
+    equal singular values beside rounding; the implicit QR iteration (``gesvd``), which is slower, does.
     """
     try:
         return np.linalg.svd(A, full_matrices=full)
