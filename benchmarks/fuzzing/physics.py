@@ -409,7 +409,7 @@ def derivatives(x: Motion) -> Iterator[Finding]:
             doubt = np.abs(fine[1:] + fine[:-1] - coarse).max(axis=1)
             bad = np.abs(np.diff(y, axis=0) - fine).max(axis=1)
             allowed = 2.0 * np.maximum(np.r_[doubt[0], doubt], np.r_[doubt, doubt[-1]])
-            allowed += 1e-7 * (np.abs(y).max() + np.abs(fine).max()) + 1e-12
+            allowed += 1e-7 * (np.abs(y).max() + np.abs(fine).max()) + 1e-10
             if np.mean(bad > allowed) > SPIKES:
                 k = int((bad / allowed).argmax())
                 yield Finding("derivative", f"{rate} of {b.name}", float(bad[k]), float(allowed[k]))

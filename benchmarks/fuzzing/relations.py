@@ -41,6 +41,7 @@ class Base:
     t_end: float
     options: dict[str, Any]
     growth: np.ndarray
+    times: np.ndarray  # outputs that were asked for
 
     @property
     def horizon(self) -> int:
@@ -136,14 +137,14 @@ def base(m: fb.Mechanism, t_end: float, options: dict[str, Any], outputs: int) -
         growth[: len(d)] = np.maximum.accumulate(d) / NUDGE
     except (fb.FlyballError, ValueError):
         pass
-    return Base(m, run, t_end, options, growth)
+    return Base(m, run, t_end, options, growth, times)
 
 
 Relation = Callable[[Base, random.Random], tuple[fb.Result, fb.Mechanism, Callable[[dict], dict] | None]]
 
 
 def _again(b: Base, m: fb.Mechanism, back: Callable[[dict], dict] | None = None, **other: Any) -> tuple:
-    return simulated(m, b.t_end, np.asarray(b.run.t), b.options, **other), m, back
+    return simulated(m, b.t_end, b.times, b.options, **other), m, back
 
 
 def has_functions(m: fb.Mechanism) -> bool:
@@ -173,7 +174,7 @@ def _method(name: str) -> Relation:
 def other_units(b: Base, dice: random.Random) -> tuple:
     s = Scale(*(10.0 ** dice.uniform(-2, 2) for _ in range(3)))
     m = scaled(b.mechanism, s)
-    times = np.asarray(b.run.t) * s.time
+    times = b.times * s.time
     options = {"atol": None} | {k: v for k, v in b.options.items() if k not in ("atol", "max_step", "step")}
     options["atol"] = ATOL * min(1.0, s.length, s.length / s.time, 1.0 / s.time)
     method = options.get("method")
@@ -220,7 +221,7 @@ def other_axes(b: Base, dice: random.Random) -> tuple:
     m = changes.turned(b.mechanism, R, shift)
     start = {k: v[:1] for k, v in state(b.run, b.mechanism).items()}
     del start
-    run = simulated(m, b.t_end, np.asarray(b.run.t), b.options)
+    run = simulated(m, b.t_end, b.times, b.options)
     # bodies' own axes turn with the world: R' = R R_0
     return run, m, back
 
@@ -234,7 +235,7 @@ def mirror(b: Base, dice: random.Random) -> tuple:
 
 def rename(b: Base, dice: random.Random) -> tuple:
     m, new = changes.renamed(b.mechanism)
-    run = simulated(m, b.t_end, np.asarray(b.run.t), b.options)
+    run = simulated(m, b.t_end, b.times, b.options)
     old = {v: k for k, v in new.items()}
     return run, m, lambda d: {f"{old[k.split()[0]]} {k.split()[-1]}": v for k, v in d.items()}
 
@@ -264,10 +265,12 @@ def file(b: Base, dice: random.Random) -> tuple:
 
 
 def halves(b: Base, dice: random.Random) -> tuple:
-    times = np.asarray(b.run.t)
+    times = b.times
     k = len(times) // 2
     if isinstance(b.options.get("method"), fb.Stepping):
         raise Unsupported("another step in the middle")
+    if len(b.run.t) != len(times):
+        raise Unsupported("a motion that ends early")
     middle = 0.5 * (times[k] + times[k + 1])
     first = simulated(b.mechanism, float(middle), times[: k + 1], b.options)
     second = simulated(b.mechanism, b.t_end, np.r_[middle, times[k + 1 :]], b.options, start=first)

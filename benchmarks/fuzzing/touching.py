@@ -271,10 +271,13 @@ def losses(x: Motion) -> Iterator[Finding]:
         if fall > allowed:
             yield Finding("a loss falls", k, fall, allowed)
     del works
+    if "numerical_loss" in x.run.energy.names:  # of the steps themselves
+        lost["sum"] = lost["sum"] + np.asarray(x.run.energy.numerical_loss)
     missing = total[0] - total - lost["sum"] + _damped(x)
     bad = float(np.abs(missing).max())
-    if bad > max(tol, DRIFT * moved):
-        yield Finding("losses and energy", "total", bad, tol)
+    allowed = 4.0 * tol if by_steps(x) else max(tol, DRIFT * moved)
+    if bad > allowed:
+        yield Finding("losses and energy", "total", bad, allowed)
 
 
 def _damped(x: Motion) -> Array:
