@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ....errors import ModelError
 from ....numerics.cone.registry import names
@@ -13,8 +14,6 @@ from ...options import count, positive, seconds
 RESTITUTION = ("poisson", "newton", "moreau")
 CONVEX_ONLY = ("barzilai-borwein",)
 IMPACTS = ("simultaneous", "sequential")
-USUAL = 5e-3
-"""Longest step [s] where none is given."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +56,8 @@ class Stepping:
     restitution: str = "poisson"
     impacts: str = "simultaneous"
 
+    usual: ClassVar[float] = 5e-3  # longest step [s] where none is given
+
     def __post_init__(self) -> None:
         if isinstance(self.step, str):
             object.__setattr__(self, "step", seconds(self.step, "step"))
@@ -88,8 +89,12 @@ class Stepping:
     @property
     def longest(self) -> float:
         """The longest step [s]."""
-        return USUAL if self.step is None else float(self.step)
+        return self.usual if self.step is None else float(self.step)
 
     def bounded(self, longest: float) -> Stepping:
-        """With steps of at most ``longest`` seconds."""
-        return self if longest >= self.longest else dataclasses.replace(self, step=longest)
+        """With steps of at most ``longest`` seconds; where no step is given they may still be divided."""
+        if longest >= self.longest:
+            return self
+        made = dataclasses.replace(self, step=None if self.step is None else longest)
+        object.__setattr__(made, "usual", longest)
+        return made
