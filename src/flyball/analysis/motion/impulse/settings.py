@@ -26,8 +26,8 @@ class Stepping:
     Parameters
     ----------
     step : float or str [s], optional
-        Longest step; shorter where an output time asks for it. If not given, 5 ms, and where contacts that give way
-        collide as short as resolves that.
+        Longest step; steps are shortened so that they end at the output times. If not given it is 5 ms (or ``max_step``,
+        if that is less), and where compliant contacts collide steps are divided until they resolve the impact.
     solver : str
         Of the cone problem: ``auto`` (chosen for each island of bodies that touch), or one by name: see
         ``docs/contact_solvers.md``.
@@ -36,7 +36,8 @@ class Stepping:
     position_iterations : int, optional
         Most iterations of the solve for positions; the same.
     tolerance : float [m/s]
-        Residual of velocities that is enough; less in steps so short that gravity makes less than a hundred times that.
+        Residual of the velocities at which iterations stop. In very short steps it is a hundredth of the velocity that
+        gravity adds in the step, where that is less.
     coulomb : bool
         Coulomb's law. If not, the convex problem that approximates it, in which what slides floats up by friction
         coefficient times sliding speed times step.
