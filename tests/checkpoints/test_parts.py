@@ -84,3 +84,14 @@ def test_prescribed_motions_go_on(tmp_path, monkeypatch):
     for name in ("c.x", "c.vx", "turn.effort", "turn.work"):
         assert run[name] == pytest.approx(plain[name], abs=1e-5 * np.abs(plain[name]).max()), name
     assert run.health.energy_drift < 1e-5
+
+
+def test_parts_name_a_wheel_that_pulls(tmp_path, monkeypatch):
+    """By impulse time stepping, too: a wheel of 1 kg that 15 N lift is held down by its joint with 5.19 N."""
+    m = fb.Mechanism("wheel", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("hub", mass=1, inertia=0.01, position=(0, 0.1)))
+    m.add(fb.WheelOnLine("road", "ground", "hub", at=(0, 0), centre=(0, 0.1), axis=(1, 0)))
+    m.add(fb.PointForce("lift", "hub", at=(0, 0.1), force=(0, 15)))
+    cut(monkeypatch, STEPS)
+    run = m.simulate(0.1, outputs=11, method="impulse", checkpoint=tmp_path / "run.nc")
+    assert "pulls with up to 5.19 N" in "".join(run.health.warnings)

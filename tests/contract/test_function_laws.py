@@ -384,3 +384,30 @@ def test_equal_functions_are_compiled_once():
     assert len({x.address for x in codes}) == 5
     for f, x in zip(functions, codes, strict=True):
         assert x.python(1.5) == f(1.5)
+
+
+def test_functions_with_other_surroundings_are_compiled_by_themselves():
+    """Built-in functions, modules and the types of numbers in a tuple decide what a function computes."""
+
+    def of(f):
+        return lambda t: f(t)
+
+    def by(module):
+        return lambda t: module.sqrt(t - 1.0)
+
+    def from_tuple(c):
+        return lambda t: c[0] / 3 * t + math.atan2(c[1], -1.0)
+
+    functions = [of(math.sin), of(math.cos), by(math), by(np), from_tuple((1, 0.0)), from_tuple((1, -0.0))]
+    codes = [native(Call(f, ("t",), "", "")) for f in functions]
+    assert len({x.address for x in codes}) == 6
+    values = [float(integrated(f)) for f in functions[:2]]
+    assert values == pytest.approx([1.0 - math.sin(1.0), 1.0 - math.cos(1.0)], abs=1e-9)
+
+
+def integrated(law):
+    """Where a mass of 1 kg is after 1 s, from rest, under a force by time."""
+    m = fb.Mechanism(planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Actuator("k", "x.displacement", force=law))
+    return m.simulate(1, rtol=1e-9)["x.displacement"][-1]

@@ -128,6 +128,8 @@ def test_the_usual_step_follows_the_stiffness(outputs: int) -> None:
     run = m.simulate(2.0, outputs=outputs)
     assert [run["a"].vx[-1], run["b"].vx[-1]] == pytest.approx([0.0, 0.3], abs=1e-4)
     assert not run.health.warnings
+    bounded = m.simulate(2.0, outputs=outputs, method="impulse", max_step=4e-3)
+    assert bounded["b"].vx[-1] == pytest.approx(0.3, abs=1e-4)
     long = m.simulate(2.0, outputs=11, method=fb.Stepping(step=5e-3))
     lost = long.energy.total[0] - long.energy.total[-1]
     assert lost > 0.1 * long.energy.total[0]
@@ -228,3 +230,15 @@ def test_mean_force_of_a_power_law(n: float, change: float) -> None:
     found = mean_force(k, n, a, b)
     assert found[0] == pytest.approx(wanted[0], rel=1e-12)
     assert found[1] == pytest.approx(wanted[1], rel=1e-7)
+
+
+@pytest.mark.parametrize("height", [0.0, 1e6])
+def test_what_a_step_takes_is_judged_wherever_heights_are_counted_from(height: float) -> None:
+    """A step of 10 ms takes most of a ball's fall by 0.2 m in an impact of 2 ms."""
+    m = fb.Mechanism("ball", gravity=(0, 0, -G))
+    m.add(fb.Ground("floor", shape=fb.Plane(position=(0, 0, height))))
+    m.add(fb.Body("ball", shape=fb.Sphere(radius=R), mass=1, position=(0, 0, height + R + 0.2)))
+    m.add(fb.Contact(friction=0.3, law="hertz", stiffness=K))
+    run = m.simulate(1.0, outputs=11, method=fb.Stepping(step=1e-2))
+    assert run.energy.numerical_loss[-1] > 0.5 * G * 0.2
+    assert any("numerical_loss" in text for text in run.health.doubtful)

@@ -174,3 +174,20 @@ def test_a_smooth_blow_beside_the_centre_of_a_body_with_products_of_inertia(turn
     p = (1 + e) / (1 / 2 + arm @ turn)
     assert run["stone"].angular_velocity[1] == pytest.approx(p * turn, abs=1e-4)
     assert run["energy.kinetic"][-1] == pytest.approx(1 - p * 1 + 0.5 * p * p * (1 / 2 + arm @ turn), rel=1e-9)
+
+
+def test_impacts_that_do_not_end_within_a_step_are_told():
+    """A ball between two elastic walls 1 mm apart: ten impacts in 10 ms, none of which the method can end its step on."""
+
+    def rattling(step):
+        m = fb.Mechanism("rattling", gravity=(0, 0, 0))
+        m.add(fb.Ground("left", shape=fb.Plane(normal=(1, 0, 0))))
+        m.add(fb.Ground("right", shape=fb.Plane(normal=(-1, 0, 0), position=(0.201, 0, 0))))
+        m.add(fb.Body("ball", mass=1, shape=fb.Sphere(radius=0.1), position=(0.1005, 0, 0), velocity=(1, 0, 0)))
+        m.add(fb.Contact(friction=0, restitution=1))
+        return m.simulate(0.1, outputs=11, method=fb.Stepping(step=step))
+
+    long, short = rattling(1e-2), rattling(2e-4)
+    assert long.energy.kinetic[-1] < 0.1 and long.health.contact.endless > 0
+    assert any("the sequence of impacts did not end" in text for text in long.health.doubtful)
+    assert abs(short.energy.kinetic[-1] - 0.5) < 1e-12 and not short.health.warnings

@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from inspect import CO_VARARGS
-from types import BuiltinFunctionType, CellType, CodeType, FunctionType, ModuleType
+from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary, WeakValueDictionary, ref
 
@@ -197,8 +197,9 @@ def _outside(function: FunctionType, done: set[int]) -> tuple[Any, ...]:
             out.append((name, _outside(value, done)))
         elif isinstance(value, ModuleType):
             inside = [(k, value.__dict__[k]) for k in sorted(names) if k in value.__dict__]
+            out.append((name, value))
             out += [(name, k, _frozen(v)) for k, v in inside if isinstance(v, bool | int | float | tuple | np.ndarray)]
-        elif not isinstance(value, BuiltinFunctionType):
+        else:
             out.append((name, type(value), _frozen(value)))
     return tuple(out)
 
@@ -217,9 +218,11 @@ def _decisive(function: FunctionType, count: int, outside: tuple[Any, ...]) -> t
 
 
 def _frozen(value: Any) -> Any:
-    """A value as it is now: of an array a copy of its numbers, of a number all its bits."""
+    """A value as it is now: of an array a copy of its numbers, of a number all its bits and, in a tuple, its type."""
     if isinstance(value, float):
         return value.hex()
+    if isinstance(value, tuple):
+        return tuple((type(x), _frozen(x)) for x in value)
     return (value.dtype, value.shape, value.tobytes()) if isinstance(value, np.ndarray) else value
 
 

@@ -27,6 +27,7 @@ LARGEST_WHOLE_POWER = 64
 Corners = Callable[[Node], tuple[int, float]]
 """Of what decides (a node) the place of the number to be read, and its sign."""
 _TRUTHS = ("<", "<=", "and", "or", "not")
+_DECISIONS = frozenset(("abs", "sign", "min", "max", "where", "table", *_TRUTHS))
 DOMAINS: dict[str, tuple[tuple[str, float], ...]] = {
     "sqrt": (("<", 0.0),),
     "**": (("<", 0.0),),
@@ -55,8 +56,8 @@ def on_one_side(node: Node, moving: Collection[str], corners: Corners, taken: No
         return node
     if node.kind in _TRUTHS:
         return _truth(node, moving, corners)
-    if _smooth_square(node) or _signed_root(node):  # u |u|, sign(u) |u|**p: their slopes have no jump
-        return node
+    if smooth := _smooth_factors(node):
+        return _with_factors(node, smooth, lambda x: on_one_side(x, moving, corners, taken))
     if node.kind == "where":
         condition, a, b = node.args
         if not _moves(condition, moving):
@@ -196,20 +197,41 @@ def _side(node: Node, u: Node, corners: Corners) -> Node:
     return side if way > 0.0 else _made(node, "neg", side)
 
 
-def _smooth_square(node: Node) -> bool:
-    if node.kind != "*":
-        return False
-    a, b = node.args
-    return any(v.kind == "abs" and any(_same(v.args[0], x) for x in _factors(u)) for u, v in ((a, b), (b, a)))
+def _smooth_factors(node: Node) -> list[tuple[Any, ...]]:
+    """Factors of a product that stay as written, by what they mean: together they and their slope do not jump.
 
-
-def _signed_root(node: Node) -> bool:
-    """Whether a product is odd in u and zero with it: sign(u) times a power of abs(u) (the flow through an orifice)."""
+    These are ``abs(u)`` beside u, and ``sign(u)`` beside a positive power of ``abs(u)`` (the flow through an orifice),
+    where u makes no decision itself.
+    """
     factors = _factors(node) if node.kind == "*" else []
-    signs = [meaning(x.args[0]) for x in factors if x.kind == "sign"]
+    meant = [meaning(x) for x in factors]
     powers = [x for x in factors if x.kind == "sqrt" or (x.kind == "**" and _positive(x.args[1]))]
-    sizes = [y.args[0] for x in powers for y in _factors(x.args[0]) if y.kind == "abs"]
-    return len(signs) == 1 and any(meaning(u) == signs[0] for u in sizes)
+    found = []
+    for x in factors:
+        if x.kind == "abs" and not _decides(x.args[0]) and meaning(x.args[0]) in meant:
+            found.append(meaning(x))
+        if x.kind == "sign" and not _decides(x.args[0]):
+            size = ("abs", None, meaning(x.args[0]))
+            found += [y for p in powers if _is_power_of(p, size) for y in (meaning(x), meaning(p))]
+    return found
+
+
+def _is_power_of(power: Node, size: tuple[Any, ...]) -> bool:
+    """Whether the base of a power is this absolute value, perhaps times what makes no decision."""
+    factors = _factors(power.args[0])
+    return any(meaning(x) == size for x in factors) and not any(_decides(x) for x in factors if meaning(x) != size)
+
+
+def _with_factors(node: Node, kept: Collection[tuple[Any, ...]], change: Callable[[Node], Node]) -> Node:
+    """A product with all its factors changed but those that are kept."""
+    if node.kind in ("*", "neg"):
+        return _made(node, node.kind, *(_with_factors(x, kept, change) for x in node.args))
+    return node if meaning(node) in kept else change(node)
+
+
+def _decides(node: Node) -> bool:
+    """Whether there is a corner or a jump in it."""
+    return any(n.kind in _DECISIONS for n in node.walk())
 
 
 def _positive(node: Node) -> bool:
@@ -221,10 +243,6 @@ def _factors(node: Node) -> list[Node]:
     if node.kind == "*":
         return [x for arg in node.args for x in _factors(arg)]
     return _factors(node.args[0]) if node.kind == "neg" else [node]
-
-
-def _same(a: Node, b: Node) -> bool:
-    return meaning(a) == meaning(b)
 
 
 def meaning(node: Node) -> tuple[Any, ...]:

@@ -38,8 +38,8 @@ class ContactHealth:
     size : float [m]
         Of the smallest body that touches, which overlaps are compared with.
     halved, reduced, impacted, endless : int
-        Steps that were taken in shorter ones; impacts that gave back less than their law says, of how many; steps in
-        which impacts followed one another without end.
+        Steps that were divided; impacts that gave back less than their law says, of how many; steps in which the
+        sequence of impacts did not end.
     notes : tuple of str
         What else has to be said: a law of impacts that was softened, a position without unique forces (Painleve).
     """
@@ -83,8 +83,8 @@ class ContactHealth:
         out = []
         if self.endless:
             out.append(
-                f"in {self.endless} of {self.solves} steps impacts followed one another without end: shorter steps, "
-                f"method=fb.Stepping(step=...), leave fewer of them to each"
+                f"in {self.endless} of {self.solves} steps the sequence of impacts did not end, and what was left of it "
+                f"was taken as inelastic: take shorter steps, method=fb.Stepping(step=...), with fewer impacts in each"
             )
         if self.size > 0.0 and self.worst_overlap > max(PASSED * self.size, 1.01 * self.overlap_at_start):
             out.append(

@@ -30,7 +30,7 @@ FINE = 3e-2  # times the root of rtol, the same where rtol is so small that a di
 MOST, ROUGH = 1e-2, 5.0  # part of the energy moved that no number of steps excuses, or so many times a rough rtol
 ROUGHEST = 2e-2  # part of the energy moved that no tolerance excuses
 DISSIPATED = 0.1  # part of what impacts and friction dissipate, beside which a numerical loss changes a motion little
-SLIGHT = 1e-6  # part of the energy present that the rounding of solves may take where hardly anything moves
+SLIGHT = 1e-6  # part of the energy that lifts all bodies by one's size, which the residuals of solves may take at rest
 PIECES, ROWS = 64, 4  # stretches that the balance is judged by at most, and rows of output in each at least
 NEARLY = 0.99  # part of what is to be expected from which on a motion among many is looked at by itself
 LOOSE = 1e-5  # rtol above which each of many is
@@ -66,19 +66,31 @@ def of_impulses(result: Result) -> tuple[str, ...]:
     taken = result.energy.exchanged("numerical_loss")
     lost = float(np.max(np.abs(taken), initial=0.0))
     own = result.health.contact.doubts if result.health.contact else ()
-    present = np.max(np.abs(result.energy.kinetic) + np.abs(result.energy.potential), initial=0.0)
-    held = max(float(present), float(whole(result).weight * result.values.length))
+    moved = max(energy_moved(result), lost)
     losses = result.energy.exchanged("friction_loss") + result.energy.exchanged("impact_loss")
     dissipated = float(np.max(losses, initial=0.0))
-    if not lost > max(MOST * energy_moved(result), DISSIPATED * dissipated, SLIGHT * held):
+    if not lost > max(MOST * moved, DISSIPATED * dissipated, SLIGHT * _lifting(result)):
         return own
     what = "took" if taken[int(np.argmax(np.abs(taken)))] > 0.0 else "gave"
     text = (
         f"impulse time stepping itself {what} {lost:.2g} J (energy.numerical_loss), "
-        f"{100.0 * lost / energy_moved(result):.2g} per cent of the energy moved: take shorter steps, "
+        f"{100.0 * lost / moved:.2g} per cent of the energy moved: take shorter steps, "
         f"method=fb.Stepping(step=...)"
     )
     return (text, *own)
+
+
+def _lifting(result: Result) -> float:
+    """Energy [J] that lifts all bodies by the size of the smallest that touches: no origin of coordinates counts."""
+    if result.health.contact is None:
+        return 0.0
+    mass = float(sum(whole(result).mass)) + sum(float(b.mass.sum()) for b in result.bulk.values())
+    return mass * float(np.linalg.norm(result.values.system.glob[:3])) * result.health.contact.size
+
+
+def warnings_of_impulses(result: Result) -> tuple[str, ...]:
+    """All that there is to say about a motion by impulse time stepping."""
+    return (*result.health.remarks, *result.health.doubtful, *pulls(result))
 
 
 def balanced(result: Result) -> Any:

@@ -38,12 +38,13 @@ IN_THE_PLANE = {"fx": "fx", "fy": "fy", "tz": "torque"}
 class Struck(Mapping):
     """Element -> its impulse.
 
-    What acts along one coordinate (limits, ropes, friction, clutches, drivers, blows along a coordinate) has a number
-    [N s] or [N m s], and so has a coordinate that an event locks, by its name: it is part of what its joint carries. A
-    coupling has such a number for each of its coordinates, by their names. A joint has six: force and torque about M's
-    origin, on ``body_j``, world axes. A contact has ``normal``, ``friction`` (its size), and ``fx``, ``fy``, ``fz``,
-    the impulse on its second side, world axes. A blow on a body, by the name of its event, has ``fx`` to ``tz``, the
-    moment about the body's centre of mass; in the plane ``fx``, ``fy`` and ``torque``.
+    What acts along one coordinate (limits, ropes, friction, clutches, drivers, an event's ``Impulse`` along a
+    coordinate) has a number [N s] or [N m s], and so has a coordinate that an event locks, by its name: it is part of
+    what its joint carries. A coupling has such a number for each of its coordinates, by their names. A joint has six:
+    force and torque about the joint's point on ``body_j``, on that body, world axes. A contact has ``normal``,
+    ``friction`` (its magnitude), and ``fx``, ``fy``, ``fz``, the impulse on its second side, world axes. An event's
+    ``Impulse`` on a body, by the name of the event, has ``fx`` to ``tz``, the moment about the body's centre of mass;
+    in the plane ``fx``, ``fy`` and ``torque``.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ def finished(result: Result, parts: Sequence[Result]) -> Result:
     if isinstance(health.options.get("method"), Mapping):  # accelerations of steps by impulses are means
         health.late |= {
             "doubtful": partial(doubts.of_impulses, result),
-            "warnings": lambda: (*health.remarks, *health.doubtful),
+            "warnings": partial(doubts.warnings_of_impulses, result),
         }
         return result
     health.late |= {

@@ -14,7 +14,6 @@ from ....results import doubts
 from ....results.contact_health import ContactHealth
 from ....results.energy import EXCHANGED, STORED
 from ....results.health import Health
-from ....results.one_sided import pulls
 from ....results.result import Result
 from ....results.sides import Sides
 from ....stepping.solvers import told
@@ -82,7 +81,7 @@ def result_of(
         "mobility": partial(mobility, model, base),
         "energy_drift": lambda: result.energy.drift,
         "doubtful": lambda: doubts.of_impulses(result),
-        "warnings": lambda: (*result.health.remarks, *result.health.doubtful, *pulls(result)),
+        "warnings": lambda: doubts.warnings_of_impulses(result),
     }
     states = np.zeros((len(t), len(values.structure.states)))
     lam = np.zeros((len(t), len(values.system.row_i)))

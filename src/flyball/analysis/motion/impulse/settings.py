@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ....errors import ModelError
 from ....numerics.cone.registry import names
@@ -13,8 +14,6 @@ from ...options import count, positive, seconds
 RESTITUTION = ("poisson", "newton", "moreau")
 CONVEX_ONLY = ("barzilai-borwein",)
 IMPACTS = ("simultaneous", "sequential")
-USUAL = 5e-3
-"""Longest step [s] where none is given."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,8 +26,8 @@ class Stepping:
     Parameters
     ----------
     step : float or str [s], optional
-        Longest step; shorter where an output time asks for it. If not given, 5 ms, and where contacts that give way
-        collide as short as resolves that.
+        Longest step; steps are shortened so that they end at the output times. If not given it is 5 ms (or ``max_step``,
+        if that is less), and where compliant contacts collide steps are divided until they resolve the impact.
     solver : str
         Of the cone problem: ``auto`` (chosen for each island of bodies that touch), or one by name: see
         ``docs/contact_solvers.md``.
@@ -37,7 +36,8 @@ class Stepping:
     position_iterations : int, optional
         Most iterations of the solve for positions; the same.
     tolerance : float [m/s]
-        Residual of velocities that is enough; less in steps so short that gravity makes less than a hundred times that.
+        Residual of the velocities at which iterations stop. In very short steps it is a hundredth of the velocity that
+        gravity adds in the step, where that is less.
     coulomb : bool
         Coulomb's law. If not, the convex problem that approximates it, in which what slides floats up by friction
         coefficient times sliding speed times step.
@@ -56,6 +56,8 @@ class Stepping:
     coulomb: bool = True
     restitution: str = "poisson"
     impacts: str = "simultaneous"
+
+    usual: ClassVar[float] = 5e-3  # longest step [s] where none is given
 
     def __post_init__(self) -> None:
         if isinstance(self.step, str):
@@ -88,8 +90,12 @@ class Stepping:
     @property
     def longest(self) -> float:
         """The longest step [s]."""
-        return USUAL if self.step is None else float(self.step)
+        return self.usual if self.step is None else float(self.step)
 
     def bounded(self, longest: float) -> Stepping:
-        """With steps of at most ``longest`` seconds."""
-        return self if longest >= self.longest else dataclasses.replace(self, step=longest)
+        """With steps of at most ``longest`` seconds; where no step is given they may still be divided."""
+        if longest >= self.longest:
+            return self
+        made = dataclasses.replace(self, step=None if self.step is None else longest)
+        object.__setattr__(made, "usual", longest)
+        return made
