@@ -153,6 +153,19 @@ def test_a_stop_that_starts_violated_is_refused():
         m.simulate(0.1)
 
 
+@pytest.mark.parametrize(
+    "bounds", [{"lower": 0.1}, {"upper": 0.1}, {"lower": 0.1, "upper": 0.5}, {"lower": -0.5, "upper": 0.1}]
+)
+@layers
+def test_a_start_beyond_a_stop_by_rounding_is_put_on_it(bounds, coordinates):
+    """A slider without forces that begins 5e-7 m beyond its stop rests at it, and that is told."""
+    past = -5e-7 if bounds.get("lower") == 0.1 else 5e-7
+    m = slider(fb.Limit("stop", "guide.displacement", **bounds), height=0.1 + past, gravity=0.0)
+    r = run(m, 0.5, coordinates)
+    assert r["guide"].displacement == pytest.approx(0.1, abs=1e-12)
+    assert "overlaps by up to 5e-07" in " ".join(r.health.warnings)
+
+
 @pytest.mark.parametrize("stop", ["rope", "lower", "upper"])
 def test_an_elastic_stop_that_is_just_reached_at_rest_never_pulls(stop):
     """Pressed by F for T, then pulled: (F / k) (1 - cos w t), then -F / k + ..., and free from where it is zero again."""
