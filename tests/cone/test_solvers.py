@@ -13,6 +13,7 @@ from flyball.numerics.cone.diagonal import diagonal, diagonal_turning
 from flyball.numerics.cone.gauss_seidel import gauss_seidel
 from flyball.numerics.cone.jacobi import jacobi
 from flyball.numerics.cone.lean import lean
+from flyball.numerics.cone.operator import push, push_turning, seen, seen_turning
 from flyball.numerics.cone.problem import (
     BROKEN,
     CONVERGED,
@@ -24,11 +25,11 @@ from flyball.numerics.cone.problem import (
     MOST,
     RESIDUAL,
 )
-from flyball.numerics.cone.operator import push, push_turning, seen, seen_turning
 from flyball.numerics.cone.projection import projected_turning
 from flyball.numerics.cone.residual import residuals
 from flyball.numerics.cone.rooms import rooms
 from flyball.numerics.cone.solve import solve
+from flyball.numerics.cone.static import Cones
 from tests.cone.problems import KINDS, cone_lack, dense, impulses, random_problem
 
 GRADIENTS = {"jacobi": jacobi, "barzilai_borwein": barzilai_borwein, "apgd": apgd, "lean": lean}
@@ -227,6 +228,22 @@ def test_the_nearest_point_with_rolling_and_spinning_friction(bounds):
         assert most <= 1e-12
         inside += y[0] > 0.0
     assert inside > 20
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.4, 2.0])
+def test_the_nearest_forces_within_cones(mu):
+    """Those of a balance at rest: what is left is square on them, and has a positive part along no ray of the cone."""
+    n = 200
+    x = np.random.default_rng(3).standard_normal(3 + 2 + 3 * n + 1)
+    most = np.array([0.1])
+    y = Cones(3, np.array([1.0, -1.0]), np.full(n, mu), most).projected(x)
+    assert y[:3] == pytest.approx(x[:3], abs=0.0)
+    assert y[3:5] == pytest.approx([max(x[3], 0.0), min(x[4], 0.0)], abs=0.0)
+    assert y[-1] == np.clip(x[-1], -0.1, 0.1)
+    p, rest = y[5:-1].reshape(n, 3), (x - y)[5:-1].reshape(n, 3)
+    assert (np.hypot(p[:, 1], p[:, 2]) <= mu * p[:, 0] + 1e-14).all() and (p[:, 0] >= 0.0).all()
+    assert np.abs((p * rest).sum(axis=1)).max() < 1e-14
+    assert (rest[:, 0] + mu * np.hypot(rest[:, 1], rest[:, 2])).max() < 1e-14
 
 
 @pytest.mark.parametrize("name", SOLVERS)
