@@ -13,6 +13,7 @@ from flyball.numerics.cone.diagonal import diagonal, diagonal_turning
 from flyball.numerics.cone.gauss_seidel import gauss_seidel
 from flyball.numerics.cone.jacobi import jacobi
 from flyball.numerics.cone.lean import lean
+from flyball.numerics.cone.operator import push, push_turning, seen, seen_turning
 from flyball.numerics.cone.problem import (
     BROKEN,
     CONVERGED,
@@ -28,6 +29,7 @@ from flyball.numerics.cone.projection import projected_turning
 from flyball.numerics.cone.residual import residuals
 from flyball.numerics.cone.rooms import rooms
 from flyball.numerics.cone.solve import solve
+from flyball.numerics.cone.static import Cones
 from tests.cone.problems import KINDS, cone_lack, dense, impulses, random_problem
 
 GRADIENTS = {"jacobi": jacobi, "barzilai_borwein": barzilai_borwein, "apgd": apgd, "lean": lean}
@@ -113,6 +115,27 @@ def test_a_cut_solve_makes_no_energy(kind, name):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_what_velocities_contacts_see_and_impulses_change(kind):
+    """By the dense matrices: relative velocities D v, and changes of velocities K^-1 D' p, each of all contacts."""
+    P, X, *_ = random_problem(8, **KINDS[kind])
+    D, DK, *_ = dense(P, X)
+    r, rng = 6 if len(P.turn) else 3, np.random.default_rng(8)
+    v, wide = X.v.copy(), X.wide.copy()
+    before = np.concatenate([v[:, :6].ravel(), wide])
+    for c in range(P.size[0]):
+        rows = slice(c * r, c * r + r)
+        both = np.ravel([seen(P, X.v, X.wide, c), *([seen_turning(P, X.v, X.wide, c)] if r == 6 else [])])
+        np.testing.assert_allclose(both, (D @ before)[rows], atol=1e-13)
+        p = rng.standard_normal(r)
+        v[:], wide[:] = X.v, X.wide
+        push(P, v, wide, c, tuple(p[:3]))
+        if r == 6:
+            push_turning(P, v, wide, c, tuple(p[3:]))
+        change = np.concatenate([v[:, :6].ravel(), wide]) - before
+        np.testing.assert_allclose(change, DK[rows].T @ p, atol=1e-13)
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_diagonal_blocks_by_definition(kind):
     """What a contact's own impulses and torques change its own velocities by, as six numbers each, without compliance."""
     P, X, *_ = random_problem(8, **KINDS[kind])
@@ -159,6 +182,34 @@ def test_residuals_by_definition(kind, coulomb, seed):
     np.testing.assert_allclose(found, [max(rates), max(lack) / largest, b @ p, p @ N @ p], rtol=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("coulomb", [0, 1])
+def test_residuals_with_rolling_and_spinning_friction_by_definition(coulomb, seed):
+    """The same with torques as forces on an arm, the root of the ratio of the traces of both diagonal blocks."""
+    P, X, _, O, _ = random_problem(seed, **KINDS["rolling friction"])
+    _, DK, N, b = dense(P, X)
+    rng = np.random.default_rng(seed)
+    X.p[:], X.torque[:] = rng.standard_normal(X.p.shape) + (1, 0, 0), 0.3 * rng.standard_normal(X.p.shape)
+    p = impulses(P, X)
+    (v, wide), w = (X.v.copy(), X.wide.copy()), np.concatenate([X.v[:, :6].ravel(), X.wide]) + DK.T @ p
+    v[:, :6], wide[:] = w[: v[:, :6].size].reshape(-1, 6), w[v[:, :6].size :]
+    O.count[COULOMB] = coulomb
+    found = residuals(P, X, O, (v, wide, X.v, X.wide))
+    u, lack, rates = N @ p + b, [], []
+    for c in range(P.size[0]):
+        k, q = slice(6 * c, 6 * c + 3), slice(6 * c + 3, 6 * c + 6)
+        size, arm = 3 / np.trace(N[k, k]), np.sqrt(np.trace(N[k, k]) / np.trace(N[q, q]))
+        mu, rho, sigma = P.mu[c], P.turn[c, 0] / arm, P.turn[c, 1] / arm
+        force, torque, rate, turn = p[k], p[q] / arm, u[k], arm * u[q]
+        slip = mu * np.linalg.norm(rate[1:]) + rho * np.linalg.norm(turn[1:]) + sigma * abs(turn[0])
+        to = force - size * (rate + (coulomb * slip, 0, 0)), torque - size * turn
+        near = projected_turning(mu, rho, sigma, 0.0, *map(tuple, to))
+        lack.append(np.linalg.norm(np.ravel(near) - np.r_[force, torque]))
+        rates.append(lack[-1] / size)
+    largest = np.linalg.norm(X.p, axis=1).max()
+    np.testing.assert_allclose(found, [max(rates), max(lack) / largest, b @ p, p @ N @ p], rtol=1e-12)
+
+
 @pytest.mark.parametrize("bounds", [(0.5, 0.2, 0.05), (0.3, 0.02, 0.4), (1.5, 0.7, 0.7)])
 def test_the_nearest_point_with_rolling_and_spinning_friction(bounds):
     """What is left is square on it, and has a positive part along no ray of the cone (Moreau's decomposition)."""
@@ -177,6 +228,22 @@ def test_the_nearest_point_with_rolling_and_spinning_friction(bounds):
         assert most <= 1e-12
         inside += y[0] > 0.0
     assert inside > 20
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.4, 2.0])
+def test_the_nearest_forces_within_cones(mu):
+    """Those of a balance at rest: what is left is square on them, and has a positive part along no ray of the cone."""
+    n = 200
+    x = np.random.default_rng(3).standard_normal(3 + 2 + 3 * n + 1)
+    most = np.array([0.1])
+    y = Cones(3, np.array([1.0, -1.0]), np.full(n, mu), most).projected(x)
+    assert y[:3] == pytest.approx(x[:3], abs=0.0)
+    assert y[3:5] == pytest.approx([max(x[3], 0.0), min(x[4], 0.0)], abs=0.0)
+    assert y[-1] == np.clip(x[-1], -0.1, 0.1)
+    p, rest = y[5:-1].reshape(n, 3), (x - y)[5:-1].reshape(n, 3)
+    assert (np.hypot(p[:, 1], p[:, 2]) <= mu * p[:, 0] + 1e-14).all() and (p[:, 0] >= 0.0).all()
+    assert np.abs((p * rest).sum(axis=1)).max() < 1e-14
+    assert (rest[:, 0] + mu * np.hypot(rest[:, 1], rest[:, 2])).max() < 1e-14
 
 
 @pytest.mark.parametrize("name", SOLVERS)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from scipy.optimize import brentq
 
 import flyball as fb
 from tests.control.slide import TIGHT, slide
@@ -296,3 +297,17 @@ def test_outputs_of_systems_keep_their_names():
     assert linear.C[0][linear.states.index("K.x")] == pytest.approx(2.0)
     with pytest.raises(fb.ModelError, match=r"has several outputs; name one: L\.fast, L\.slow"):
         slide(fb.StateSpace.from_control("L", two, inputs=["1"]), force="L")
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+def test_an_integral_is_held_at_zero_by_a_law_of_its_own_sign(coordinates):
+    """c' = -sign(c) + sin(t) / 2: c = 0.3 - t + (1 - cos(t)) / 2 down to zero, where it stays; it is a force on 1 kg."""
+    m = fb.Mechanism("held", planar=True, gravity=(0, 0))
+    m.add(fb.Body("b", mass=1.0, inertia=1.0), fb.Prismatic("P", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Integrator("c", of="-sign(c.output) + 0.5*sin(t)", initial=0.3))
+    m.add(fb.PointForce("f", "b", force=("c.output", 0)))
+    end = brentq(lambda t: 0.3 - t + 0.5 * (1 - np.cos(t)), 0.0, 1.0)
+    r = m.simulate(2.0, outputs=21, coordinates=coordinates, rtol=1e-10, atol=1e-12)
+    t = np.minimum(r.t, end)
+    assert r["c"].output == pytest.approx(np.where(r.t < end, 0.3 - t + 0.5 * (1 - np.cos(t)), 0.0), abs=1e-9)
+    assert r["b.vx"] == pytest.approx(0.8 * t - 0.5 * t**2 - 0.5 * np.sin(t), abs=1e-9)

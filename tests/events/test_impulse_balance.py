@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.results.struck import Struck, summed
 from flyball.tables.system import INERTIA, MASS
 from tests.layers import both_layers
 
@@ -178,6 +179,15 @@ def test_both_corners_of_a_sliding_box():
 def run_table(m):
     pytest.importorskip("pandas")
     return m.simulate(0.01).events.to_dataframe()
+
+
+def test_jumps_that_follow_one_another_are_one():
+    """Of elements, of rows and of what was given."""
+    blows = [("along", 0, 1.0, "blow")], [("along", 1, 4.0, "other")]
+    first = Struck({"stop": 1.0}, np.array([1.0, 2.0]), blows[0])
+    second = Struck({"stop": 0.5, "rope": 2.0}, np.array([0.5, -1.0]), blows[1])
+    both = summed([first, second]).plain()
+    assert both == {"own": {"stop": 1.5, "rope": 2.0}, "rows": [1.5, 1.0], "blows": (*blows[0], *blows[1])}
 
 
 @both_layers

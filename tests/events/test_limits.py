@@ -110,13 +110,28 @@ def test_a_damped_buffer_lets_go_before_it_pulls(coordinates):
     assert np.abs(r.energy.balance).max() < 1e-8
 
 
+@pytest.mark.parametrize(("lower", "upper"), [(-1.0, 1.0), (-1.1, 0.7), (-0.3, 1.9)])
 @layers
-def test_between_two_stops_without_loss(coordinates):
-    """To and fro at constant speed: hits at even times, all found."""
-    m = slider(fb.Limit("walls", "guide.displacement", lower=-1, upper=1, restitution=1), gravity=0.0, speed=3.0)
+def test_between_two_stops_without_loss(coordinates, lower, upper):
+    """To and fro at constant speed: hits at even times, all found, and no others."""
+    m = slider(fb.Limit("walls", "guide.displacement", lower=lower, upper=upper, restitution=1), gravity=0.0, speed=3.0)
     r = run(m, 20.0, coordinates)
-    assert times(r, "walls") == pytest.approx((1 + 2 * np.arange(30)) / 3, abs=1e-8)
+    hits = (upper + (upper - lower) * np.arange(40)) / 3
+    assert times(r, "walls") == pytest.approx(hits[hits < 20.0], abs=1e-8)
     assert np.abs(r["guide"].rate) == pytest.approx(3.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@layers
+def test_a_stop_lets_go_where_the_push_on_it_ends(coordinates, side):
+    """Pressed by 2 kg times (1 - t): from 1 s on it goes with (t - 1)^3 / 6, away from the stop."""
+    place = 0.1 * side
+    stop = fb.Limit("stop", "guide.displacement", **{"upper" if side > 0 else "lower": place})
+    push = fb.PointForce("push", "block", force=(0, f"{2.0 * side} * (1 - t)"))
+    r = run(slider(stop, push, gravity=0.0, height=place), 2.0, coordinates, outputs=21)
+    after = np.maximum(r.t - 1.0, 0.0)
+    assert r["guide"].displacement == pytest.approx(place - side * after**3 / 6, abs=1e-9)
+    assert np.abs(r["stop"].force) == pytest.approx(2.0 * np.maximum(1.0 - r.t, 0.0), abs=1e-8)
 
 
 def test_world_coordinate_of_a_body():
@@ -151,6 +166,19 @@ def test_a_stop_that_starts_violated_is_refused():
     m = slider(fb.Limit("floor", "guide.displacement", lower=0.1), height=0.05)
     with pytest.raises(fb.FlyballError, match=r"Limit 'floor'.*0\.05.*0\.1"):
         m.simulate(0.1)
+
+
+@pytest.mark.parametrize(
+    "bounds", [{"lower": 0.1}, {"upper": 0.1}, {"lower": 0.1, "upper": 0.5}, {"lower": -0.5, "upper": 0.1}]
+)
+@layers
+def test_a_start_beyond_a_stop_by_rounding_is_put_on_it(bounds, coordinates):
+    """A slider without forces that begins 5e-7 m beyond its stop rests at it, and that is told."""
+    past = -5e-7 if bounds.get("lower") == 0.1 else 5e-7
+    m = slider(fb.Limit("stop", "guide.displacement", **bounds), height=0.1 + past, gravity=0.0)
+    r = run(m, 0.5, coordinates)
+    assert r["guide"].displacement == pytest.approx(0.1, abs=1e-12)
+    assert "overlaps by up to 5e-07" in " ".join(r.health.warnings)
 
 
 @pytest.mark.parametrize("stop", ["rope", "lower", "upper"])

@@ -41,6 +41,20 @@ def test_a_pendulum_on_a_rope_goes_slack_over_the_top_and_taut_again(coordinates
 
 
 @layers
+def test_a_pendulum_that_begins_over_the_top_is_held_by_its_speed(coordinates):
+    """m (v^2 / l - g) at first, though gravity alone would let the rope go slack; six times m g more at the bottom."""
+    l, mass = 0.8, 1.2
+    v = np.sqrt(1.5 * G * l)
+    m = fb.Mechanism("rope", planar=True, gravity=(0, -G))
+    m.add(fb.Body("bob", mass=mass, inertia=0.01, position=(0, l), velocity=(v, 0)))
+    m.add(fb.Rope("rope", ("ground", "bob"), at=((0, 0), (0, l))))
+    bottom = quad(lambda a: l / np.sqrt(v**2 + 2 * G * l * (1 - np.cos(a))), 0, np.pi, epsabs=1e-13)[0]
+    r = run(m, bottom, coordinates, outputs=[0.0, bottom])
+    assert r["rope"].tension == pytest.approx([mass * (v**2 / l - G), mass * (v**2 / l + 5 * G)], rel=1e-8)
+    assert not len(times(r, "rope"))
+
+
+@layers
 def test_atwoods_rope_slack_and_taut_again(coordinates):
     """The heavy load stops dead: the light one flies for 2 v / g, and takes it up again with m2 / (m1 + m2) of v."""
     m1, m2, height, top = 3.0, 2.0, 0.6, 9.0

@@ -182,6 +182,14 @@ def test_in_a_mechanism_of_a_millimetre_a_tenth_of_a_nanometre_is_elsewhere(laye
     m.add(fb.Event("up", "t - 0.003", do=fb.Set("lo", 1e-10)))
     with pytest.raises(fb.SimulationError, match=r"would put Limit 'floor' elsewhere in no time, by 1e-10 m"):
         m.simulate(0.01, coordinates=layer)
+    for law, what in (("a", "elsewhere in no time, by 1e-10"), ("a*(t - 0.003)", "velocity of .* by 1e-14")):
+        m = mechanism(a=0.0)
+        m.add(fb.Body("p", mass=1e-6, inertia=1e-13), fb.Body("q", mass=1e-6, inertia=1e-13, position=(1e-3, 0)))
+        m.add(fb.Fixed("A", "ground", "q", at=(0, 0)), fb.Prismatic("P", "ground", "p", at=(0, 0), axis=(1, 0)))
+        new = 1e-10 if law == "a" else 1e-14
+        m.add(fb.Driver("D", "P.displacement", law), fb.Event("more", "t - 0.003", do=fb.Set("a", new)))
+        with pytest.raises(fb.SimulationError, match=what):
+            m.simulate(0.01, coordinates=layer)
 
 
 def test_what_touches_keeps_its_size(layer):

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
 import flyball as fb
+from flyball.analysis.motion.events import slips
+from flyball.analysis.motion.events.instant import Part
+from flyball.constraints.modes import SLIP
+from flyball.equations.sliding import FIRST, FRESH, direction
+from flyball.numerics.cone.dense.problem import EVEN, PUSHES, TURNS, WITH
+from flyball.tables.system import SWITCH_SLIDING
 
 G = 9.81
 TIGHT = {"method": "dop853", "rtol": 1e-11, "atol": 1e-12}
@@ -272,3 +280,48 @@ def test_a_ball_goes_round_another(at):
     run = m.simulate(0.01, outputs=2, **TIGHT)
     (place,) = (e.name for e in run.model.forces if e.name != "push")
     assert run[place].normal[0] == pytest.approx(3 - 2 * 0.4**2 / 0.2, abs=1e-12)
+
+
+def slipping(rate, way, length=0.2):
+    """What the rules of slips at an instant read of one place, whose slips are switches 1 and 2."""
+    values = SimpleNamespace(values=SimpleNamespace(length=length))
+    rates = np.array([0.0, *rate])
+    here = SimpleNamespace(c=values)
+    return SimpleNamespace(rate=rates, way=np.array([0.0, *way]), still=np.full(3, 1e-12), here=here)
+
+
+@pytest.mark.parametrize("speed", [1.0, 1e-3, -1e-3])
+def test_a_straight_slip_keeps_its_direction_past_rest(speed):
+    """Friction is smooth up to the instant at which a slip ends: past it the speed along the same direction is negative."""
+    d = np.array([0.6, -0.8])
+    assert direction(1.0, tuple(d), tuple(speed * d)) == pytest.approx((*d, speed), rel=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_instants_take_the_direction_of_a_motion_for_what_has_just_begun_to_slide(seed):
+    rng = np.random.default_rng(seed)
+    a = rng.uniform(0.0, 2 * np.pi)
+    way, u = FRESH * np.array([np.cos(a), np.sin(a)]), 0.2 * FIRST * rng.normal(size=2)
+    u *= np.sign(way @ u)
+    found = slips._heading(slipping(u, way), [1, 2])
+    assert found == pytest.approx(np.ravel(direction(0.2, tuple(way), tuple(u))[:2]), abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("speed", "faster", "begins"), [(0.0, 1.0, True), (1e-6, 1.0, True), (1e-6, -1.0, False), (1e-2, 1.0, False)]
+)
+def test_a_slip_begins_that_is_slow_and_gets_faster(speed, faster, begins):
+    d = np.array([0.6, 0.8])
+    assert slips._begins(slipping(speed * d, (0.0, 0.0)), [1, 2], d, faster * d) == begins
+
+
+def test_a_slip_is_let_go_with_the_friction_that_it_held():
+    """At the edge of its cone: 3 N of 0.3 times 10 N."""
+    x, mu = np.array([10.0, 1.8, -2.4]), 0.3
+    table = np.zeros((3, SWITCH_SLIDING + 1))
+    table[1:, SWITCH_SLIDING] = mu
+    n = SimpleNamespace(fired=lambda guards, *kinds: {1}, kind=[0, SLIP, SLIP], S=SimpleNamespace(switch_x=table))
+    parts = [Part(0, PUSHES), Part(1, TURNS, gain=mu, of=0), Part(2, WITH, gain=mu, of=0)]
+    found = x, np.full(3, EVEN), np.array([np.inf, 3.0, 3.0]), np.full(3, 1e-9)
+    out = slips.loose(n, parts, found, np.zeros(0, int))
+    assert [-p.gain * x[0] * p.lean for _, p in sorted(out.items())] == pytest.approx(x[1:], rel=1e-14)

@@ -55,22 +55,23 @@ def oscillator(k):
     return m
 
 
-def recursion(k, h, n, rho):
+def recursion(k, widths, rho):
     """Positions of m x'' = - k x by the formulas of Chung and Hulbert (1993), a being x'' at t + (am - af) h at first."""
     am, af = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
     gamma = 0.5 - am + af
     beta = 0.25 * (gamma + 0.5) ** 2
     x, v = 0.0, 0.5
-    true = -k * x
-    a = true + (am - af) * h * (-k * v)
+    true, last = -k * x, widths[0]
+    a = true + (am - af) * last * (-k * v)
     out = [x]
-    for _ in range(n):
+    for h in widths:
+        a = true + (a - true) * h / last  # at t + (am - af) h of another width, by the same rate
         # x1 = p + beta h^2 a1, (1 - am) a1 + am a = - (1 - af) k x1 + af x''
         p = x + h * v + (0.5 - beta) * h * h * a
         new = (-(1 - af) * k * p + af * true - am * a) / (1 - am + (1 - af) * k * beta * h * h)
         x = p + beta * h * h * new
         v += h * ((1 - gamma) * a + gamma * new)
-        a, true = new, -k * x
+        a, true, last = new, -k * x, h
         out.append(x)
     return np.array(out)
 
@@ -80,18 +81,38 @@ def recursion(k, h, n, rho):
 def test_steps_are_those_of_the_formulas(rho, k):
     """An oscillator that steps resolve, and one of a thousand periods a step: what of it is left after each is rho."""
     r = oscillator(k).simulate(0.5, outputs=51, method=ALPHA, rho_inf=rho, step=0.01, rtol=1e-10)
-    expected = recursion(k, 0.01, 50, rho)
+    expected = recursion(k, [0.01] * 50, rho)
     assert np.abs(r["x"].position[:, 0] - expected).max() < 1e-5 * np.abs(expected).max()
     if k > 1e9 and rho == 0.5:
         assert np.abs(r["x"].position[-1, 0]) < 1e-10 * np.abs(r["x"].position[:5, 0]).max()
 
 
-def test_a_body_that_spins_about_a_fixed_axis_is_exact():
-    """Increments are of the exponential map: at a tenth of a turn each step no error but rounding."""
-    m = free_body(inertia=(1.0, 1.0, 2.0), w=(0.0, 0.0, 10.0))
-    r = m.simulate(5.0, outputs=6, method=ALPHA, step=0.05, rtol=1e-13)
+@pytest.mark.parametrize("rho", [1.0, 0.5, 0.0])
+def test_a_last_step_that_is_narrower(rho):
+    r = oscillator(100.0).simulate(0.104, outputs=[0.104], method=ALPHA, rho_inf=rho, step=0.01, rtol=1e-13)
+    assert r["x"].position[-1, 0] == pytest.approx(recursion(100.0, [0.01] * 10 + [0.004], rho)[-1], abs=1e-14)
+
+
+@pytest.mark.parametrize("method", [ALPHA, "variational"])
+@pytest.mark.parametrize("n", [10, 20])
+def test_works_are_those_of_the_trapezoidal_rule(method, n):
+    """A torque 6 t on 2 kg m^2: the rate 3 t^2 / 2 is exact, and the work 9 t^4 / 4 becomes 9 (1 + h^2) / 4 at 1 s."""
+    m = fb.Mechanism("wheel", planar=True)
+    m.add(fb.Body("b", mass=1.0, inertia=2.0), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    m.add(fb.Motor("M", "A", torque="6*t"))
+    r = m.simulate(1.0, outputs=[1.0], method=method, step=1.0 / n, rtol=1e-13)
+    assert r["A"].rate[-1] == pytest.approx(1.5, rel=1e-13)
+    assert r["M"].work[-1] == pytest.approx(2.25 * (1.0 + 1.0 / n**2), rel=1e-11)
+
+
+@pytest.mark.parametrize("method", [ALPHA, "variational"])
+@pytest.mark.parametrize("w", [10.0, 0.02])
+def test_a_body_that_spins_about_a_fixed_axis_is_exact(method, w):
+    """Increments are of the exponential map: at up to a tenth of a turn each step no error but rounding."""
+    m = free_body(inertia=(1.0, 1.0, 2.0), w=(0.0, 0.0, w))
+    r = m.simulate(5.0, outputs=6, method=method, step=0.05, rtol=1e-13)
     x = r[m.bodies[0].name].rotation[:, :, 0]
-    assert np.abs(x - np.column_stack([np.cos(10 * r.t), np.sin(10 * r.t), 0 * r.t])).max() < 1e-11
+    assert np.abs(x - np.column_stack([np.cos(w * r.t), np.sin(w * r.t), 0 * r.t])).max() < 1e-11
 
 
 @pytest.mark.parametrize("name", ["governor.toml", "chaplygin_sleigh.toml", "rolling_disk.toml", "heavy_top.toml"])

@@ -20,6 +20,7 @@ from flyball.equations.within import ROWS
 from flyball.numerics.integrators import clock as ex
 from flyball.numerics.integrators.tableaux import tableau
 from flyball.special import keeping
+from flyball.special.recorder import Recorder
 from flyball.tables.system import (
     EFFORT,
     F_APPLIED,
@@ -158,6 +159,18 @@ def test_a_moment_on_a_body_without_inertia():
     same(m, "absolute")
 
 
+def test_what_is_taken_for_granted_is_checked():
+    """A procedure whose pivot is zero returns a number greater than none, by which the loops go on."""
+    x, _ = values_of(example("andrews.toml"))
+    r = Recorder(x.structure, x.system)
+    pivots = [r.graph.symbol(name) for name in "ab"]
+    assert all(y.granted("nonzero") for y in pivots)
+    p = r.add("FACTOR", {y.index: ("a", k) for k, y in enumerate(pivots)}, [])
+    assert [(nodes, what) for nodes, what, _ in p.checks] == [([y], "nonzero") for y in pivots]
+    assert all(number > 0.0 for *_, number in p.checks)
+    assert not r.add("LOADS", {}, []).checks
+
+
 def test_other_values_run_the_same_code():
     m = example("andrews.toml")
     made, _ = same(m, "joint")
@@ -174,6 +187,17 @@ def test_a_zero_is_other_code():
     x, _ = values_of(m)
     other, _ = values_of(m, parameters={"stiffness": 0.0})
     assert special.plan(other).key != special.plan(x).key
+
+
+def test_code_is_known_by_the_values_that_formulas_decided_by():
+    """Of the same entries other values are another digest, others' values are not."""
+    m = example("andrews.toml")
+    x, other = (values_of(m, parameters=p)[0].system for p in (None, {"stiffness": 9000.0}))
+    changed = [("force_x", int(k)) for k in np.flatnonzero(x.force_x.ravel() != other.force_x.ravel())]
+    same = [("body_x", k) for k in range(4)]
+    assert changed
+    assert keeping.digest(x, changed) != keeping.digest(other, changed)
+    assert keeping.digest(x, same) == keeping.digest(other, same)
 
 
 def test_files_on_disk(tmp_path, monkeypatch):

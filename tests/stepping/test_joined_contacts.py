@@ -1,9 +1,15 @@
 """Contacts on mechanisms: joints stay closed at any mass ratio, impulses are those of closed forms, momentum stays."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import flyball as fb
+from flyball.contact.tables import MOVER, SHAPE_1, SHAPE_2
+from flyball.stepping.joined import FIRST
+from flyball.stepping.lifts import change_of_gap
 from tests.layers import LAYERS
 
 from .stepped import Stepped
@@ -106,3 +112,44 @@ def test_jointed_bodies_that_meet_in_space_keep_their_momentum(coordinates):
     assert not np.allclose(s.twist("a")[0], 0.0)
     assert after[0] == pytest.approx(P, abs=1e-12 if coordinates == "absolute" else 1e-3)
     assert after[1] == pytest.approx(L, abs=1e-3)
+
+
+@pytest.mark.parametrize("coordinates", LAYERS)
+def test_jaws_that_close_on_each_other(coordinates):
+    """Two floating bodies on one hinge, which turn towards each other with w and -w and meet: both then go on without.
+
+    Momentum m w along each axis stays; moment of momentum about the centre is none, before as after.
+    """
+    w, mass, inertia = 2.0, 3.0, 0.4
+    m = fb.Mechanism("jaws", planar=True)
+    m.add(fb.Body("a", mass=mass, inertia=inertia, position=(1.0, 0.0), velocity=(0.0, w), angular_velocity=w))
+    m.add(fb.Body("b", mass=mass, inertia=inertia, position=(0.0, 1.0), velocity=(w, 0.0), angular_velocity=-w))
+    m.add(fb.Revolute("hinge", "a", "b", at=(0.0, 0.0)))
+    way = np.array([-1.0, 1.0, 0.0]) / np.sqrt(2)
+    s = Stepped(m, 1e-7, coordinates, 1, lambda M: [(0, 1, (1.0, 1.0, 0.0), way, 0.0, 0.0)])
+    s.step()
+    for name in "ab":
+        v, turning = s.twist(name)
+        assert v == pytest.approx([w / 2, w / 2, 0.0], abs=1e-5)
+        assert turning == pytest.approx(np.zeros(3), abs=1e-5)
+
+
+def test_what_closing_joints_does_to_a_gap():
+    """The way of one body's point less that of the other's, along the normal, for small turns about any axis."""
+    rng = np.random.default_rng(5)
+    normal, arms = np.array([0.6, 0.0, 0.8]), rng.normal(size=(2, 3))
+    before, after, ways = np.zeros((2, 12)), np.zeros((2, 12)), []
+    for k in range(2):
+        R, turn = Rotation.random(random_state=k), Rotation.from_rotvec(1e-6 * rng.normal(size=3))
+        place, shift = rng.normal(size=3), 1e-6 * rng.normal(size=3)
+        before[k] = np.r_[place, R.as_matrix().ravel()]
+        after[k] = np.r_[place + shift, (turn * R).as_matrix().ravel()]
+        ways.append(shift + turn.apply(arms[k]) - arms[k])
+    shapes, at = np.zeros((2, MOVER + 1), np.int64), np.zeros((1, 4), np.int64)
+    shapes[:, MOVER] = 0, 1
+    at[0, [SHAPE_1, SHAPE_2]] = 0, 1
+    A = SimpleNamespace(pose=before, count=np.zeros(FIRST + 1, np.int64))
+    P = SimpleNamespace(frame=np.r_[normal, np.zeros(6)][None], arm=arms.reshape(1, 6))
+    M, C = SimpleNamespace(pose=after), SimpleNamespace(at=at)
+    found = change_of_gap(SimpleNamespace(shape_i=shapes), A, M, C, P, 0)
+    assert found == pytest.approx(normal @ (ways[1] - ways[0]), abs=1e-11)

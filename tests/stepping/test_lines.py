@@ -62,6 +62,21 @@ def test_a_slide_bounces_off_its_stop(e, side):
     assert s.A.real[LOST] == pytest.approx(1 - e * e, abs=1e-9)
 
 
+@pytest.mark.parametrize("z", [0.1, 2.0, 100.0])
+@pytest.mark.parametrize("coordinates", LAYERS)
+def test_what_stops_a_damped_cart(coordinates, z):
+    """Impulse of a stop: m v less what the damper takes, h c (1 - b) v / 2, z = h c / m, b = (z/4)^2 / (1 + (z/4)^2)."""
+    h, mass, v = 0.01, 2.0, 1.5
+    m = fb.Mechanism("slide", planar=True, gravity=(0, 0))
+    m.add(fb.Body("cart", mass=mass, inertia=1.0, velocity=(v, 0)))
+    m.add(fb.Prismatic("A", "ground", "cart", at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("d", "A.displacement", damping=z * mass / h))
+    s = Stepped(m, h, coordinates, stops={"d": (-np.inf, 0.0, 0.0)})
+    s.step()
+    b = (z / 4) ** 2 / (1 + (z / 4) ** 2)
+    assert s.X.line.sum() == pytest.approx(mass * v * (1 - (1 - b) * z / 2), rel=1e-7)
+
+
 @pytest.mark.parametrize("share", [0.5, 1.5])
 def test_friction_in_a_bearing_holds_or_slips(share):
     """A wheel on a shaft under a torque of a share of mu r N; it sticks without creep, or turns at (T - mu r N) / I."""
@@ -100,6 +115,23 @@ def test_a_rope_of_any_stiffness_carries_a_ball(ratio):
     assert max(energy) < 1e-2
     if ratio >= 10:
         assert stretch < 2e-3
+
+
+@pytest.mark.parametrize("ratio", [1e2, 1e4])
+def test_a_ball_that_circles_on_a_stiff_rope(ratio):
+    """Its stretch is m v^2 / (k r), and tells nothing of the way by which an arc is longer than its chord."""
+    h, v = 0.005, 2.0
+    k = ratio / h**2
+    r = 0.5 + np.sqrt(0.25 + v * v / k)  # k (r - 1) = m v^2 / r
+    m = hanging(r, velocity=(0, v))
+    m.gravity = (0, 0)
+    m.add(fb.Rope("rope", ["ground", "bob"], at=[(0, 0), (r, 0)], stiffness=k, length=1.0))
+    s = Stepped(m, h)
+    stretch = []
+    for _ in range(200):
+        s.step()
+        stretch.append(np.hypot(*s.q[:2]) - 1.0)
+    assert np.abs(np.array(stretch) - (r - 1.0)).max() < 1e-2 * (h * v) ** 2
 
 
 def test_a_damped_rope_is_a_damped_spring_as_long_as_it_is_taut():

@@ -9,9 +9,11 @@ import flyball as fb
 from flyball.contact.tables import BEFORE, FOUND, Contacts
 from flyball.numerics.cone.operator import across
 from flyball.numerics.cone.rooms import rooms, unfilled
+from flyball.stepping.bounce import expand
 from flyball.stepping.record import book, book_turning
 from flyball.stepping.rows import warm
-from flyball.stepping.tables import COUNTS, REALS, TRACKS, Pace
+from flyball.stepping.tables import BEFORE_KICK, COUNTS, REALS, REDUCED, TRACKS, TURNED_BEFORE, Pace
+from tests.cone.problems import KINDS, dense, random_problem
 
 G, R, RHO, SIGMA = 9.81, 0.1, 0.002, 0.001
 
@@ -61,6 +63,39 @@ def test_what_torques_take_in_impacts_is_frictions_too(restitution: float, law: 
     assert run.energy.friction_loss[-1] > 0.9
     assert np.abs(run.energy.balance).max() < (1e-5 if held else 1e-12)
     assert np.diff(run.energy.total).max() < (1e-5 if held else 1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_expansion_goes_as_far_as_the_energy_before_the_impact(seed: int) -> None:
+    """With torques of rolling and spinning friction: kinetic energy by masses and inertias, to rounding."""
+    P, X, *_ = random_problem(seed, **KINDS["rolling friction"])
+    Z, E = rooms(P)[0], rooms(P)[0]
+    nc, nodes = P.size[0], P.size[1]
+    D, DK, *_ = dense(P, X)
+    rng, first = np.random.default_rng(seed), X.v[:, :6].ravel().copy()
+
+    def kinetic(v: np.ndarray) -> float:
+        total = 0.0
+        for (inverse, xx, yy, zz, xy, xz, yz), u in zip(P.node[:, :7], v.reshape(nodes, 6), strict=True):
+            turning = np.linalg.inv([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            total += 0.5 * (u[:3] @ u[:3] / inverse + u[3:] @ turning @ u[3:])
+        return total
+
+    seen = (D @ first).reshape(nc, 6)
+    now, pace = np.zeros((nc, TRACKS)), Pace(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(8, np.int64))
+    now[:, BEFORE_KICK : BEFORE_KICK + 3], now[:, TURNED_BEFORE : TURNED_BEFORE + 3] = seen[:, :3], seen[:, 3:]
+    lost = -0.02 * seen.ravel()  # against what the contacts see: energy is lost
+    more = 2.0 * rng.standard_normal((nc, 6))
+    Z.p[:], Z.torque[:] = lost.reshape(nc, 6)[:, :3], lost.reshape(nc, 6)[:, 3:]
+    E.p[:], E.torque[:] = more[:, :3], more[:, 3:]
+    X.v[:, :6] = (first + DK.T @ lost).reshape(nodes, 6)
+    E.v[:, :6] = X.v[:, :6] + (DK.T @ more.ravel()).reshape(nodes, 6)
+    C = Contacts(np.zeros(8, np.int64), np.zeros((nc, 4), np.int64), np.zeros((nc, 8)))
+    C.count[FOUND] = nc
+    assert kinetic(X.v[:, :6].ravel()) < kinetic(first) < kinetic(E.v[:, :6].ravel())
+    expand(P, np.zeros((nc, 3)), Z, E, X, C, pace, now)
+    assert kinetic(X.v[:, :6].ravel()) == pytest.approx(kinetic(first), rel=1e-12)
+    assert pace.count[REDUCED] == 1
 
 
 def test_impulses_and_torques_of_the_step_before_follow_their_contacts() -> None:

@@ -8,7 +8,9 @@ import pytest
 
 import flyball as fb
 from flyball.errors import ModelError
+from flyball.graph.node import Graph
 from flyball.graph.values import reached
+from flyball.tracing.model import parameters
 from tests import mechanisms
 from tests.contract import zoo
 from tests.examples.test_examples import EQUATIONS
@@ -221,3 +223,10 @@ def test_why_these_coordinates_is_told():
     m = mechanisms.four_bar()
     assert m.symbolic().coordinates.startswith("joint: these make the fewest equations")
     assert m.symbolic(coordinates="joint").coordinates.startswith("joint: as asked for")
+
+
+def test_parameters_with_a_unit_are_symbols_and_derived_ones_are_expressions_of_them():
+    m = fb.Mechanism("o", planar=True, parameters={"k": "100 N/m", "x": 0.1, "n": "3", "twice": "2*k"})
+    found = parameters(m, Graph())
+    assert list(found) == ["k", "x", "n"]
+    assert all(node.op == "symbol" for node in found.values())

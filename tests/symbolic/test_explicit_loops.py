@@ -158,15 +158,16 @@ def test_mechanisms_of_dyads(name):
         assert differs(m, s, "joint", s.start + move) < 1e-11
 
 
-@pytest.mark.parametrize("drawn", [1.2, -2.7])
-@pytest.mark.parametrize("leading", ["a parameter", "a number"])
+@pytest.mark.parametrize("drawn", [1.2, -5.0])
+@pytest.mark.parametrize("leading", ["a parameter", 2.0, 0.5])
 def test_a_quadratic_with_any_leading_coefficient(leading, drawn):
     """p w^2 + 3 w = 5 + t: (-3 + sqrt(9 + 4 p (5 + t))) / (2 p), or with the other sign, whichever is drawn."""
     g = Graph()
-    p = g.symbol(Symbol("p", "parameter"), 2.0) if leading == "a parameter" else 2.0
+    given = leading == "a parameter"
+    p = g.symbol(Symbol("p", "parameter"), 2.0) if given else leading
     t, w = (g.symbol(Symbol(n, "coordinate")) for n in "tw")
     found = single(p * w * w + 3.0 * w - (5.0 + t), w, Probe({"w": drawn, "t": 0.0})).value
-    for a, more in ((2.0, 0.0), *(((0.5, 1.0), (7.0, -2.0)) if leading == "a parameter" else ((2.0, 4.0),))):
+    for a, more in ((2.0, 0.0), (0.5, 1.0), (7.0, -2.0)) if given else ((leading, 0.0), (leading, 4.0)):
         root = np.copysign(np.sqrt(9.0 + 4.0 * a * (5.0 + more)), drawn)
         assert evaluate([found], {"p": a, "t": more})[0] == pytest.approx((root - 3.0) / (2.0 * a), rel=1e-14)
 
