@@ -146,7 +146,8 @@ class Health:
         out = [line for line in out if self._simulated or line[0] not in ("steps", "energy balance", "time used")]
         more = []
         if self.redundant:
-            more.append(("redundant", ", ".join(self.redundant)))
+            cut = self._found("mobility").cut
+            more.append(("redundant", ", ".join(self.redundant) + (f"; {cut}" if cut else "")))
         if self.undetermined:
             text = "; ".join(f"{k}: {', '.join(v)}" for k, v in self.undetermined.items())
             more.append(("reactions not determined", text))
