@@ -1,5 +1,7 @@
 """Friction in joints: closed forms in motion, sticking, the load that counts, and joints that jam."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -398,7 +400,10 @@ def test_more_frictions_than_newton_takes_steps(law):
 def test_friction_along_one_coordinate_says_where_its_surface_slips_along_another(spin, given, said):
     """A shaft in a bush, pushed with half of what friction holds at rest: one that spins fast would creep at once."""
     m = fb.Mechanism("shaft", gravity=(0, 0, -9.81))
-    m.add(fb.Body("b", mass=1.0, inertia=(0.1, 0.1, 0.1)), fb.Cylindrical("C", "ground", "b", axis=(1, 0, 0), at=(0, 0, 0)))
+    m.add(
+        fb.Body("b", mass=1.0, inertia=(0.1, 0.1, 0.1)),
+        fb.Cylindrical("C", "ground", "b", axis=(1, 0, 0), at=(0, 0, 0)),
+    )
     m.add(fb.Initial("C.angle", rate=spin), fb.PointForce("push", "b", at=(0, 0, 0), force=(1.0, 0, 0)))
     m.add(fb.JointFriction("f", joint="C", static=0.2, **given))
     found = m.simulate(0.5).health.warnings

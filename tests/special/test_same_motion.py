@@ -129,9 +129,7 @@ def bead_that_reaches_the_end():
     u = np.linspace(-np.pi, 0, 41)
     m = fb.Mechanism("bead", planar=True)
     m.add(fb.Body("bead", mass=0.3, inertia=1e-3, position=(0, -1), velocity=(2, 0)))
-    m.add(
-        fb.Cam("wire", "ground", "bead", points=np.column_stack([np.cos(u), np.sin(u)]), at=(0, -1), closed=False)
-    )
+    m.add(fb.Cam("wire", "ground", "bead", points=np.column_stack([np.cos(u), np.sin(u)]), at=(0, -1), closed=False))
     return m
 
 

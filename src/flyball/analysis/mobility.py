@@ -26,7 +26,6 @@ from .freedom.redundancy import redundant_sets
 from .freedom.stresses import undetermined
 from .untouched import left_out
 
-
 SHOWN = 64  # free motions of a large mechanism that are named; counted are all
 
 

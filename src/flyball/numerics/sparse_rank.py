@@ -54,7 +54,7 @@ def _array(G: Any) -> np.ndarray:
 
 
 def sparse_null_space(A: Any) -> tuple[int, np.ndarray]:
-    """Dimension of the null space of a sparse positive semidefinite matrix, and its basis, as far as there is `ROOM`."""
+    """Dimension of the null space of a sparse positive semidefinite matrix, and its basis as far as there is `ROOM`."""
     weak, vectors = weak_pivots(A)
     return len(weak), vectors
 

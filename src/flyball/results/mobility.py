@@ -88,7 +88,9 @@ class Mobility:
         """In words, whether `redundant` and `undetermined` are not complete."""
         if self.followed is None or self.followed >= self.redundancy:
             return ""
-        return f"named are those that {self.followed} of {self.redundancy} constraints too many touch: there may be more"
+        return (
+            f"named are those that {self.followed} of {self.redundancy} constraints too many touch: there may be more"
+        )
 
     @cached_property
     def sets(self) -> tuple[RedundantSet, ...]:

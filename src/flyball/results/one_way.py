@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from ..forces.joint_friction import JointFriction
 
 if TYPE_CHECKING:
     from .result import Result
 
-ACROSS = 0.1  # part of the slip along a friction's coordinate above which that across it changes the force: by 0.5 % there
+ACROSS = 0.1  # part of the slip along a friction's coordinate above which that across it counts: it takes 0.5 % there
 SLIPPED = 1e-3  # part of the mechanism's length above which slip across it is worth a word
 TURNED = 1.0  # the same of a turn whose slip is unknown, since no radius is given [rad]
 
@@ -19,7 +17,7 @@ TURNED = 1.0  # the same of a turn whose slip is unknown, since no radius is giv
 def one_way(result: Result) -> list[str]:
     """What is said of frictions on `Cylindrical`, `Planar` and `PointInPlane` that slip across their coordinate.
 
-    A surface has one friction force, mu N against its whole slip. A `JointFriction` knows the slip along its own
+    A surface has one friction force, mu N against its whole slip. Friction in a joint knows the slip along its own
     coordinate only: there it is too large by |v| / v, so that it may stick where the surface creeps, and across there
     is none.
     """
@@ -27,7 +25,7 @@ def one_way(result: Result) -> list[str]:
         return []
     model, found = result.model, []
     for f in result.values.structure.loads:
-        if not (isinstance(f, JointFriction) and model[f.joint].one_surface):
+        if not (hasattr(f, "load") and model[f.joint].one_surface):
             continue
         own = f.coordinate_text()
         slips = {f"{f.joint}.{what}": _slip(result, f, what) for what in model[f.joint].measured(result.planar)}
@@ -45,7 +43,7 @@ def one_way(result: Result) -> list[str]:
     return found
 
 
-def _slip(result: Result, f: JointFriction, what: str) -> tuple[float, str]:
+def _slip(result: Result, f: Any, what: str) -> tuple[float, str]:
     """How far the surfaces slip along a coordinate of the joint [m]; a turn without a radius [rad]."""
     angle, radius = what.startswith("angle"), result.values.numbers[f.name].radius
     arm = 1.0 if not angle or radius is None else float(radius)

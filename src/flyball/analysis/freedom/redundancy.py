@@ -21,9 +21,7 @@ SHOWN = 64  # constraints too many that are connected with one another, of which
 SHARE = 1e-3  # part of the largest share in a dependency that a driver must have for the gap to be seen at it
 
 
-def redundant_sets(
-    there: Found, positions: list[np.ndarray], shaky: bool, redundancy: int
-) -> tuple[RedundantSet, ...]:
+def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool, redundancy: int) -> tuple[RedundantSet, ...]:
     """The sets, smallest first. Cures hold in all these positions, and if those of the sets before are done too.
 
     ``shaky``: the mechanism can shake but not move, so that what depends on one another does so here only.
