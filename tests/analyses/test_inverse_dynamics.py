@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import flyball as fb
 from flyball.cli import app
 from tests.analyses.linkages import four_bar_driven, slider_crank
-from tests.assembly.test_mobility import parallelogram
+from tests.assembly.test_mobility import parallelogram, windows
 from tests.mechanisms import G, door, four_bar, planar_rod
 
 BOTH = ("absolute", "joint")
@@ -292,3 +292,17 @@ def test_joints_together_on_either_body(coordinates):
     # about the middle of the upper link: 3 kg hang on its left end, 1 kg on its right
     arm_of_forces = -0.5 * 3.0 * G - 0.5 * 1.0 * G
     assert upper.torque[:, 2] == pytest.approx(arm_of_forces, abs=1e-9)
+
+
+def test_many_dependencies_are_counted_by_pivots(monkeypatch):
+    """22 driven windows: 462 rows of which 396 can be independent, taken for a large mechanism; 66 are too many."""
+    from flyball.analysis.freedom import determinacy
+    from flyball.numerics import sparse_rank
+
+    m = windows(22)
+    m.add(*[fb.Driver(f"drive{k}", f"A{k}.angle", "0.1*t") for k in range(22)])
+    for module in (determinacy, sparse_rank):
+        monkeypatch.setattr(module, "DENSE", 0)
+    found = m.inverse_dynamics([0.1])
+    assert found.determinacy.count.tolist() == [66]
+    assert len(found.determinacy.wrenches) == 88

@@ -196,3 +196,55 @@ def test_a_large_mechanism_may_not_move_without_inertia_either():
         turned.simulate(0.01)
     assert links(0.5).check().freedoms == 520
     assert links(0.0).check().freedoms == 519
+
+
+def windows(count: int) -> fb.Mechanism:
+    """Square four-bars in space beside one another: three constraints too many each."""
+    m = fb.Mechanism("windows")
+    for k in range(count):
+        x = 3.0 * k
+        for name, at in (("a", (x, 0.5, 0)), ("b", (x + 0.5, 1, 0)), ("c", (x + 1, 0.5, 0))):
+            m.add(fb.Body(f"{name}{k}", mass=1, inertia=(1, 1, 1), position=at))
+        for name, i, j, at in (
+            ("A", "ground", f"a{k}", (x, 0, 0)),
+            ("B", f"a{k}", f"b{k}", (x, 1, 0)),
+            ("C", f"b{k}", f"c{k}", (x + 1, 1, 0)),
+            ("D", "ground", f"c{k}", (x + 1, 0, 0)),
+        ):
+            m.add(fb.Revolute(f"{name}{k}", i, j, at=at, axis=(0, 0, 1)))
+    return m
+
+
+def test_all_that_depends_on_something_is_named_in_a_large_mechanism_too():
+    """76 windows: 1520 rows, 228 too many, and all 304 joints take part."""
+    m = windows(76)
+    found = mobility(m, assemble(m))
+    assert (found.rows, found.redundancy, found.freedoms) == (1520, 228, 76)
+    assert set(found.redundant) == set(found.undetermined) == {f"{c}{k}" for c in "ABCD" for k in range(76)}
+    assert found.cut == "" and found.as_dict()["cut"] == ""
+
+
+def test_sets_of_a_large_mechanism_are_counted_where_they_are_not_all_sought(monkeypatch):
+    """Three constraints too many in each of two windows; of each window's one is looked into."""
+    from flyball.analysis.freedom import redundancy
+
+    monkeypatch.setattr(redundancy, "DENSE", 0)
+    monkeypatch.setattr(redundancy, "SHOWN", 1)
+    m = windows(2)
+    assert [s.count for s in mobility(m, assemble(m)).sets] == [3, 3]
+
+
+def test_a_list_that_is_cut_says_so(monkeypatch):
+    """Where there is no room for all dependencies the true count stands beside what is named."""
+    from flyball.numerics import sparse_rank
+
+    m = windows(5)
+    a = assemble(m)
+    for name in ("FEW", "DENSE"):
+        monkeypatch.setattr(sparse_rank, name, 0)
+    monkeypatch.setattr(sparse_rank, "ROOM", 700)  # 7 vectors of 100 rows
+    found = mobility(m, a)
+    assert found.redundancy == 15
+    words = "named are those that 7 of 15 constraints too many touch: there may be more"
+    assert found.cut == found.as_dict()["cut"] == words
+    assert words in str(found) and words in str(m.check()) and words in str(m.simulate(1e-3).health)

@@ -1,5 +1,7 @@
 """Friction in joints: closed forms in motion, sticking, the load that counts, and joints that jam."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -384,3 +386,26 @@ def test_more_frictions_than_newton_takes_steps(law):
         if slides:
             want = -most[-1] * way(law, 0.02 * r[f"j{k}"].rate)[-1]
             assert r[f"f{k}"].friction[-1] == pytest.approx(want, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spin", "given", "said"),
+    [
+        (50.0, {"coordinate": "displacement", "radius": 0.01}, r"'C.angle' it slips 0.25 m without"),
+        (50.0, {"coordinate": "displacement"}, r"'C.angle' it slips 25 rad without"),
+        (0.0, {"coordinate": "displacement", "radius": 0.01}, ""),
+        (50.0, {"coordinate": "angle", "radius": 0.01}, r"'C.displacement' it slips 0.125 m without"),
+    ],
+)
+def test_friction_along_one_coordinate_says_where_its_surface_slips_along_another(spin, given, said):
+    """A shaft in a bush, pushed with half of what friction holds at rest: one that spins fast would creep at once."""
+    m = fb.Mechanism("shaft", gravity=(0, 0, -9.81))
+    m.add(
+        fb.Body("b", mass=1.0, inertia=(0.1, 0.1, 0.1)),
+        fb.Cylindrical("C", "ground", "b", axis=(1, 0, 0), at=(0, 0, 0)),
+    )
+    m.add(fb.Initial("C.angle", rate=spin), fb.PointForce("push", "b", at=(0, 0, 0), force=(1.0, 0, 0)))
+    m.add(fb.JointFriction("f", joint="C", static=0.2, **given))
+    found = m.simulate(0.5).health.warnings
+    assert len(found) == bool(said)
+    assert not said or (re.search(said, found[0]) and "JointFriction 'f' acts along" in found[0])

@@ -379,3 +379,20 @@ def test_events_that_come_ever_closer_are_named(monkeypatch):
     m.add(fb.Event("ever faster", "sin(1/(0.3 - t))"))
     with pytest.raises(fb.SimulationError, match=r"without end \(30 within .* s\): Event 'ever faster'"):
         m.simulate(0.3)
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+def test_what_holds_a_locked_coordinate_of_a_body_is_a_curve(coordinates):
+    """A falling body is held at one height against its weight until it is let go, and against a torque."""
+    m = fb.Mechanism("held", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("b", mass=2.0, inertia=1.0, velocity=(1, 0)), fb.PointTorque("turn", "b", torque=0.7))
+    m.add(fb.Event("hold", "t - 0.5", do=[fb.Lock("b.y"), fb.Lock("b.angle")]))
+    m.add(fb.Event("free", "t - 0.8", do=[fb.Release("b.y")]))
+    r = m.simulate(1.0, outputs=101, coordinates=coordinates)
+    held, free = (r.t > 0.505) & (r.t < 0.795), (r.t < 0.495) | (r.t > 0.805)
+    assert r["b.y_effort"][held] == pytest.approx(2.0 * 9.81)
+    assert r["b.y_effort"][free] == pytest.approx(0.0, abs=1e-12)
+    assert r["b.angle_effort"][r.t > 0.505] == pytest.approx(-0.7)
+    assert r["b.angle_effort"][r.t < 0.495] == pytest.approx(0.0, abs=1e-12)
+    assert r["b"].names["y_effort"].unit == "N" and r["b"].names["angle_effort"].unit == "N*m"
+    assert "x_effort" not in r["b"].names

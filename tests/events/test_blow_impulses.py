@@ -1,5 +1,8 @@
 """What joints carry of a blow: the blow itself is none of it. By hand, and by Lagrange multipliers of absolute rows."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -163,3 +166,18 @@ def test_all_that_happens_only_at_the_start_is_booked():
     third = m.simulate(1.0, start=second, outputs=3)
     assert third["A.displacement"][-1] == pytest.approx(0.5 * np.sin(4.0), abs=1e-6)
     assert third.energy.drift < 1e-6
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_impulses_of_a_pickled_event_still_say_what_each_body_got(again):
+    """What acts on the struck bar adds up to the change of its momentum, in a copy of the event, of the list, of all."""
+    r = four_bar(fb.Impulse("crank", (0.3, 0.1))).simulate(0.002, outputs=3)
+    (h,) = r.events
+    whole = h.impulses.on("crank")
+    for made in (again(h), again(r.events)[0], again(r).events[0]):
+        assert dict(made.impulses).keys() == dict(h.impulses).keys()
+        found = made.impulses.on("crank")
+        assert found.keys() == whole.keys()
+        for name, x in whole.items():
+            assert found[name] == pytest.approx(x)
+    assert sum(whole.values())[0] == pytest.approx(r.model["crank"].mass * (h.after["crank.vx"] - h.before["crank.vx"]))

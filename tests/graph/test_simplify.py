@@ -73,6 +73,17 @@ def test_values_stay(tree, seed):
         assert close(x, z, at), (text(x), text(z), at)
 
 
+def test_infinity_is_not_multiplied_out():
+    """Infinity times a sum whose terms have different signs is infinite, not nan; the arctangent of it is finite."""
+    g = Graph()
+    x, a, b = (g.symbol(n) for n in "xab")
+    for far in (g.divide(a + b, 0.0), (g.number(np.inf) + x) * (a + b), g.divide(a + b, x - x) * a):
+        angle = g.function("atan2", x, far)
+        (y,) = simplified([angle + a * (a + b)])
+        at = {"x": 1.0, "a": 2.0, "b": -1.0}
+        assert evaluate([y], at)[0] == pytest.approx(evaluate([angle], at)[0] + 2.0)
+
+
 def short(make, *names):
     g = Graph()
     return text(simplified([make(*[g.symbol(n) for n in names])])[0])

@@ -39,7 +39,8 @@ def mechanism() -> fb.Mechanism:
 
 def healthy(undetermined: dict | None = None, **options: object) -> Health:
     """A health report that says all is well."""
-    found = SimpleNamespace(freedoms=0, redundant=tuple(undetermined or ()), undetermined=undetermined or {})
+    names = tuple(undetermined or ())
+    found = SimpleNamespace(freedoms=0, redundant=names, undetermined=undetermined or {}, cut="")
     late = {"mobility": found, "energy_drift": 1e-9}
     return Health(True, "reached the end", 1e-12, float("nan"), 10, 1, 99, 50, 0.5, options, late=late)
 

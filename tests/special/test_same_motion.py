@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.graph.node import Graph
+from flyball.graph.printers.llvm import Module, Procedure
+from flyball.math.scalar import choose
+from flyball.special import machine
 from tests.mechanisms import example, four_bar
 
 SOME = {  # seconds of motion in which something happens, and not so many that differences grow
@@ -116,3 +122,72 @@ def test_it_goes_on_from_where_it_ended():
     for wish in (True, False):
         rest = m.simulate(1.0, start=first, outputs=2, specialize=wish, rtol=1e-10)
         np.testing.assert_allclose(rest.q[-1], whole.q[-1], atol=1e-8)
+
+
+def bead_that_reaches_the_end():
+    """A bead on a curve that ends after a quarter of a circle."""
+    u = np.linspace(-np.pi, 0, 41)
+    m = fb.Mechanism("bead", planar=True)
+    m.add(fb.Body("bead", mass=0.3, inertia=1e-3, position=(0, -1), velocity=(2, 0)))
+    m.add(fb.Cam("wire", "ground", "bead", points=np.column_stack([np.cos(u), np.sin(u)]), at=(0, -1), closed=False))
+    return m
+
+
+def mount_turned_by_half_a_turn():
+    m = fb.Mechanism("mount")
+    m.add(fb.Body("b", mass=1.0, inertia=(1, 1.1, 1.2), angular_velocity=(0, 0, 2.0)))
+    m.add(fb.Bushing("mount", "ground", "b", at=(0, 0, 0), torsional_stiffness=0.01))
+    return m
+
+
+def force_out_of_its_domain():
+    m = fb.Mechanism("slide")
+    m.add(fb.Body("b", mass=1.0, inertia=(1, 1, 1), velocity=(1.0, 0, 0)))
+    m.add(fb.Prismatic("P", "ground", "b", axis=(1, 0, 0), at=(0, 0, 0)), fb.Sensor("x", "P.displacement"))
+    m.add(fb.PointForce("push", "b", at=(0, 0, 0), force=("sqrt(0.5 - x)", 0, 0)))
+    return m
+
+
+def driver_out_of_its_domain():
+    m = fb.Mechanism("driven")
+    m.add(fb.Body("b", mass=1.0, inertia=(1, 1, 1)), fb.Body("c", mass=1.0, inertia=(1, 1, 1), position=(0, 1, 0)))
+    m.add(fb.Prismatic("P", "ground", "b", axis=(1, 0, 0), at=(0, 0, 0)))
+    m.add(fb.Revolute("R", "b", "c", axis=(0, 0, 1), at=(0, 0, 0)))
+    m.add(fb.Driver("drive", "P.displacement", "0.1*asin(2*t)"))
+    return m
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+@pytest.mark.parametrize(
+    "make",
+    [bead_that_reaches_the_end, mount_turned_by_half_a_turn, force_out_of_its_domain, driver_out_of_its_domain],
+)
+def test_what_is_not_defined_ends_the_motion_in_made_code_too(make, coordinates):
+    """The same words at the same time: a curve that ends, a rotation without an axis, laws out of their domains."""
+    ends = []
+    for specialize in (True, False):
+        with pytest.raises(fb.SimulationError) as e:
+            make().simulate(4.0, specialize=specialize, coordinates=coordinates)
+        ends.append(e.value)
+    assert ends[0].t == pytest.approx(ends[1].t, rel=1e-6)
+    assert str(ends[0]).split(": ")[2:] == str(ends[1]).split(": ")[2:]
+
+
+def test_a_branch_that_is_nan_is_a_value_like_any_other():
+    """``choose(x, nan, b)`` is nan where x > 0, in made code and in equations with symbols: an error stays one."""
+    graph = Graph()
+    x = graph.symbol("x")
+    stores = [(("b", k), f) for k, f in enumerate((choose(x, np.nan + 0.0 * x, x), choose(x, 2.0 * x, np.nan)))]
+    module = Module(machine.ARGUMENTS, lambda base: [])
+    module.add(Procedure("A", {x.index: ("a", 0)}, stores))
+    loaded = machine.Loaded(machine.assembled(str(module)), ["A"])
+    pointer, number = ctypes.c_void_p, ctypes.c_double
+    call = ctypes.CFUNCTYPE(number, pointer, pointer, number, *[pointer] * 4)(loaded.addresses["A"])
+    for value in (-1.0, 1.0):
+        given, out = np.array([value]), np.zeros(2)
+        call(None, None, 0.0, given.ctypes.data, out.ctypes.data, None, None)
+        assert out == pytest.approx([np.nan, 2.0] if value > 0.0 else [-1.0, np.nan], nan_ok=True)
+    m = fb.Mechanism("braked", planar=True, gravity=(0, 0))
+    m.add(fb.Body("b", mass=1.0, inertia=1), fb.Prismatic("P", "ground", "b", axis=(1, 0), at=(0, 0)))
+    m.add(fb.Brake("B", coordinate="P.displacement", capacity="0.1 - t"))
+    assert "nan if t - 1/10 > 0" in str(m.symbolic())

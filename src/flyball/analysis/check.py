@@ -64,6 +64,7 @@ def check(model: Model) -> Report:
         redundant=m.redundant,
         redundancy=m.redundancy,
         undetermined=m.undetermined,
+        cut=m.cut,
         moved=a.moved,
         departures=a.departures,
         mass=weights.total.mass,

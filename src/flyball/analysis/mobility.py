@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import AssemblyError
 from ..model.model import Model
-from ..numerics.sparse_rank import null_spaces
+from ..numerics.sparse_rank import DENSE, null_spaces
 from ..results.freedoms import FreeMotion, Geometry, RedundantSet
 from ..results.mobility import Mobility
 from ..tables.system import SEMIDEFINITE
@@ -25,6 +25,8 @@ from .freedom.jacobian import Found, few, scaled_jacobian
 from .freedom.redundancy import redundant_sets
 from .freedom.stresses import undetermined
 from .untouched import left_out
+
+SHOWN = 64  # free motions of a large mechanism that are named; counted are all
 
 
 class Sought(Found):
@@ -38,15 +40,16 @@ class Sought(Found):
     def sets(self, m: Mobility) -> tuple[RedundantSet, ...]:
         """See `Mobility.sets`."""
         if self.gap:
-            return redundant_sets(self, [], False)
+            return redundant_sets(self, [], False, m.redundancy)
         g = m.geometry
-        return redundant_sets(self, g.positions, g.singular and not g.positions)
+        return redundant_sets(self, g.positions, g.singular and not g.positions, m.redundancy)
 
     def motions(self, m: Mobility) -> tuple[FreeMotion, ...]:
         """See `Mobility.motions`."""
         a = self.assembly
         a.compiled.at(a.t, a.q, a.v)  # turns are named by where bodies are
-        return free_motions(a, self.velocities)
+        large = max(m.rows, m.velocities) > DENSE
+        return free_motions(a, self.velocities[:, : SHOWN if large else None])
 
     def geometry(self, m: Mobility) -> Geometry:
         """See `Mobility.geometry`."""
@@ -110,4 +113,5 @@ def mobility(
     lam = dependent / np.maximum(size, 1e-300)[:, None]
     there = Sought(a, lam, None if motions is None else motions * scale[:, None], gap)
     without = left_out(model)
-    return Mobility(nv, nr, rank, tuple(names), undetermined(a, lam, names) if len(names) else {}, without, there)
+    loose = undetermined(a, lam, names) if len(names) else {}
+    return Mobility(nv, nr, rank, tuple(names), loose, without, there, lam.shape[1])

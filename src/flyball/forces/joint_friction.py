@@ -81,7 +81,9 @@ class JointFriction(CoordinateForce):
     a joint of its own. For the flanks of a trapezoidal thread thrust_factor is 1 / cos(flank angle).
 
     A surface has one friction force, against its whole slip. Where a joint's coordinates are slips of one surface
-    (`Cylindrical`, `Planar`, `PointInPlane`), friction along a second one is refused.
+    (`Cylindrical`, `Planar`, `PointInPlane`), friction along a second one is refused; that along one knows only the
+    slip along it: it is right where nothing slips along the others, and ``result.health.warnings`` says where it does
+    (a shaft that spins fast creeps axially under any thrust, and here it sticks).
 
     With a ``stick_speed`` the law is regularised instead: friction is tanh(v / stick_speed) of the full one, and what
     would stick creeps at ``stick_speed`` times artanh(part of the full friction that holds it);

@@ -7,22 +7,14 @@ from typing import Any
 
 from .operations import ADD, NUMBER
 
-SMALLEST = 1e-300  # what is greater than zero with this added to it is not negative
-
 
 def taken(x: Any, a: Any, b: Any) -> Any:
-    """The branch, as nodes; None where it is open.
-
-    A first branch that is no number stands for an error: it is taken for granted that x is not greater than zero.
-    """
+    """The branch, as nodes; None where it is open: nan in a branch is a value like any other, which ends a motion."""
     if a is b:
         return a
     if x.op == NUMBER:
         return a if x.value > 0.0 else b
     if most(x) <= 0.0:
-        return b
-    if a.op == NUMBER and a.value != a.value:
-        x.graph.granted.append((x.graph.subtract(SMALLEST, x), "positive"))
         return b
     return None
 

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import ModelError
+from .actions import Lock
 from .body import Body, Driver, Frame
 from .controller import Controller
 from .coupling import Coupling
@@ -72,9 +73,9 @@ def _told(model: Model, name: str) -> Table:
     if member and member[1] in model.by_name and model[member[1]].category == "bulk":
         return _of_member(axes)
     e = model[name]
-    if isinstance(e, Body) and touching:
-        return _of_point(axes) | _of_contact(axes)
-    if isinstance(e, (Body, Frame)):
+    if isinstance(e, Body):
+        return _of_point(axes) | (_of_contact(axes) if touching else {}) | _of_locks(model, e)
+    if isinstance(e, Frame):
         return _of_point(axes)
     if e.category == "bulk":
         return of_set(axes)
@@ -178,6 +179,14 @@ def _of_point(axes: str) -> Table:
     for name, unit in (turning, turned):
         out[name] = Quantity(unit, array=True, width=0 if planar else n)
     return out | {"quaternion": Quantity("1", array=not planar, width=4), "rotation": Quantity("1", width=9)}
+
+
+def _of_locks(model: Model, body: Body) -> Table:
+    """Of a body with coordinates that events lock: what holds them, along each."""
+    locked = [a.what for e in model.events for a in e.do if isinstance(a, Lock)]
+    own = dict.fromkeys(what for owner, _, what in (x.rpartition(".") for x in locked) if owner == body.name)
+    units = {what: _effort("rad" if what == "angle" else "m") for what in own}
+    return {f"{what}_effort": Quantity(unit, curve=True, array=True) for what, unit in units.items()}
 
 
 def _of_contact(axes: str) -> Table:

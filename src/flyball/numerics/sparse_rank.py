@@ -15,8 +15,9 @@ FEW = 150  # rows or columns up to which singular values take no longer than piv
 DENSE = 1500  # rows or columns up to which they decide where pivots leave a doubt
 CLEAR = 1e-8  # pivots of unit rows above this are surely some: singular values of 1e-4 and more
 WEAK = 1e-10  # pivots of a large matrix with unit rows below this count as zero
+SPREAD = 1e-5  # up to this one may be nothing but what was added, of a vector whose square is up to 1e8
 ADDED = 1e-13  # to the diagonal of such a matrix
-SHOWN = 64  # vectors of a null space that are made of a matrix that is larger than `DENSE`
+ROOM = 2**24  # numbers (128 MB) that the vectors of a null space may have, of a matrix that is larger than `DENSE`
 
 
 def rank(G: Any) -> int:
@@ -30,7 +31,7 @@ def null_spaces(G: Any) -> tuple[int, np.ndarray, np.ndarray | None]:
     """Rank, basis of the dependencies among rows (n, n - rank), basis of what the rows allow (m, m - rank).
 
     G is sparse, or an array. Where pivots decide, the dependencies are no orthonormal basis, and nothing of what is
-    allowed is given; of a matrix larger than `DENSE` up to `SHOWN` dependencies are.
+    allowed is given; of a matrix larger than `DENSE` as many dependencies are as there is `ROOM` for.
     """
     if max(G.shape) > FEW and (found := by_pivots(G)) is not None:
         return *found, None
@@ -44,7 +45,7 @@ def by_pivots(G: Any) -> tuple[int, np.ndarray] | None:
 
     G = sp.csr_matrix(G)
     p = Pivots(G @ G.T)
-    basis = p.vectors(p.weak[:SHOWN]) if max(G.shape) > DENSE else p.dependencies(G)
+    basis = p.vectors(p.shown) if max(G.shape) > DENSE else p.dependencies(G)
     return None if basis is None else (int(G.shape[0]) - len(p.weak), basis)
 
 
@@ -53,7 +54,7 @@ def _array(G: Any) -> np.ndarray:
 
 
 def sparse_null_space(A: Any) -> tuple[int, np.ndarray]:
-    """Dimension of the null space of a sparse positive semidefinite matrix, and up to `SHOWN` vectors of its basis."""
+    """Dimension of the null space of a sparse positive semidefinite matrix, and its basis as far as there is `ROOM`."""
     weak, vectors = weak_pivots(A)
     return len(weak), vectors
 
@@ -66,18 +67,18 @@ def weak_pivots(A: Any) -> tuple[np.ndarray, np.ndarray]:
     weak : ndarray of int
         As many as the null space has dimensions. Of G G^T: rows that depend on the others, which do not on each other.
     vectors : ndarray (n, k)
-        Up to `SHOWN` vectors of a basis of the null space.
+        A basis of the null space: as many of its vectors as there is `ROOM` for.
     """
     p = Pivots(A)
-    return np.argsort(p.pattern.perm)[p.weak], p.vectors(p.weak[:SHOWN])
+    return np.argsort(p.pattern.perm)[p.weak], p.vectors(p.shown)
 
 
 class Pivots:
     """Pivots of a sparse positive semidefinite matrix, in an order of its own: where they are none.
 
     From A = L D L^T: where a pivot is nothing but what was added to the diagonal, L^T x = e_k gives a vector of the
-    null space. Its pivot is x^T A x, so that of a vector spread over very many entries is larger by their number: there
-    the quotient of Rayleigh decides.
+    null space. Its pivot is x^T A x, so that of a vector with very many entries, or with large ones, is larger by its
+    square: there the quotient of Rayleigh decides.
 
     Attributes
     ----------
@@ -97,11 +98,18 @@ class Pivots:
         self.lower = sp.csc_matrix((L, self.pattern.Li, self.pattern.Lp), shape=(n, n)) + sp.identity(n, format="csc")
         with np.errstate(divide="ignore"):
             pivots = 1.0 / self.inverse
-        sure, doubtful = ~(pivots > WEAK), (pivots > WEAK) & (pivots < 10.0 * ADDED * n)
-        which = np.flatnonzero(doubtful)
-        quotients = pivots[which] / np.maximum((self._ends(which) ** 2).sum(axis=0), 1.0)
-        self.weak = np.sort(np.r_[np.flatnonzero(sure), which[quotients < 10.0 * ADDED]])
+        sure, doubtful = ~(pivots > WEAK), (pivots > WEAK) & (pivots < SPREAD)
+        found = [np.flatnonzero(sure)]
+        for which in np.split(rest := np.flatnonzero(doubtful), range(most(n), len(rest), most(n))):
+            quotients = pivots[which] / np.maximum((self._ends(which) ** 2).sum(axis=0), 1.0)
+            found.append(which[quotients < 10.0 * ADDED])
+        self.weak = np.sort(np.concatenate(found))
         self.least = float(np.delete(pivots, self.weak).min(initial=np.inf))
+
+    @property
+    def shown(self) -> np.ndarray:
+        """Those weak pivots for whose vectors there is `ROOM`."""
+        return self.weak[: most(len(self.inverse))]
 
     def vectors(self, which: np.ndarray) -> np.ndarray:
         """Vectors (n, k) of the null space that belong to weak pivots, their largest entry 1."""
@@ -143,6 +151,11 @@ class Pivots:
         y = spsolve_triangular(self.lower.tocsr(), y, unit_diagonal=True)
         y = spsolve_triangular(self._upper, self.inverse[:, None] * y, lower=False, unit_diagonal=True)
         return y[self.pattern.perm] / self.size[:, None]
+
+
+def most(n: int) -> int:
+    """How many vectors of n numbers there is `ROOM` for."""
+    return max(ROOM // max(n, 1), 1)
 
 
 def _scaled(x: np.ndarray) -> np.ndarray:

@@ -59,6 +59,7 @@ class Report:
     com: tuple[float, ...]  # their centre of mass in the world, assembled [m]
     warnings: tuple[str, ...] = field(default=())
     events: dict[str, str] = field(default_factory=dict)  # event -> when it is, and what it does
+    cut: str = ""  # whether `redundant` and `undetermined` are not complete, in words
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -73,6 +74,8 @@ class Report:
         if self.redundant:
             names = ", ".join(self.redundant[:12]) + (", ..." if len(self.redundant) > 12 else "")
             out.append(("redundant", f"{_count(self.redundancy, 'constraint')} too many, among {names}"))
+        if self.cut:
+            out.append(("redundant", self.cut))
         if self.undetermined:
             first = list(self.undetermined.items())[:12]
             text = "; ".join(f"{k}: {', '.join(v)}" for k, v in first) + (

@@ -14,6 +14,7 @@ from .energy import gained
 from .lag import late, perhaps_late
 from .ledger import Ledger, apart, whole
 from .one_sided import pulls
+from .one_way import one_way
 from .overturned import overturned, perhaps_overturned
 from .residue import missed
 
@@ -50,6 +51,7 @@ def warnings(result: Result) -> tuple[str, ...]:
         *_open_loads(result),
         *_open_forces(result),
         *_creep(result),
+        *one_way(result),
         *pulls(result),
     ]
     return tuple(text for text in texts if text)

@@ -11,8 +11,8 @@ from .contact_health import ContactHealth
 from .departure import Departure, summary
 
 LATE = (
-    *("freedoms", "redundant", "undetermined", "energy_drift", "acceleration_violation", "creep", "warnings"),
-    "doubtful",
+    *("freedoms", "redundant", "redundant_cut", "undetermined", "energy_drift", "acceleration_violation", "creep"),
+    *("warnings", "doubtful"),
 )
 """Figures that are found when first asked for."""
 
@@ -78,6 +78,11 @@ class Health:
     def redundant(self) -> tuple[str, ...]:
         """Joints whose constraints depend on one another."""
         return self._found("mobility").redundant
+
+    @property
+    def redundant_cut(self) -> str:
+        """In words, whether `redundant` and `undetermined` are not complete, since the mechanism is too large."""
+        return self._found("mobility").cut
 
     @property
     def undetermined(self) -> dict[str, tuple[str, ...]]:
@@ -146,7 +151,7 @@ class Health:
         out = [line for line in out if self._simulated or line[0] not in ("steps", "energy balance", "time used")]
         more = []
         if self.redundant:
-            more.append(("redundant", ", ".join(self.redundant)))
+            more.append(("redundant", "; ".join(filter(None, (", ".join(self.redundant), self.redundant_cut)))))
         if self.undetermined:
             text = "; ".join(f"{k}: {', '.join(v)}" for k, v in self.undetermined.items())
             more.append(("reactions not determined", text))

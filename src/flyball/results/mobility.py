@@ -54,6 +54,9 @@ class Mobility:
         Elements whose rows take part in a dependency.
     undetermined : dict
         Joint -> reaction components (world axes, on ``body_j``) that redundancy leaves undetermined.
+    followed : int or None
+        How many of the constraints too many these two come from, where a mechanism is so large that they are not
+        found for all; None: for all.
     """
 
     velocities: int
@@ -63,6 +66,7 @@ class Mobility:
     undetermined: dict[str, tuple[str, ...]] = field(default_factory=dict)
     without: str = ""  # what is there besides, and not counted
     found: Findings | None = field(default=None, compare=False, repr=False)
+    followed: int | None = None
 
     @property
     def gruebler(self) -> int:
@@ -78,6 +82,15 @@ class Mobility:
     def redundancy(self) -> int:
         """Rows that say nothing new."""
         return self.rows - self.rank
+
+    @property
+    def cut(self) -> str:
+        """In words, whether `redundant` and `undetermined` are not complete."""
+        if self.followed is None or self.followed >= self.redundancy:
+            return ""
+        return (
+            f"named are those that {self.followed} of {self.redundancy} constraints too many touch: there may be more"
+        )
 
     @cached_property
     def sets(self) -> tuple[RedundantSet, ...]:
@@ -119,6 +132,8 @@ class Mobility:
             out += [("redundant", s.text), ("redundant", s.advice)]
         if (left := self.redundancy - sum(s.count for s in self.sets[:LINES])) > 0:
             out.append(("redundant", f"... and {left} more"))
+        if self.cut:
+            out.append(("redundant", self.cut))
         if self.undetermined:
             text = "; ".join(f"{k}: {', '.join(v)}" for k, v in list(self.undetermined.items())[:LINES])
             out.append(("reactions not determined", text))
@@ -137,6 +152,7 @@ class Mobility:
             "redundancy": self.redundancy,
             "redundant": list(self.redundant),
             "undetermined": {k: list(v) for k, v in self.undetermined.items()},
+            "cut": self.cut,
             "motions": [m.as_dict() for m in self.motions],
             "sets": [s.as_dict() for s in self.sets],
             "geometry": None if self.there.gap else self.geometry.as_dict(),

@@ -163,6 +163,7 @@ def _health(data: dict[str, Any]) -> Health:
     found = SimpleNamespace(
         freedoms=data["freedoms"],
         redundant=tuple(data["redundant"]),
+        cut=data.get("redundant_cut", ""),
         undetermined={k: tuple(v) for k, v in data["undetermined"].items()},
     )
     late: dict[str, Any] = {"mobility": found, "energy_drift": data["energy_drift"]}

@@ -144,8 +144,9 @@ class Struck(Mapping):
     def __repr__(self) -> str:
         return repr(dict(self))
 
-    def __reduce__(self) -> Any:
-        return dict, (dict(self),)
+    def __getstate__(self) -> dict[str, Any]:
+        """With the states before and after, which `on` needs; what was made of them is made again."""
+        return {k: getattr(self, k) for k in ("_own", "_rows", "_blows", "_moments")}
 
 
 def summed(every: Sequence[Struck]) -> Struck:

@@ -16,7 +16,7 @@ from ...equations.dependencies import dependencies
 from ...model.body import Driver
 from ...model.coupling import Coupling
 from ...numerics.rank import parts
-from ...numerics.sparse_rank import DENSE, FEW, SHOWN, by_pivots
+from ...numerics.sparse_rank import DENSE, FEW, by_pivots
 from ...results.records import Records
 from ...results.result import Result
 from ..compiled import Compiled, compiled
@@ -24,6 +24,7 @@ from .jacobian import lengths, scaled_jacobian
 from .poses import absolute_states
 from .stresses import CHANGED, self_stresses
 
+ITERATED = 64  # dependencies up to which they are found by inverse iteration
 LEAST = 1e-6  # part of the largest entry of a dependency that makes a row part of it
 NONE, SURE = 1e-11, 1e-5  # singular values, of the largest, that are surely none, and surely some
 
@@ -79,7 +80,7 @@ class _Along:
         lam = np.zeros((len(self.states), nr, 0))
         count, left, tried = max(nr - nv, 0), np.arange(len(self.states)), set[int]()
         while len(left):
-            if count not in tried and count < min(nr, SHOWN):
+            if count not in tried and count < min(nr, ITERATED):
                 tried.add(count)
                 sure, own = self._iterated(left, count)
                 lam = _put(lam, left[sure], own[sure])
@@ -107,13 +108,14 @@ class _Along:
         c.at(float(t[0]), q, v)
         G, size, _ = scaled_jacobian(c)
         size = np.maximum(size, 1e-300)
-        large, many = max(G.shape) > DENSE, count >= SHOWN and max(G.shape) > FEW
+        large, many = max(G.shape) > DENSE, count >= ITERATED and max(G.shape) > FEW
         if (large or many) and (found := by_pivots(G)) is not None:
-            own, self.out.least[k] = found[1], 1.0
+            (count, own), self.out.least[k] = found, 1.0
         else:
             p = parts(G.toarray())
-            own, self.out.least[k] = p.dependencies, float(p.values[-1] / p.values[0]) if p.rank else 1.0
-        self.out.count[k] = own.shape[1]
+            count, own = p.rank, p.dependencies
+            self.out.least[k] = float(p.values[-1] / p.values[0]) if p.rank else 1.0
+        self.out.count[k] = G.shape[0] - count
         return own / size[:, None]
 
 

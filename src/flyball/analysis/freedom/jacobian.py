@@ -18,13 +18,13 @@ class Found:
     """Where a mechanism was looked at, and what the null spaces of its Jacobian are there."""
 
     assembly: Assembly
-    dependencies: np.ndarray  # multipliers (nr, k) that act on nothing; of a large mechanism up to `SHOWN` of them
+    dependencies: np.ndarray  # multipliers (nr, k) that act on nothing; all for which there is `ROOM`
     allowed: np.ndarray | None  # velocities (nv, f) that the rows allow; None: found when asked for
     gap: str = ""  # why it cannot be assembled, if it cannot
 
     @property
     def velocities(self) -> np.ndarray:
-        """Velocities (nv, f) that the rows allow; of a large mechanism up to `SHOWN`."""
+        """Velocities (nv, f) that the rows allow; all for which there is `ROOM`."""
         if self.allowed is not None:
             return self.allowed
         a = self.assembly

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...model.body import Driver
 from ...numerics.rank import rank
-from ...numerics.sparse_rank import SHOWN
+from ...numerics.sparse_rank import DENSE
 from ...results.freedoms import RedundantSet
 from ...tables.system import G_VALUE, NU
 from ..compiled import Compiled
@@ -17,13 +17,16 @@ from .supports import irreducible
 
 WRONG = 1e-8  # a dependency of unit size that adds up to more than this part of the mechanism's length contradicts
 
+SHOWN = 64  # constraints too many that are connected with one another, of which sets are sought in a large mechanism
 SHARE = 1e-3  # part of the largest share in a dependency that a driver must have for the gap to be seen at it
 
 
-def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool) -> tuple[RedundantSet, ...]:
+def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool, redundancy: int) -> tuple[RedundantSet, ...]:
     """The sets, smallest first. Cures hold in all these positions, and if those of the sets before are done too.
 
     ``shaky``: the mechanism can shake but not move, so that what depends on one another does so here only.
+    ``redundancy``: constraints too many. Of a large mechanism in which more than `SHOWN` of them are connected with one
+    another, the sets found are not all there are.
     """
     lam, a = there.dependencies, there.assembly
     if not lam.shape[1]:
@@ -35,7 +38,9 @@ def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool) -> tu
     size = np.maximum(size, 1e-300)
     names = list(s.slices)
     groups = [np.arange(r.start, r.stop) for r in s.slices.values()]
-    found = irreducible(lam * size[:, None], groups)
+    most = SHOWN if max(G.shape) > DENSE else lam.shape[1]
+    found = irreducible(lam * size[:, None], groups, most)
+    all_found = sum(basis.shape[1] for _, basis in found) == redundancy
     found.sort(key=lambda x: len(x[0]))
     g, nu = c.work.row[G_VALUE] / size, (c.sparse_jacobian() @ a.v - c.work.row[NU]) / size
     those = [tuple(names[e] for e in elements) for elements, _ in found]
@@ -49,7 +54,7 @@ def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool) -> tu
         here_only = not what and (here_only or shaky)
         cure = None if what or here_only else cure
         count = basis.shape[1]
-        if lam.shape[1] == SHOWN:  # of a large mechanism not all dependencies are there; those of a set's own rows are
+        if not all_found:  # those of a set's own rows are
             own = G[np.concatenate([groups[e] for e in numbers])].toarray()
             count = len(own) - rank(own)
         out.append(RedundantSet(elements, count, what, gap, here_only, loose, cure, drivers, cut, unit))

@@ -17,7 +17,9 @@ SMALL = 1e-8  # singular values below this are rounding; bases are orthonormal
 NEW = 1e-6  # those above this are of something new
 
 
-def irreducible(N: np.ndarray, groups: Sequence[np.ndarray]) -> list[tuple[list[int], np.ndarray]]:
+def irreducible(
+    N: np.ndarray, groups: Sequence[np.ndarray], most: int | None = None
+) -> list[tuple[list[int], np.ndarray]]:
     """Subspaces that make up a null space, each carried by a set of elements from which none can be left out.
 
     Parameters
@@ -26,15 +28,18 @@ def irreducible(N: np.ndarray, groups: Sequence[np.ndarray]) -> list[tuple[list[
         A basis of the null space, its rows in units in which they compare.
     groups : sequence of ndarray of int
         The rows of every element.
+    most : int, optional
+        Dimensions up to which a part that is connected by its elements is taken apart: of a larger one so many.
 
     Returns
     -------
     list of (elements, basis)
-        Numbers of the elements, and vectors (n, c) that only they carry. All bases together are k independent vectors.
+        Numbers of the elements, and vectors (n, c) that only they carry. All bases together are k independent vectors,
+        or fewer where ``most`` is.
     """
     out: list[tuple[list[int], np.ndarray]] = []
     for part in _parts(N, groups):
-        basis = span(part)
+        basis = span(part[:, :most])
         blocks = [basis[g] for g in groups]
         touched = [e for e, b in enumerate(blocks) if len(b) and np.abs(b).max() > SMALL]
         if basis.shape[1] == 1:

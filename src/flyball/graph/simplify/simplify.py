@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -56,6 +57,21 @@ def simplified(
     return out
 
 
+class Barriers:
+    """Numbers of the nodes that are not looked into: those to keep, and operations on infinity or nan.
+
+    These are values that no law of algebra holds for: infinity times a sum is not the sum of infinity times its terms.
+    """
+
+    def __init__(self, graph: Graph, kept: set[int]) -> None:
+        self.graph, self.kept = graph, kept
+
+    def __contains__(self, k: object) -> bool:
+        return k in self.kept or any(
+            a.op == NUMBER and not math.isfinite(a.value) for a in self.graph.nodes[cast(int, k)].args
+        )
+
+
 class Simplifier:
     """Makes expressions of one graph short; what it has found serves the next.
 
@@ -73,7 +89,7 @@ class Simplifier:
     ) -> None:
         self.graph = graph
         self.units = [tuple(x.index for x in unit) for unit in units]
-        self.barriers = {x.index for x in keep}
+        self.barriers = Barriers(graph, {x.index for x in keep})
         self.costs: dict[int, float] = {}
         size = len(reached(nodes))
         self.expander = Expander(self, most or (TERMS if size < MANY else FEW_TERMS))

@@ -42,11 +42,18 @@ class PointView(View):
         return stacked(self._record[5], self._result.planar)
 
     def _found(self, name: str) -> np.ndarray:
-        """Of a body where there is contact: the sum of contact forces on it [N], world axes, (n, 2) or (n, 3)."""
+        """Of a body: what holds a coordinate that events lock, or the sum of contact forces on it [N], world axes."""
+        if name.endswith("_effort"):
+            return self._effort(f"{self.element.name}.{name.removesuffix('_effort')}")
         found, n = self._result.contacts, 2 if self._result.planar else 3
         if found is None or self.element.name not in found.sides.names:
             return np.zeros((len(self._result.t), n))
         return found.force_on(*found.sides.span(self.element.name))[:, 0, :n]
+
+    def _effort(self, coordinate: str) -> np.ndarray:
+        """Force [N] or torque [N m] along a coordinate while it is locked, else 0: where no events happen, too."""
+        rows = [w.row for w in self._result.values.structure.switches if w.switch.label == coordinate]
+        return self._result.multipliers[:, rows[0]] if rows else self._result.records.zeros()
 
     @property
     def rotation(self) -> np.ndarray:
