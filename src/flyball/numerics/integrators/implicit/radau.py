@@ -101,7 +101,8 @@ def expect(callbacks, S, K, c, h):
     """Start values of the stages, and accelerations at the last one.
 
     What hardly moves by the rates of where a stretch begins moves by those of where it would end so: else
-    dx/dt = t - sqrt(x) would be linearised at x = 0 however wide the step is (`differentiate`).
+    dx/dt = t - sqrt(x) would be linearised at x = 0 however wide the step is (`differentiate`). With what begins to
+    move so the Jacobian of where it was at rest serves no longer.
     """
     predict(K, h)
     last, nv = STAGES - 1, K.v.shape[1]
@@ -122,11 +123,15 @@ def expect(callbacks, S, K, c, h):
             for k in range(STAGES):
                 K.v[k, i] += C[k] * C[k] * h * change / 2.0
                 K.d[k, i] += C[k] * C[k] * C[k] * h * h * change / 6.0
+            if abs(K.d[last, i]) > K.tol[0, i] or abs(K.v[last, i] - K.v[START, i]) > K.tol[1, i]:
+                K.count[FRESH] = -1
     for i in range(K.tol_x.shape[0]):
         if abs(K.z[last, i] - K.z[START, i]) <= K.tol_x[i]:
             change = c.K[1, at + nv + i] - K.rate[START, i]
             for k in range(STAGES):
                 K.z[k, i] += C[k] * C[k] * h * change / 2.0
+            if abs(K.z[last, i] - K.z[START, i]) > K.tol_x[i]:
+                K.count[FRESH] = -1
 
 
 @formula
