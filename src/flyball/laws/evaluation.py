@@ -229,6 +229,14 @@ def times(slope, rate):
 
 
 @formula
+def over(rate, size):
+    """Rate over size; of arguments that rest 0, though the size may be 0."""
+    if rate == 0.0:
+        return rate
+    return divide(rate, size)
+
+
+@formula
 def value(function, x):
     """f(x) of a function of one argument."""
     if function == NEGATE:
@@ -366,8 +374,8 @@ def combine_jets(operation, stack, k):
         put_chain(stack, k, f, f1, f2)
     elif operation == ATAN2:
         r = a * a + b * b
-        f1 = divide(b * a1 - a * b1, r)
-        put(stack, k, f, f1, divide(b * a2 - a * b2 - 2.0 * (a * a1 + b * b1) * f1, r))
+        f1 = over(b * a1 - a * b1, r)
+        put(stack, k, f, f1, over(b * a2 - a * b2 - 2.0 * (a * a1 + b * b1) * f1, r))
     elif operation == MINIMUM or operation == MAXIMUM:
         second = a - b if operation == MINIMUM else b - a
         put(stack, k, f, choose(second, b1, a1), choose(second, b2, a2))

@@ -173,7 +173,7 @@ def _of_sides_alone(args: Iterable[Node], moving: Collection[str]) -> bool:
 
 
 def _between(like: Node, way: Node, a: Node, b: Node) -> Node:
-    """A where ``way`` is 1, b where it is -1, and what is between: affine in every side, whichever parts it stands in."""
+    """A where ``way`` is 1, b where it is -1, and what is between: affine in every side, in however many parts."""
     if way.kind == SIDE or (way.kind == "neg" and way.args[0].kind == SIDE):
         at, value = (way.value, 1.0) if way.kind == SIDE else (way.args[0].value, -1.0)
         return _made(like, BETWEEN_SIDES, way, _with_side(a, at, value), _with_side(b, at, -value))
