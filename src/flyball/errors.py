@@ -4,16 +4,31 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 import sys
 import warnings
 from pathlib import Path
 from typing import Any
 
 PACKAGE = Path(__file__).parent
+HEAD, TAIL = 1200, 500  # characters of a long message that are kept: where it is, and what the rule and the remedy are
+_WORD = re.compile(r"\S{201,}")
+
+
+def readable(message: str) -> str:
+    """A message whose longest words, and as a whole what is longest, are shortened in the middle.
+
+    Names, formulas and lists that a user wrote may have any length.
+    """
+    text = _WORD.sub(lambda m: f"{m[0][:120]}...{m[0][-60:]}", message)
+    return text if len(text) <= HEAD + TAIL else f"{text[:HEAD]} ... {text[-TAIL:]}"
 
 
 class FlyballError(Exception):
     """Any error raised by flyball on purpose."""
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(readable(message))
 
 
 class ModelError(FlyballError, ValueError):
@@ -45,7 +60,7 @@ def warn(text: str, category: type[Warning]) -> None:
     depth, frame = 1, sys._getframe(0)
     while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(PACKAGE):
         depth, frame = depth + 1, frame.f_back
-    warnings.warn(text, category, stacklevel=depth)
+    warnings.warn(readable(text), category, stacklevel=depth)
 
 
 def optional(package: str, extra: str) -> Any:

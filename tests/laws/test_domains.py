@@ -5,6 +5,7 @@ The positions expected are SciPy's, DOP853 at rtol = 1e-12, atol = 1e-14 and ste
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import flyball as fb
@@ -96,6 +97,75 @@ def test_what_a_smooth_product_is_multiplied_by_keeps_its_corners(flow):
     assert run.health.steps < 100
 
 
+@pytest.mark.parametrize(
+    ("rate", "initial", "value"),
+    [
+        ("-sqrt(max(p, 0))", 0.04, 0.0),
+        ("-where(p > 0, sqrt(p), 0)", 0.04, 0.0),
+        ("t - sqrt(max(p, 0))", 0.0, 0.25),  # p = t^2/4
+        ("max(t - 0.5, 0) - sqrt(max(p, 0))", 0.0, 0.0625),  # it rests until then
+        ("where(t > 0.5, 1, 0) - 2*sqrt(max(p, 0))", 0.0, 0.17699087224126825),  # by SciPy, as above
+    ],
+)
+def test_state_at_rest_where_a_slope_is_infinite(rate, initial, value):
+    """The second derivative of the state was nan there; with radau nothing moved, or the root had no effect."""
+    m = fb.Mechanism(planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.State("p", rate=rate, initial=initial), fb.Actuator("k", "x.displacement", force="p"))
+    for options in ({}, {"method": "radau"}, {"method": "rk45"}, {"coordinates": "absolute"}):
+        assert m.simulate(1, **options)["p"].output[-1] == pytest.approx(value, abs=2e-7)
+
+
+@pytest.mark.parametrize(("law", "value"), [("t - sqrt(max(value, 0))", 0.8788363277328602),
+                                            ("max(t - 0.5, 0) - sqrt(max(value, 0))", 0.3929833512064383)])  # fmt: skip
+def test_implicit_steps_of_a_body_at_rest_where_a_slope_is_infinite(law, value):
+    """By SciPy, as above."""
+    m = fb.Mechanism(planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Actuator("k", "x.displacement", force=law))
+    for options in ({}, {"method": "radau"}, {"method": "radau", "step": 1e-3}):
+        assert m.simulate(2, **options)["x.displacement"][-1] == pytest.approx(value, abs=1e-7)
+
+
+@pytest.mark.parametrize("law", ["sqrt(max(t-1, 0))**5", "where(t > 1, (t-1)**2*sqrt(t-1), 0)", "sqrt(t)**5", "t**2*sqrt(t)",
+                                 "sqrt(max(t-1, 0))**4", "atan2(max(t-1, 0)**3, max(t-1, 0)**3)*0"])  # fmt: skip
+def test_driver_whose_law_is_smooth_though_a_part_of_it_is_not(law):
+    """The derivatives of the product are finite where those of a factor are infinite."""
+    m = fb.Mechanism(planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Driver("d", "x.displacement", law=law))
+    run = m.simulate(2, outputs=20)
+    power = 2.5 if "5" in law or "sqrt(t" in law else 2.0
+    expected = 0.0 if law.endswith("*0") else np.maximum(run.t - ("-1" in law), 0.0) ** power
+    assert run["x.displacement"] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_driver_still_leaves_the_domain_of_a_root_in_a_power():
+    m = fb.Mechanism(planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Driver("d", "x.displacement", law="sqrt(0.5 - t)**4"))
+    with pytest.raises(fb.SimulationError, match=r"Driver .d. cannot be followed beyond t = 0\.5 s"):
+        m.simulate(2)
+
+
+@pytest.mark.parametrize(
+    ("law", "value"),
+    [
+        ("-where(rate > 0, 1, where(rate < 0, -1, 0)) + 2*t", 1.5**3 / 3),  # rests until t = 0.5
+        ("-where(rate > 0 and rate >= 0, 1, -1) + 2*t", 1.5**3 / 3),
+        ("-sign(rate)*sign(rate)*sign(rate) + 2*t", 1.5**3 / 3),
+        ("-sign(rate)*where(rate > 0, 2, 1) + 2*t", 1 / 3),  # until t = 1
+    ],
+)
+def test_a_pull_grows_until_friction_lets_go(law, value):
+    """Parts of the law that decide by the same rate are affine in its side together."""
+    m = fb.Mechanism(planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Actuator("k", "x.displacement", force=law))
+    for options in ({}, {"method": "radau"}, {"coordinates": "absolute"}):
+        assert m.simulate(2, **options)["x.displacement"][-1] == pytest.approx(value, abs=1e-8)
+
+
 def test_size_of_an_angle_passes_half_a_turn():
     """|atan2(y, x)| has a corner there, though atan2(y, x) jumps; here even that has no effect."""
 
@@ -106,8 +176,11 @@ def test_size_of_an_angle_passes_half_a_turn():
         m.add(fb.Sensor("th", "B.angle"), fb.Sensor("w", "B.rate"), fb.Motor("M", "B", torque=torque))
         return float(m.simulate(3, rtol=1e-9)["B.angle"][-1])
 
-    catch = "0.01*step(abs(atan2(sin(th-pi), cos(th-pi))), 0.3, 1, 0.5, 0) - 0.001*w"
-    assert swing(catch) == pytest.approx(swing("-0.001*w"), abs=1e-8)
+    wrapped = "atan2(sin(th-pi), cos(th-pi))"
+    plain = swing("-0.001*w")
+    for size, near, far in ((f"abs({wrapped})", 0.3, 0.5), (f"{wrapped}**2", 0.09, 0.25)):
+        catch = f"0.01*step({size}, {near}, 1, {far}, 0) - 0.001*w"
+        assert swing(catch) == pytest.approx(plain, abs=1e-8)
 
 
 def test_the_text_of_a_law_without_a_value_is_told():

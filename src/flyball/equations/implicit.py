@@ -343,7 +343,7 @@ def perform(method, callbacks, S, W, M, own, going, task):
 def by_radau(S, W, M, own, going, task):
     """Radau IIA of order 5."""
     method = (attempt, between_radau, enter_radau, refuse)
-    return perform(method, (residual, linearise, compose, land, inspect), S, W, M, own, going, task)
+    return perform(method, (residual, linearise, compose, land, inspect, arrive_there), S, W, M, own, going, task)
 
 
 @door

@@ -168,7 +168,7 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
             else:
                 f = integer_power(v, operand)
                 f1, f2 = power_slopes(v, operand)
-            put(stack, top, f, f1 * stack[top, 1], f2 * stack[top, 1] * stack[top, 1] + f1 * stack[top, 2])
+            put_chain(stack, top, f, f1, f2)
         elif operation == WHERE:
             top -= 2
             yes = stack[top, 0] - 0.5
@@ -211,6 +211,29 @@ def put(stack, k, f, f1, f2):
     stack[k, 0] = f
     stack[k, 1] = f1
     stack[k, 2] = f2
+
+
+@formula
+def put_chain(stack, k, f, f1, f2):
+    """Write in row k, which holds an argument, a function of it with the value f and the slopes f1 and f2."""
+    u1, u2 = stack[k, 1], stack[k, 2]
+    put(stack, k, f, times(f1, u1), times(f2, u1 * u1) + times(f1, u2))
+
+
+@formula
+def times(slope, rate):
+    """Slope times rate; an argument that rests has no effect, though the slope there may be infinite."""
+    if rate == 0.0:
+        return rate
+    return slope * rate
+
+
+@formula
+def over(rate, size):
+    """Rate over size; of arguments that rest 0, though the size may be 0."""
+    if rate == 0.0:
+        return rate
+    return divide(rate, size)
 
 
 @formula
@@ -341,17 +364,18 @@ def combine_jets(operation, stack, k):
     elif operation == SUBTRACT:
         put(stack, k, f, a1 - b1, a2 - b2)
     elif operation == MULTIPLY:
-        put(stack, k, f, a1 * b + a * b1, a2 * b + 2.0 * a1 * b1 + a * b2)
+        f1 = times(b, a1) + times(a, b1)
+        put(stack, k, f, f1, times(b, a2) + 2.0 * times(a1, b1) + times(a, b2))
     elif operation == DIVIDE:
         f1 = divide(a1 - f * b1, b)
         put(stack, k, f, f1, divide(a2 - 2.0 * f1 * b1 - f * b2, b))
     elif operation == POWER:  # the exponent does not depend on time
         f1, f2 = power_slopes(a, b)
-        put(stack, k, f, f1 * a1, f2 * a1 * a1 + f1 * a2)
+        put_chain(stack, k, f, f1, f2)
     elif operation == ATAN2:
         r = a * a + b * b
-        f1 = divide(b * a1 - a * b1, r)
-        put(stack, k, f, f1, divide(b * a2 - a * b2 - 2.0 * (a * a1 + b * b1) * f1, r))
+        f1 = over(b * a1 - a * b1, r)
+        put(stack, k, f, f1, over(b * a2 - a * b2 - 2.0 * (a * a1 + b * b1) * f1, r))
     elif operation == MINIMUM or operation == MAXIMUM:
         second = a - b if operation == MINIMUM else b - a
         put(stack, k, f, choose(second, b1, a1), choose(second, b2, a2))

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
 from types import MappingProxyType
+from typing import Any
 
 from ..errors import ExpressionError
 from ..model.expressions import Expression, folded
@@ -36,7 +38,7 @@ from .opcodes import (
     WHERE,
     WHOLE_POWER,
 )
-from .sides import BETWEEN_SIDES, SIDE, Corners, on_one_side, whole
+from .sides import BETWEEN_SIDES, SIDE, Corners, meaning, on_one_side, whole
 
 _FUNCTIONS = ("neg", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs")
 _UNARY = {name: NEGATE + k for k, name in enumerate((*_FUNCTIONS, "sign", "cubic", "quintic", "not"))}
@@ -109,6 +111,8 @@ def compile_law(
     tree = _with_code(tree, code, functions)
     writer = _Writer(expression, inputs, parameters, const, sensors, tables)
     tree = _folded(expression, tree, writer.varying)
+    if derivatives:
+        tree = _single_powers(tree, writer.varying)
     if corners is not None:
         tree = on_one_side(tree, frozenset((*inputs[1:], *sensors)), corners)
     writer.write(tree)
@@ -155,6 +159,57 @@ def _folded(expression: Expression, tree: Node, varying: Collection[str]) -> Nod
         return folded(_expand(tree, varying), expression.text)
     except ExpressionError as error:
         raise ExpressionError(f"{expression.where}: {error}" if expression.where else str(error)) from None
+
+
+def _single_powers(node: Node, varying: Collection[str]) -> Node:
+    """The tree with one power in place of products of powers of one base, some of them broken: u**2 sqrt(u) is u**2.5.
+
+    Where u is zero its derivatives are those of a power, while those of a factor may be infinite.
+    """
+    node = replace(node, args=tuple(_single_powers(arg, varying) for arg in node.args)) if node.args else node
+    if node.kind != "*" and not (node.kind == "**" and whole(node.args[1])):
+        return node
+    groups: dict[Any, tuple[Node, float, bool]] = {}
+    for u, exponent, broken in _powers(node):
+        _, known, also = groups.get(meaning(u), (u, 0.0, False))
+        groups[meaning(u)] = u, known + exponent, broken or also
+    every = list(groups.values())
+    if not any(broken and e > 0.0 and not _constant(u, varying) for u, e, broken in every):
+        return node
+    factors = [_power(node, u, e, broken) for u, e, broken in every]
+    return reduce(lambda a, b: replace(node, kind="*", args=(a, b), value=None), factors)
+
+
+def _powers(node: Node) -> list[tuple[Node, float, bool]]:
+    """What is multiplied: bases, exponents, and whether the base must not be negative."""
+    if node.kind == "*":
+        return [x for arg in node.args for x in _powers(arg)]
+    if node.kind == "sqrt":
+        return [(node.args[0], 0.5, True)]
+    if node.kind == "**" and node.args[1].kind == "number":
+        base, exponent = node.args[0], float(node.args[1].value)
+        if not whole(node.args[1]):
+            return [(base, exponent, True)]
+        inner = _powers(base) if base.kind in ("sqrt", "**") else [(base, 1.0, False)]
+        return [(u, e * exponent, broken) for u, e, broken in inner]
+    return [(node, 1.0, False)]
+
+
+def _power(like: Node, u: Node, exponent: float, broken: bool) -> Node:
+    """A power; with ``broken``, of numbers that are not negative only."""
+    if exponent == 1.0 and not broken:
+        return u
+    number = replace(like, kind="number", args=(), value=exponent)
+    power = replace(like, kind="**", args=(u, number), value=None)
+    if not broken or exponent != int(exponent):
+        return power
+    zero = replace(number, value=0.0)
+    known = replace(power, kind="<=", args=(zero, u))
+    return replace(power, kind="where", args=(known, power, replace(power, kind="sqrt", args=(u,))))
+
+
+def _constant(node: Node, varying: Collection[str]) -> bool:
+    return not any(n.kind == SIDE or (n.kind == "name" and n.value in varying) for n in node.walk())
 
 
 def _refuse_twins(
@@ -213,9 +268,7 @@ class _Writer:
 
     def write(self, node: Node, frozen: bool = False) -> None:
         """Write a node after its arguments; `frozen` means that a constant part around it is already marked."""
-        constant = frozen or not any(
-            n.kind == SIDE or (n.kind == "name" and n.value in self.varying) for n in node.walk()
-        )
+        constant = frozen or _constant(node, self.varying)
         if node.kind == "number":
             return self.emit(CONSTANT, self.slot(float(node.value)), 1)
         if node.kind == SIDE:

@@ -66,7 +66,7 @@ def on_one_side(node: Node, moving: Collection[str], corners: Corners, taken: No
         yes, no = _both(taken, condition), _both(taken, _made(condition, "not", condition))
         a, b = on_one_side(a, moving, corners, yes), on_one_side(b, moving, corners, no)
         branches = _without_poles(a, b, no, moving), _without_poles(b, a, yes, moving)
-        return _made(node, BETWEEN_SIDES, _truth(condition, moving, corners), *branches)
+        return _between(node, _truth(condition, moving, corners), *branches)
     if node.kind == "abs" and node.args[0].kind == "atan2":  # |atan2(y, x)| = atan2(|y|, x), which does not jump
         y, x = node.args[0].args
         return on_one_side(_made(node, "atan2", _made(node, "abs", y), x), moving, corners, taken)
@@ -84,13 +84,14 @@ def on_one_side(node: Node, moving: Collection[str], corners: Corners, taken: No
                     out = _affine(_made(node, node.kind, out, arg))
                     continue
                 side = _side(node, difference(out, arg), corners)
-                out = _made(node, BETWEEN_SIDES, side, *((out, arg) if node.kind == "max" else (arg, out)))
+                out = _between(node, side, *((out, arg) if node.kind == "max" else (arg, out)))
             else:
                 out = _made(node, node.kind, out, arg)
         return out
     if node.kind == "table" and _moves(node.args[0], moving):
         corners(Node("table", args, node.value, node.start, node.stop))  # continuous: it only has to be watched
-    return _in_domain(Node(node.kind, args, node.value, node.start, node.stop), node, moving, taken)
+    made = _in_domain(Node(node.kind, args, node.value, node.start, node.stop), node, moving, taken)
+    return _affine_in_shared(made) if node.kind == "*" else made
 
 
 def _in_domain(node: Node, written: Node, moving: Collection[str], taken: Node | None) -> Node:
@@ -160,7 +161,7 @@ def _truth(node: Node, moving: Collection[str], corners: Corners) -> Node:
         return _made(node, "neg", first)
     for other in others:  # not the lesser, or larger, of two: a side beyond 1 is to be seen through the other
         known = Node("number", value=-1.0 if node.kind == "and" else 1.0)
-        first = _made(node, BETWEEN_SIDES, first, *((other, known) if node.kind == "and" else (known, other)))
+        first = _between(node, first, *((other, known) if node.kind == "and" else (known, other)))
     return first
 
 
@@ -170,6 +171,23 @@ def _of_sides_alone(args: Iterable[Node], moving: Collection[str]) -> bool:
     return any(n.kind == SIDE for n in nodes) and not any(
         n.kind == "name" and (n.value == "t" or n.value in moving) for n in nodes
     )
+
+
+def _between(like: Node, way: Node, a: Node, b: Node) -> Node:
+    """A where ``way`` is 1, b where it is -1, and what is between: affine in every side, in however many parts."""
+    if way.kind == SIDE or (way.kind == "neg" and way.args[0].kind == SIDE):
+        at, value = (way.value, 1.0) if way.kind == SIDE else (way.args[0].value, -1.0)
+        return _made(like, BETWEEN_SIDES, way, _with_side(a, at, value), _with_side(b, at, -value))
+    return _affine_in_shared(_made(like, BETWEEN_SIDES, way, a, b))
+
+
+def _affine_in_shared(node: Node) -> Node:
+    """The node, affine in the sides that stand in two or more of its arguments: products of them would be no more."""
+    sides = [dict.fromkeys(n.value for n in arg.walk() if n.kind == SIDE) for arg in node.args]
+    for at in dict.fromkeys(x for k, found in enumerate(sides) for x in found if any(x in y for y in sides[:k])):
+        way = Node(SIDE, (), at, node.start, node.stop)
+        node = _made(node, BETWEEN_SIDES, way, _with_side(node, at, 1.0), _with_side(node, at, -1.0))
+    return node
 
 
 def _affine(node: Node) -> Node:

@@ -23,9 +23,12 @@ from .attached import refuse_attached, remedy
 from .function import apply, arguments, function_tree
 from .grammar import CONSTANTS, FUNCTIONS, Node, did_you_mean, read, refuse
 from .units import is_unit, split_quantity, to_si
+from .words import shortened
 
 if TYPE_CHECKING:
     from .table import Table
+
+NAMES = 600  # characters of the known names in a message
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,7 @@ class Expression:
             cure = f"a unit follows a single number, as in '2 {name}', in a formula within parentheses"
         else:
             cure = f"define a parameter '{name}', or correct the name"
-        listed = f"known names: {', '.join(sorted(known)) or 'none'}; {cure}"
+        listed = f"known names: {shortened(sorted(known), NAMES) or 'none'}; {cure}"
         refuse(self.text, node.start, node.stop, f"unknown name '{name}'", listed)
 
     def evaluate(self, env: Mapping[str, Any], tables: Mapping[str, Table] | None = None) -> Any:

@@ -73,6 +73,23 @@ class Node:
             yield from arg.walk()
 
 
+def written(node: Node) -> str:
+    """A tree as text, for messages."""
+    if node.kind == "number":
+        return f"{node.value:.6g}"
+    if node.kind == "name":
+        return str(node.value)
+    args = [written(arg) for arg in node.args]
+    infix = (*_CONDITIONS, *_BINARY.values())
+    if node.kind in ("neg", "not"):
+        return f"{'-' if node.kind == 'neg' else 'not '}{args[0]}"
+    if node.kind in infix:
+        blank = "" if node.kind in ("*", "/", "**") else " "
+        return f"({f'{blank}{node.kind}{blank}'.join(args)})"
+    bare = [text[1:-1] if arg.kind in infix else text for text, arg in zip(args, node.args, strict=True)]
+    return f"{node.value if node.kind == 'table' else node.kind}({', '.join(bare)})"
+
+
 def read(text: str, tables: Collection[str] = (), curves: bool = False) -> tuple[str, Node]:
     """The text on one line, and its tree; `ExpressionError` if it is not a formula.
 

@@ -37,3 +37,8 @@ def shortened(names: Iterable[str], most: int = 60) -> str:
     if len(every) - len(kept) <= 3:
         return ", ".join(every)
     return f"{', '.join(kept)}, ... {every[-1]}"
+
+
+def brief(text: str, most: int = 200) -> str:
+    """A text, of a long one the beginning and the end."""
+    return text if len(text) <= most else f"{text[: 2 * most // 3]} ... {text[-most // 4 :]}"

@@ -31,6 +31,8 @@ def ending(path: str | os.PathLike, known: Sequence[str]) -> str:
         return found
     if _device(at):
         return ""
+    if at.is_dir():
+        raise cannot_write(at, IsADirectoryError())
     said = f"the ending {found!r} is not known here" if found else "its name has no ending"
     other = next((f"; {how} writes {found}" for kinds, how in ELSEWHERE.items() if found in kinds), "")
     raise ModelError(f"cannot write {os.fspath(path)!r}: {said}; it must be {' or '.join(known)}{other}")

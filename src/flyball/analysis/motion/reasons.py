@@ -18,7 +18,9 @@ from ...laws.opcodes import BY_TIME
 from ...model.body import Driver
 from ...model.element import Element, LawOf, fields_with
 from ...model.force import CoordinateForce
+from ...model.grammar import written
 from ...model.touch import Touch
+from ...model.words import brief
 from ...numerics.integrators import clock as ex
 from ...tables.system import (
     BODY_LAW,
@@ -50,12 +52,12 @@ from .residual import missed
 from .rounding import excess, far_off, rounded
 from .samples import too_often
 from .unbounded import boundless, escaping, too_long
+from .undefined import undefined_in
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
 LOCKED = 1e-3  # part of the accelerations asked for that no solution of the rows leaves open
 PARTED = 1e-6  # part of a rate or second derivative by which laws of one coordinate differ that disagree
-LONGEST = 200  # characters of a law's text in a message
 PARTS = ("value", "rate", "second derivative")
 SHARP = 10.0  # a law that changes this many times more than its own slope says has jumped
 
@@ -123,7 +125,7 @@ def of_drivers(a: Assembly, clock: ex.Clock) -> str:
             )
         problem = _no_number(after) or _jump(before, after[0], NEAR * span, wrapped)
         if problem:
-            return f"{driver.title} cannot be followed beyond t = {t:.6g} s: its law {problem}"
+            return f"{driver.title} cannot be followed beyond t = {t:.6g} s: its law {problem}{_texts(driver)}"
     return ""
 
 
@@ -201,9 +203,10 @@ def _not_finite(a: Assembly, clock: ex.Clock, method: str) -> str:
         return f"at t = {t:.6g} s the motion is not finite any more: {text}"
     if text := boundless(a, clock, _component):
         return text
-    force = next((x for d in (0.0, *AHEAD) if (x := broken_force(a.compiled, t + d * span))), "")
-    if force:
-        return f"the equations of motion are not finite just after t = {t:.6g} s: {force}"
+    times = [t + d * span for d in (0.0, *AHEAD)]
+    broken = (text for at in times for find in (broken_force, _broken_rate) if (text := find(a.compiled, at)))
+    if text := next(broken, "") or _broken_ahead(a, clock):
+        return f"the equations of motion are not finite just after t = {t:.6g} s: {text}"
     wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)
     if not wrong.any() and (corners := _held_on(a)):
         return (
@@ -266,9 +269,11 @@ def broken_force(c: Compiled, t: float) -> str:
                 given = (
                     "".join(f", {n} = {v:.6g}" for n, v in zip(e.outputs, (x, y), strict=False)) if e.outputs else ""
                 )
+                part = undefined_in(c, e, t, (float(x), float(y)))
                 return (
-                    f"the law of {e.title} gives {laws} for t = {t:.6g}{given}. Look for a division by zero or a range "
-                    f"that it leaves{_texts(e)}"
+                    f"the law of {e.title} gives {laws} for t = {t:.6g}{given}"
+                    f"{f', as {part}' if part else ''}. Look for a division by zero or a range that it leaves"
+                    f"{_texts(e)}"
                 )
             pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
             out = (
@@ -281,11 +286,37 @@ def broken_force(c: Compiled, t: float) -> str:
     return ""
 
 
+def _broken_rate(c: Compiled, t: float) -> str:
+    """The controller whose state has no finite rate for what is measured as the compiled loop has left it."""
+    for x in c.structure.controls:
+        if part := undefined_in(c, x.controller, t):
+            law = brief(written(x.law.tree))
+            return f"the rate of {x.name!r} of {x.controller.title}, {law}, has no finite value, as {part}"
+    return ""
+
+
+def _broken_ahead(a: Assembly, clock: ex.Clock) -> str:
+    """The force or controller without a finite value where the motion would be by its present rates."""
+    c, t, y, rates = a.compiled, float(clock.real[ex.T]), clock.y[ex.NOW], clock.K[0]
+    if not np.isfinite(y).all() or not np.isfinite(rates).all():
+        return ""
+    s, z = c.structure, c.z
+    for d in (clock.real[ex.H], *(part * clock.real[ex.LARGEST] for part in AHEAD)):
+        x = y + d * rates
+        c.z = x[s.nq + s.nv :].copy()
+        with np.errstate(all="ignore"):
+            c.at(t + d, x[: s.nq].copy(), x[s.nq : s.nq + s.nv].copy(), MOTION)
+        if text := broken_force(c, t + d) or _broken_rate(c, t + d):
+            break
+    c.z = z
+    return text
+
+
 def _texts(e: Element) -> str:
-    """What the laws of a force are as given, the beginning of long ones."""
-    given = {name: getattr(e, name) for name in fields_with(e.__class__, LawOf)}
-    shown = {n: x if len(x) <= LONGEST else f"{x[:LONGEST]} ..." for n, x in given.items() if isinstance(x, str)}
-    texts = [f"{name} = {x}" for name, x in shown.items()]
+    """What the laws of a force are as given, the beginning and end of long ones."""
+    given = {name: getattr(e, name) for name in ("law",) if isinstance(e, Driver)}
+    given |= {name: getattr(e, name) for name in fields_with(e.__class__, LawOf)}
+    texts = [f"{name} = {brief(x)}" for name, x in given.items() if isinstance(x, str)]
     return f", in {'; '.join(texts)}" if texts else ""
 
 

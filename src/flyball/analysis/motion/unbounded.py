@@ -7,8 +7,12 @@ from collections.abc import Callable
 import numpy as np
 
 from ...equations.engine import MOTION, evaluate
+from ...model.force import Force
+from ...model.grammar import written
+from ...model.words import brief, shortened
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import TABLEAUX, Tableau, tableau
+from ...tables.branches import laws
 from ...tables.system import VALUE
 from ..assembly.start import Assembly
 
@@ -72,8 +76,19 @@ def escaping(a: Assembly, clock: ex.Clock, named: Named) -> str:
     i = first + int(np.argmax(part))
     return (
         f"at t = {t:.6g} s {_told(a, i, float(y[i]), named)} and changes by {rate[i]:.3g} in a second, faster and "
-        f"faster: it has no value from there on. Look at the law of its rate"
+        f"faster: it has no value from there on. {_cause(a, i)}"
     )
+
+
+def _cause(a: Assembly, i: int) -> str:
+    """Where to look for what makes component i run off."""
+    s = a.compiled.structure
+    if i >= s.nq + s.nv:
+        x = s.controls[i - s.nq - s.nv]
+        return f"Look at the law of its rate, {brief(written(x.law.tree))}"
+    pushing = dict.fromkeys(e.title for e, _, _ in laws(s.model) if isinstance(e, Force))
+    known = f"Look at the laws of {shortened(pushing)}, or for" if pushing else "Look for"
+    return f"{known} a force that grows without bound where the motion ended, as 1/r**2 does towards r = 0"
 
 
 def longest_stable(a: Assembly, R: Tableau) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from ....errors import SimulationError
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
 from ....numerics.integrators.implicit.desk import Desk
-from ....tables.system import FREE, NV, Q0, SCHUR, SCRATCH, SOLVER, SPHERICAL, TREE, V0, System
+from ....tables.system import FREE, G_CORNER, NV, Q0, SCHUR, SCRATCH, SOLVER, SPHERICAL, TREE, V0, System
 from ...compiled import Compiled
 from ...linear.derivatives import refuse_functions
 from ...linear.loads import STEP, as_complex
@@ -136,6 +136,7 @@ class Implicit:
         real[ds.STAYS] = 2.0 if x.dear else 1.2  # Hairer and Wanner (1996), IV.8, of large systems and of others
         count[ds.LEAST], count[ds.INDEX_3] = 2 if turns else 1, int(x.index_3)
         count[ds.SHARED] = int(x.first[SIZES]) if len(x.pressing) else 0
+        count[ds.CORNERS] = int(any(kind == G_CORNER for kind, _, _ in x.s.guards))
 
     def _desk(self, nz: int, springy: np.ndarray) -> Desk:
         """The desk of a run as it is new."""

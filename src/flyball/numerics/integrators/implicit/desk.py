@@ -19,8 +19,8 @@ from ...lu import Rows
 # entries of Desk.count: what was done; whether the Jacobian is that of the present state (1), serves (0) or not (-1);
 # whether there is a polynomial of the step before; refinements of each linear solve; iterations of a step at least;
 # iterations of all stages together; whether velocities are not held to the constraints (index 3); where the sizes of
-# rows begin in the Jacobian, if forces depend on multipliers
-ITERATIONS, JACOBIANS, FACTORS, FRESH, BEFORE, REFINE, LEAST, WHOLE, INDEX_3, SHARED, COUNTS = range(11)
+# rows begin in the Jacobian, if forces depend on multipliers; whether laws of forces or states have corners
+ITERATIONS, JACOBIANS, FACTORS, FRESH, BEFORE, REFINE, LEAST, WHOLE, INDEX_3, SHARED, CORNERS, COUNTS = range(12)
 # entries of Desk.real: tolerances as the estimate needs them; bound of the iteration; its last ratio, and its rate;
 # width that is factored for; width and error of the step before; what the last step asks for: iterations it took, or
 # the factor of its width; regularisation; size of corrections that are taken for rounding where they do not fall any

@@ -23,6 +23,7 @@ from ...lu import lu_factor
 from ..clock import ASIDE, ASIDE_RATE, NEW, NOW, STEP, T
 from .desk import (
     BEFORE,
+    CORNERS,
     FACTORS,
     FRESH,
     ITERATIONS,
@@ -236,7 +237,7 @@ def attempt(callbacks, S, K, c, h):
             K.count[FRESH] = -1
     tolerances(c, K)
     if K.count[FRESH] < 0:
-        if K.count[BEFORE] == 0:  # the slopes of laws at a corner are those of no other place: see `radau`
+        if K.count[BEFORE] == 0 and K.count[CORNERS] == 1:  # see `radau.differentiate`
             place(K, h)
             predict(K, h)
             ends(callbacks, S, K, h)

@@ -37,9 +37,11 @@ from ..clock import BEFORE as BEGAN
 from ..loop import shorten
 from ..refusal import afresh, take_back
 from .asked import WIDEST
+from .coefficients import C
 from .desk import (
     ASKED,
     BEFORE,
+    CORNERS,
     FRESH,
     JACOBIANS,
     LAST_ERROR,
@@ -54,7 +56,7 @@ from .desk import (
     WIDTH,
 )
 from .newton import factor
-from .step import MOST, begin, estimate, iterate, predict
+from .step import MOST, STAGES, begin, estimate, iterate, predict
 from .whole import iterate_whole
 
 SAFETY = 0.9
@@ -82,19 +84,56 @@ def rest(K, c):
 def differentiate(linearise, S, K, c, h):
     """The numbers of the Jacobian, in row START. Returns a status.
 
-    It is that of where the step begins. In the first step of a stretch it is that of where the step is expected to
-    end: a stretch may begin at the corner of a law, where its slope may be infinite (sqrt(x) at 0), and with that
-    Newton's corrections, and the estimated error, would be next to nothing whatever the equations miss.
+    It is that of where the step begins. Where laws have corners, that of the first step of a stretch is that of where
+    the step is expected to end: a stretch may begin at the corner of a law, where its slope may be infinite (sqrt(x) at
+    0), and with that Newton's corrections, and the estimated error, would be next to nothing whatever the equations
+    miss.
     """
-    if K.count[BEFORE] == 1:
+    if K.count[BEFORE] == 1 or K.count[CORNERS] == 0:
         return linearise(c.real[T], START, S, K, c)
-    last = K.d.shape[0] - 2
-    for i in range(K.v.shape[1]):
-        K.a[last, i] = K.a[START, i]
+    last = STAGES - 1
     status = linearise(c.real[T] + h, last, S, K, c)
     for e in range(K.J.shape[1]):
         K.J[START, e] = K.J[last, e]
     return status
+
+
+@formula
+def expect(callbacks, S, K, c, h):
+    """Start values of the stages, and accelerations at the last one.
+
+    What hardly moves by the rates of where a stretch begins moves by those of where it would end so: else
+    dx/dt = t - sqrt(x) would be linearised at x = 0 however wide the step is (`differentiate`). With what begins to
+    move so the Jacobian of where it was at rest serves no longer.
+    """
+    predict(K, h)
+    last, nv = STAGES - 1, K.v.shape[1]
+    for i in range(nv):
+        K.a[last, i] = K.a[START, i]
+    if K.count[BEFORE] == 1 or K.count[CORNERS] == 0:
+        return
+    compose, evaluate = callbacks[2], callbacks[5]
+    compose(c.y[NOW], K.d[last], K.v[last], K.z[last], c.y[NEW], S)
+    status, _ = evaluate(c.real[T] + h, c.y[NEW], c.K[1], S, K)
+    if status != 0:
+        return
+    at = c.y.shape[1] - K.z.shape[1] - nv
+    for i in range(nv):
+        if abs(K.d[last, i]) <= K.tol[0, i] and abs(K.v[last, i] - K.v[START, i]) <= K.tol[1, i]:
+            change = c.K[1, at + i] - K.a[START, i]
+            K.a[last, i] += change
+            for k in range(STAGES):
+                K.v[k, i] += C[k] * C[k] * h * change / 2.0
+                K.d[k, i] += C[k] * C[k] * C[k] * h * h * change / 6.0
+            if abs(K.d[last, i]) > K.tol[0, i] or abs(K.v[last, i] - K.v[START, i]) > K.tol[1, i]:
+                K.count[FRESH] = -1
+    for i in range(K.tol_x.shape[0]):
+        if abs(K.z[last, i] - K.z[START, i]) <= K.tol_x[i]:
+            change = c.K[1, at + nv + i] - K.rate[START, i]
+            for k in range(STAGES):
+                K.z[k, i] += C[k] * C[k] * h * change / 2.0
+            if abs(K.z[last, i] - K.z[START, i]) > K.tol_x[i]:
+                K.count[FRESH] = -1
 
 
 @formula
@@ -103,7 +142,7 @@ def attempt(callbacks, S, K, c, h):
     residual, linearise, compose, arrive = callbacks[:4]
     begin(c, K)
     rest(K, c)
-    predict(K, h)
+    expect(callbacks, S, K, c, h)
     if c.real[GROW] <= 1.0 and K.count[FRESH] == 0 and (c.count[TROUBLE] != 0 or K.real[THETA] > K.real[SERVES]):
         K.count[FRESH] = -1
     if K.count[FRESH] < 1 and not (K.count[FRESH] == 0 and K.real[WIDTH] > 0.0):
@@ -117,7 +156,7 @@ def attempt(callbacks, S, K, c, h):
     status, asked = iterate(residual, S, K, c, h)
     if status != 0:
         if K.count[FRESH] == 1:
-            predict(K, h)
+            expect(callbacks, S, K, c, h)
             status = iterate_whole((residual, linearise), S, K, c, h)
             if status == 0:
                 asked = float(MOST)
