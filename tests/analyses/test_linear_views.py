@@ -172,7 +172,7 @@ def test_pictures_go_to_files(tmp_path: Path) -> None:
     ):
         assert draw(tmp_path / f"{k}.png") is None
         assert (tmp_path / f"{k}.png").stat().st_size > 10_000
-    with pytest.raises(fb.ModelError, match="it must be .png or .svg or .pdf"):
+    with pytest.raises(fb.ModelError, match="it must be"):
         linear.bode(path=tmp_path / "a.bmp")
 
 

@@ -36,7 +36,7 @@ def test_picture(press, tmp_path):
     assert (tmp_path / "press.png").stat().st_size > 10_000
     with pytest.raises(fb.ModelError, match=r"no coordinate 'knee.angel' \(did you mean 'knee.angle'\?\)"):
         press.plot(coordinate="knee.angel")
-    with pytest.raises(fb.ModelError, match="it must be .png or .svg or .pdf"):
+    with pytest.raises(fb.ModelError, match="it must be"):
         press.plot(tmp_path / "press.bmp")
 
 
