@@ -164,3 +164,33 @@ def test_a_motion_with_contact_goes_on_from_where_one_ended():
     assert then["push"].work == pytest.approx(whole["push"].work[4:], abs=1e-9)
     with pytest.raises(fb.ModelError, match="start"):
         m.simulate(0.8, t_start=0.1, start=first, method="impulse")
+
+
+@pytest.mark.parametrize("restitution", [0.5, 0.9])
+@pytest.mark.parametrize("step", [2e-3, 5e-4])
+def test_a_pendulum_that_jams_on_the_floor(step, restitution):
+    """Friction alone would hold more than restitution gives back (Painleve's jam): the pendulum stops at once.
+
+    With a and b the distances of the floor's point from the hinge along floor and normal, compression ends after
+    I w / (a + mu b), in which friction opposes the slip; expansion adds its part, held by friction.
+    """
+    mass, radius, mu, top = 0.5, 0.05, 0.8, 0.55
+    m = fb.Mechanism("jam", gravity=(0, 0, -9.81))
+    m.add(fb.Ground("floor", shape=fb.Plane()))
+    m.add(fb.Body("bob", mass=mass, inertia=(5e-4,) * 3, shape=fb.Sphere(radius=radius), position=(0.27, 0.0, 0.083)))
+    m.add(fb.Revolute("hinge", "ground", "bob", at=(0.0, 0.0, top), axis=(0, 1, 0)))
+    m.add(fb.Contact(friction=mu, restitution=restitution))
+    run = m.simulate(0.3, outputs=round(0.3 / step) + 1, method=fb.Stepping(step=step))
+    assert not run.health.warnings
+    length = np.hypot(0.27, top - 0.083)
+    a = np.sqrt(length**2 - (top - radius) ** 2)
+    rate = np.sqrt(2 * 9.81 * mass * (0.083 - radius) / (mass * length**2 + 5e-4))
+    pressed = (1 + restitution) * (mass * length**2 + 5e-4) * rate / (a + mu * top)
+    hit = int(np.argmax(run.contacts.normal_force))
+    at = run.contacts.t[run.contacts.when[hit]]
+    assert step * run.contacts.normal_force[hit] == pytest.approx(pressed, rel=15.0 * step)
+    after = run.energy.kinetic[run.t > at + 3 * step]
+    assert after.max() < 0.02 * run.energy.kinetic.max()
+    assert run.energy.impact_loss[-1] + run.energy.friction_loss[-1] == pytest.approx(
+        run.energy.kinetic.max(), rel=20.0 * step
+    )

@@ -33,7 +33,10 @@ ARRAYS = {  # columns of the table: type, numbers a row
 class Contacts:
     """Contacts at the output times, row by row; the rows of time ``i`` are ``begin[i]`` to ``begin[i + 1]``.
 
-    ``run.contacts.at(0.5)``, ``run.contacts.between("ball", "ground")``, ``run.contacts.on("ball")``.
+    ``run.contacts.at(0.5)``, ``run.contacts.between("ball", "ground")``, ``run.contacts.on("ball")``. In steps by
+    impulses the rows of a time are the contacts of the step that ends there. Such a step finds its contacts with the
+    poses of its start: ``point`` and ``gap`` belong to these, a step before the poses of the result at that time. With
+    every other method they belong to the output time.
 
     Attributes
     ----------
@@ -44,11 +47,12 @@ class Contacts:
     pair : ndarray (k, 2) of int
         The two sides, as `Sides` counts them.
     point : ndarray (k, 3) [m]
-        Midway between the surfaces, world axes.
+        Midway between the surfaces, world axes; in steps by impulses where the step began.
     normal : ndarray (k, 3)
-        From the first side to the second.
+        From the first side to the second; in steps by impulses the one along which the impulse was found, of the start
+        of the step or of its middle.
     gap : ndarray (k,) [m]
-        Below zero where they overlap.
+        Below zero where they overlap; in steps by impulses at the start of the step.
     force : ndarray (k, 3) [N]
         On the second side, the mean over the step that ends at the time, world axes.
     state : ndarray (k,) of int
@@ -107,7 +111,7 @@ class Contacts:
 
     @property
     def worst_overlap(self) -> float:
-        """Deepest overlap at an output time [m]; 0 if nothing overlapped."""
+        """Deepest overlap of the contacts in the table [m]; 0 if nothing overlapped. Whose poses: see `Contacts`."""
         return float(-np.min(self.gap, initial=0.0))
 
     @property

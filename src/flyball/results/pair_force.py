@@ -28,7 +28,8 @@ class PairForce:
     tangential_force : ndarray (n,) [N]
         Size of the summed tangential forces.
     center : ndarray (n, 3) [m]
-        Mean point of the contacts, weighed by their normal forces; nan where nothing presses.
+        Mean point of the contacts, weighed by their normal forces; nan where nothing presses. In steps by impulses it
+        belongs to the start of the step that ends at the time, as ``gap`` does: see `Contacts`.
     gap : ndarray (n,) [m]
         The least of the contacts; nan where there is none.
     count : ndarray (n,) of int

@@ -21,13 +21,14 @@ from ..contact.tables import FOUND, GAP, MATERIAL, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
 from ..math.vec import add, dot, load3, put3, scale, sub
 from ..numerics.cone.operator import across, seen, seen_turning
-from ..numerics.cone.problem import ENOUGH, MOST, NONE
+from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, MOST, NONE, RESIDUAL
 from .motion import no_impact
 from .penalty import stiffness
 from .sequence import one_after_the_other
 from .tables import (
     BEFORE_KICK,
     BOUNCE,
+    CUTS,
     ENOUGH_V,
     FLAT,
     GIVEN,
@@ -41,6 +42,7 @@ from .tables import (
     NO_RESTITUTION,
     POISSON,
     REDUCED,
+    ROUGH,
     SEQUENTIAL,
     STEP,
     SWEEPS,
@@ -61,27 +63,22 @@ def elasticity(G, C, L, c):
 
 
 @formula
-def bounce(G, C, at, bias, R, Z, E, X, W, O, F, L, pace, now):
-    """Impacts; velocities in ``X.v`` and ``X.wide`` are those after them. Returns whether there were any.
+def bounce(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
+    """The impacts that `hits` found; velocities in ``X.v`` and ``X.wide`` are those after them.
 
     ``R`` is the problem with biases and least normal impulses of its own, ``Z`` the state of compression, which shares
     its velocities with ``X``, ``E`` that of expansion.
     """
-    if pace.count[LAW] == NO_RESTITUTION or not hits(G, C, at, bias, R, X, L, pace, now):
-        return False
     if pace.count[SEQUENTIAL] != 0:
         for c in range(C.count[FOUND]):
             R.least[c] = elasticity(G, C, L, c)
         if not one_after_the_other(R, Z, X, C, pace, now):
             pace.count[REDUCED] += 1
-        close(R, bias, Z, X, C, pace, now)
-        return True
-    if pace.count[LAW] == POISSON:
+    elif pace.count[LAW] == POISSON:
         by_compression(G, C, bias, R, Z, E, X, W, O, F, L, pace, now)
     else:
         by_velocities(C, bias, R, Z, E, X, W, O, F, pace, now)
     close(R, bias, Z, X, C, pace, now)
-    return True
 
 
 @formula
@@ -143,6 +140,8 @@ def copy_velocities(X, E):
 @formula
 def hits(G, C, at, bias, R, X, L, pace, now):
     """Whether there are impacts; biases of the contacts that are hit, and their velocities before in ``now``."""
+    if pace.count[LAW] == NO_RESTITUTION:
+        return False
     h = pace.real[STEP]
     slowest = no_impact(pace, h)
     found = False
@@ -190,6 +189,8 @@ def solve_afresh(address, R, Z, W, O, F, pace):
     O.count[MOST] = MORE * pace.count[SWEEPS]
     O.real[ENOUGH] = pace.real[ENOUGH_V]
     enter(address, R, Z, W, O, F.impacts, 0)
+    if O.count[ENDED] != CONVERGED and O.real[RESIDUAL] > pace.real[ROUGH] * pace.real[STEP]:
+        pace.count[CUTS] += 1
 
 
 @formula

@@ -21,8 +21,9 @@ from ..tables.system import System, Work
 # impulses, from those before the step in State.wide (movers' twists follow); those put there; rows of contacts into the
 # problem; velocities found taken from State.wide, and put there as joints allow; the mean velocities put there, lines
 # being made those of the second solve; the way gone with these and others beside them in State.wide; velocities at its
-# end put there. Besides, impacts over before the step whose impulses stand in a state; poses as last evaluated
-START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES, KICKED, POSES = range(10)
+# end put there. Besides, impacts over before the step whose impulses stand in a state; poses as last evaluated;
+# velocities in State.wide before an impact made those that joints allow where rows are
+START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES, KICKED, POSES, CONSISTENT = range(11)
 # entries of Joined.real: time and step; energy lost at stops; by how far (< 0) a stop
 # would be overrun; gravity's potential energy, and its work over the step at the mean velocities; kinetic energy before
 # the mechanism was put onto its joints, -1 where nothing is hit; energy that the method takes at joints

@@ -5,7 +5,8 @@ from __future__ import annotations
 from ..compiler.door import door, enter
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
-from ..equations.tasks import ARRIVE, MOTION, POSITION
+from ..equations.rows import row_times
+from ..equations.tasks import ARRIVE, MOTION, POSITION, SOLVE
 from ..equations.tree import retract
 from ..math.vec import load3, load9, put3, put9
 from ..numerics.integrators.clock import T
@@ -27,9 +28,11 @@ from .gauges import put_right
 from .implicit import dot_rows, implied, respond
 from .joined import (
     ADDED,
+    ASTRAY,
     BEGIN,
     BEGUN,
     CHANGE,
+    CONSISTENT,
     EFFORTS,
     FINISH,
     FIRST,
@@ -90,6 +93,9 @@ def ask(A, M, C, P, X, task):
     if task == POSES:
         show(A, M, True)
         return 0
+    if task == CONSISTENT:
+        make_consistent(A, X)
+        return 0
     if task == KICKED:
         for d in range(A.wide.shape[1]):
             A.wide[IMPULSE, d] = 0.0
@@ -107,6 +113,27 @@ def ask(A, M, C, P, X, task):
         for d in range(A.wide.shape[1]):
             X.wide[d] = A.clock.y[0, A.S.kinds[COORDINATES] + d]
     return 0
+
+
+@formula
+def make_consistent(A, X):
+    """Velocities before an impact made those that joints allow at half the step, where the rows are.
+
+    Those of the start of the step are none by what joints turn in half of it. Impulses of contacts along which nothing
+    can move do not end such a part, and where friction jams they would grow without bound.
+    """
+    rows = A.sheet.rows
+    for d in range(A.wide.shape[1]):
+        rows[0, d] = 0.0
+    for r in range(A.S.row_i.shape[0]):
+        rows[1, r] = A.W.row[NU, r] - row_times(A.S, A.W, r, X.wide)
+    enter(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, SOLVE)
+    for d in range(A.wide.shape[1]):
+        A.wide[WAY, d] = X.wide[d] + 0.5 * rows[2, d]
+        X.wide[d] += rows[2, d]
+        A.wide[V_BEFORE, d] = X.wide[d]
+    for r in range(A.S.row_i.shape[0]):
+        A.real[ASTRAY] -= rows[3, r] * row_times(A.S, A.W, r, A.wide[WAY])
 
 
 @formula

@@ -7,14 +7,16 @@ from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..contact.broad.search import FASTER, MIDWAY
 from ..contact.broad.search import STEP as STEP_ON
-from ..contact.tables import AHEAD, BEFORE, DONE, FOUND, GAP, NORMAL, NUMBER
+from ..contact.tables import AHEAD, BEFORE, DONE, FOUND, FULL_CONTACTS, GAP, NORMAL, NUMBER, POINT
 from ..math.vec import load3, put3
 from ..numerics.cone.operator import push, seen
 from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
-from .bounce import ROUNDS, bounce, no_kicks
+from ..tables.system import COORDINATES
+from .bounce import ROUNDS, bounce, hits, no_kicks
 from .joined import (
     ASTRAY,
     BEGIN,
+    CONSISTENT,
     FINISH,
     FIRST,
     FREE,
@@ -28,7 +30,6 @@ from .joined import (
     POSES,
     ROWS,
     TOO_LONG,
-    V_BEFORE,
 )
 from .joined import STEP as JOINTS_STEP
 from .joined import TIME as JOINTS_TIME
@@ -64,6 +65,7 @@ from .tables import (
     MOST_CONTACTS,
     NUMERICAL,
     POSITIONS,
+    REDUCED,
     ROUGH,
     SEARCHING,
     STEP,
@@ -201,28 +203,34 @@ def onto_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, pace, now):
 
 @formula
 def ledger(A, pace):
-    """Energies that contacts, stops and joints exchanged so far, and those that the method took."""
-    real = pace.real
-    return real[LOST_IMPACT], real[LOST_FRICTION], real[GIVEN], real[NUMERICAL], A.real[LOST], A.real[ASTRAY]
+    """Energies that contacts, stops and joints exchanged so far, and those that the method took; counts of impacts."""
+    real, count = pace.real, pace.count
+    energies = real[LOST_IMPACT], real[LOST_FRICTION], real[GIVEN], real[NUMERICAL], A.real[LOST], A.real[ASTRAY]
+    return energies, (count[IMPACTS], count[REDUCED], count[ENDLESS])
 
 
 @formula
-def back(N, A, X, pace, sums):
-    """Velocities and energies of the start of the step again, after its impacts."""
+def back(N, M, A, X, pace, sums):
+    """Poses, velocities, energies and counts of the start of the step again, before its impacts."""
+    put_back_poses(N, M)
     for k in range(N.body.shape[0]):
         for i in range(6):
-            X.v[k, i] = N.before[k, i]
+            X.v[k, i] = N.start[k, 12 + i]
     for d in range(X.wide.shape[0]):
-        X.wide[d] = A.wide[V_BEFORE, d]
-    real = pace.real
-    real[LOST_IMPACT], real[LOST_FRICTION], real[GIVEN], real[NUMERICAL], A.real[LOST], A.real[ASTRAY] = sums
+        X.wide[d] = A.clock.y[1, A.S.kinds[COORDINATES] + d]
+    for r in range(A.lam.shape[1]):
+        A.lam[2, r] = 0.0
+    real, count = pace.real, pace.count
+    energies, counts = sums
+    real[LOST_IMPACT], real[LOST_FRICTION], real[GIVEN], real[NUMERICAL], A.real[LOST], A.real[ASTRAY] = energies
+    count[IMPACTS], count[REDUCED], count[ENDLESS] = counts
 
 
 @formula
 def search_again(G, M, C, H, B, Z, pace, now):
     """Contacts with the velocities after impacts, which may meet what nothing moved towards before. Returns a status.
 
-    What was hit, and is none any more or has another normal, stays a contact: its impulse is along the normal it had.
+    What was hit, and is none any more or has another normal or place, stays a contact: its impulse acts where it did.
     """
     status, most = enter(pace.door[SEARCHING], G, M, H, C, B, FASTER), H.at.shape[0]
     n = H.count[FOUND]
@@ -232,23 +240,33 @@ def search_again(G, M, C, H, B, Z, pace, now):
     C.count[NUMBER] = H.count[NUMBER]
     for k in range(n):
         o = H.at[k, BEFORE]
-        same = o >= 0 and not (kicked(now, o) and load3(C.x, o, NORMAL) != load3(H.x, k, NORMAL))
+        same = o >= 0 and not (kicked(now, o) and moved(C, o, H, k))
         put3(Z.p, k, 0, load3(now, o, KICK) if same else (0.0, 0.0, 0.0))
         if same:
             now[o, HIT] = -1.0
         if o >= 0:
             H.at[k, BEFORE] = C.at[o, BEFORE]
     for o in range(C.count[FOUND]):
-        if kicked(now, o) and now[o, HIT] >= 0.0 and n < most:
-            put3(Z.p, n, 0, load3(now, o, KICK))
-            copy_contact(C, o, H, n)
-            H.at[n, BEFORE] = -1
+        if kicked(now, o) and now[o, HIT] >= 0.0:
+            if n < most:
+                put3(Z.p, n, 0, load3(now, o, KICK))
+                copy_contact(C, o, H, n)
+                H.at[n, BEFORE] = -1
             n += 1
+    if n > most:
+        C.count[FOUND] = n
+        return FULL_CONTACTS
     for k in range(n):
         copy_contact(H, k, C, k)
         put3(now, k, KICK, load3(Z.p, k, 0))
     C.count[FOUND] = n
     return DONE
+
+
+@formula
+def moved(C, o, H, k):
+    """Whether contact k of H has another normal or place than contact o of C."""
+    return load3(C.x, o, NORMAL) != load3(H.x, k, NORMAL) or load3(C.x, o, POINT) != load3(H.x, k, POINT)
 
 
 @formula
@@ -265,8 +283,12 @@ def impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, pace, now):
     """Impacts until nothing more is hit: what is hit may hit what is near. Returns a status."""
     no_kicks(C, now)
     for _ in range(ROUNDS):
-        if not bounce(G, C, P.at, P.bias, R, Z, E, X, W, O, F, L, pace, now):
+        if not hits(G, C, P.at, P.bias, R, X, L, pace, now):
             return DONE
+        if pace.door[JOINTS] != 0:
+            held_by_joints(A, M, C, P, X, pace, CONSISTENT)
+            hits(G, C, P.at, P.bias, R, X, L, pace, now)
+        bounce(G, C, P.bias, R, Z, E, X, W, O, F, L, pace, now)
         held_by_joints(A, M, C, P, Z, pace, KICKED)
         if without_contact(A, M, C, P, X, N, pace) != DONE:
             return NO_WAY
@@ -306,8 +328,18 @@ def onward(G, A, M, C, D, H, B, N, P, X, L, pace, now, before, hit):
 
 @formula
 def step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
-    """One step of time; where it cannot be taken, for what is returned, only impacts have changed anything."""
-    keep_start(N, M)
+    """One step of time; where it cannot be taken, for what is returned, everything is as it was at its start."""
+    keep_start(N, M, X)
+    sums = ledger(A, pace)
+    status = taken(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before)
+    if status != DONE:
+        back(N, M, A, X, pace, sums)
+    return status
+
+
+@formula
+def taken(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
+    """Impacts, velocities, and the way, for `step`; a status."""
     if without_contact(A, M, C, P, X, N, pace) != DONE:
         return NO_WAY
     B.real[AHEAD] = pace.real[STEP]
@@ -321,17 +353,14 @@ def step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, bef
     status = impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, pace, now)
     if status != DONE:
         return status
-    sums = ledger(A, pace)
     status = onward(G, A, M, C, D, H, B, N, P, X, L, pace, now, before, pace.count[IMPACTS] > before_impacts)
     if status != DONE:
         return status
     status = velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before)
     if status != DONE:
-        back(N, A, X, pace, sums)
         return status
     positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now)
     if onto_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, pace, now) != DONE:
-        back(N, A, X, pace, sums)
         return NO_WAY
     displace(N, M, X, Y.v, pace)
     held_by_joints(A, M, C, P, X, pace, VELOCITIES_AFTER)

@@ -92,13 +92,13 @@ def jumps(M, P, c, movers, arms):
 
 
 @formula
-def keep_start(N, M):
-    """Keep poses, and twists, which at the start of a step are those of the mechanism's bodies there."""
+def keep_start(N, M, X):
+    """Keep poses, and twists, which at the start of a step are in ``M`` those of the mechanism's bodies only."""
     for k in range(M.pose.shape[0]):
         for i in range(12):
             N.start[k, i] = M.pose[k, i]
         for i in range(6):
-            N.start[k, 12 + i] = M.twist[k, i]
+            N.start[k, 12 + i] = X.v[k, i] if k < N.body.shape[0] else M.twist[k, i]
 
 
 @formula
