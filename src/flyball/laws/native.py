@@ -39,6 +39,7 @@ class Native:
         self.original: Callable[[], Any] = lambda: None  # the function that ``python`` is a twin of, if it lives
         self.outside: tuple[Any, ...] = ()
         self.equal: Native | None = None
+        self._code: Any = None
         key = None
         self.reason = ""
         self.raised: list[Exception] = []  # the last exception of a call from compiled code, where it can be known

@@ -57,7 +57,8 @@ def on_one_side(node: Node, moving: Collection[str], corners: Corners, taken: No
     if node.kind in _TRUTHS:
         return _truth(node, moving, corners)
     if smooth := _smooth_factors(node):
-        return _with_factors(node, smooth, lambda x: on_one_side(x, moving, corners, taken))
+        made = _with_factors(node, smooth, lambda x: on_one_side(x, moving, corners, taken))
+        return _affine_in_shared(made) if node.kind == "*" else made
     if node.kind == "where":
         condition, a, b = node.args
         if not _moves(condition, moving):

@@ -83,8 +83,8 @@ class ContactHealth:
         out = []
         if self.endless:
             out.append(
-                f"in {self.endless} of {self.solves} steps the sequence of impacts did not end, and what was left of "
-                f"it was taken as inelastic: take shorter steps, method=fb.Stepping(step=...), with fewer impacts in each"
+                f"in {self.endless} of {self.solves} steps the sequence of impacts did not end, and the last were "
+                f"taken as inelastic: take shorter steps, method=fb.Stepping(step=...), with fewer impacts in each"
             )
         if self.size > 0.0 and self.worst_overlap > max(PASSED * self.size, 1.01 * self.overlap_at_start):
             out.append(

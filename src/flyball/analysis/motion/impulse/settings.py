@@ -26,8 +26,9 @@ class Stepping:
     Parameters
     ----------
     step : float or str [s], optional
-        Longest step; steps are shortened so that they end at the output times. If not given it is 5 ms (or
-        ``max_step``, if that is less), and where compliant contacts collide steps are divided until they resolve the impact.
+        Longest step; steps are shortened so that they end at the output times. If not given it is 5 ms, or
+        ``max_step`` if that is less, and where compliant contacts collide steps are divided until they resolve the
+        impact.
     solver : str
         Of the cone problem: ``auto`` (chosen for each island of bodies that touch), or one by name: see
         ``docs/contact_solvers.md``.
