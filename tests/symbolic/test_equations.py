@@ -230,3 +230,15 @@ def test_parameters_with_a_unit_are_symbols_and_derived_ones_are_expressions_of_
     found = parameters(m, Graph())
     assert list(found) == ["k", "x", "n"]
     assert all(node.op == "symbol" for node in found.values())
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+def test_coordinates_that_are_drawn_at_other_values_than_zero(coordinates):
+    """An angle of 0.3 rad, from which a spring turns, and a displacement of 0.2 m as drawn."""
+    m = fb.Mechanism("drawn", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=2.0, inertia=0.1, position=(0.2, 0.0)))
+    m.add(fb.Body("b", mass=1.0, inertia=0.05, position=(0.5, -0.4), angle=0.3))
+    m.add(fb.Prismatic("P", "ground", "a", at=(0.2, 0), axis=(1, 0), displacement=0.2))
+    m.add(fb.Revolute("A", "a", "b", at=(0.2, 0.0), angle=0.3))
+    m.add(fb.CoordinateSpring("s", "A.angle", stiffness=3.0), fb.CoordinateSpring("k", "P.displacement", stiffness=5.0))
+    same_as_results(m, coordinates)
