@@ -125,7 +125,7 @@ def test_outputs_that_cannot_be(outputs):
 def test_more_outputs_than_the_memory_holds(outputs, monkeypatch):
     """On a machine of 1 MiB; what is kept of each time counts, not the times alone."""
     monkeypatch.setattr("os.sysconf", lambda name: 1024)
-    with pytest.raises(fb.ModelError, match=r"times take [\d,]+ MiB of memory or more, and this machine has 1 MiB"):
+    with pytest.raises(fb.ModelError, match=r"times take [\d,.]+ MiB of memory or more, and this machine has 1 MiB"):
         block().simulate(1.0, outputs=outputs, coordinates="absolute")
     assert len(block().simulate(1.0, outputs=101).t) == 101
 
