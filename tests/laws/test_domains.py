@@ -186,16 +186,3 @@ def test_size_of_an_angle_passes_half_a_turn():
 def test_the_text_of_a_law_without_a_value_is_told():
     with pytest.raises(fb.SimulationError, match=r"in force = -5 - sqrt\(value\)"):
         end("-5 - sqrt(value)")
-
-
-@pytest.mark.parametrize("flow", ["sign(p)*sqrt(abs(p))", "p*abs(p)"])
-def test_what_a_smooth_product_is_multiplied_by_keeps_its_corners(flow):
-    """A brake by the pressure p: 1 m/s is gone at v^2 / 2a = 0.25 m, and the mass rests there."""
-    m = fb.Mechanism(planar=True)
-    m.add(fb.Body("b", mass=1, inertia=1, velocity=(1, 0)))
-    m.add(fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)))
-    m.add(fb.State("p", rate="1 - p", initial=1))
-    m.add(fb.Actuator("k", "x.displacement", force=f"where(rate > 0, -2, 2)*{flow}"))
-    run = m.simulate(1)
-    assert run["x.displacement"][-1] == pytest.approx(0.25, abs=1e-9)
-    assert run.health.steps < 100
