@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import ctypes
 
 import numpy as np
@@ -170,7 +171,8 @@ def test_what_is_not_defined_ends_the_motion_in_made_code_too(make, coordinates)
             make().simulate(4.0, specialize=specialize, coordinates=coordinates)
         ends.append(e.value)
     assert ends[0].t == pytest.approx(ends[1].t, rel=1e-6)
-    assert str(ends[0]).split(": ")[2:] == str(ends[1]).split(": ")[2:]
+    words = [re.sub(r" = -\d\.\d+e-\d\d,", " = rounding,", str(e)).split(": ")[2:] for e in ends]
+    assert words[0] == words[1]
 
 
 def test_a_branch_that_is_nan_is_a_value_like_any_other():

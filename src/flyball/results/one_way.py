@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..forces.joint_friction import JointFriction
+
 if TYPE_CHECKING:
     from .result import Result
 
@@ -25,7 +27,7 @@ def one_way(result: Result) -> list[str]:
         return []
     model, found = result.model, []
     for f in result.values.structure.loads:
-        if not (hasattr(f, "load") and model[f.joint].one_surface):
+        if not (isinstance(f, JointFriction) and model[f.joint].one_surface):
             continue
         own = f.coordinate_text()
         slips = {f"{f.joint}.{what}": _slip(result, f, what) for what in model[f.joint].measured(result.planar)}
