@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..forces.joint_friction import JointFriction
-
 if TYPE_CHECKING:
     from .result import Result
 
@@ -26,8 +24,9 @@ def one_way(result: Result) -> list[str]:
     if len(result.t) < 2:
         return []
     model, found = result.model, []
-    for f in result.values.structure.loads:
-        if not (isinstance(f, JointFriction) and model[f.joint].one_surface):
+    frictions: list[Any] = result.values.structure.loads
+    for f in frictions:
+        if not (hasattr(f, "load") and model[f.joint].one_surface):
             continue
         own = f.coordinate_text()
         slips = {f"{f.joint}.{what}": _slip(result, f, what) for what in model[f.joint].measured(result.planar)}
