@@ -62,6 +62,15 @@ def test_integrators_and_coordinates():
     same(four_bar(), 0.3, coordinates="joint")
 
 
+def test_a_spring_beside_a_bushing():
+    """Lengths that a trial evaluation assumes not to be zero belong to no procedure of the code."""
+    m = fb.Mechanism("spring and bushing", planar=True)
+    m.add(fb.Body("b", mass=1.0, inertia=0.1, position=(0.2, 0.3), velocity=(0.5, 0.2), angular_velocity=1.0))
+    m.add(fb.SpringDamper("spring", "ground", "b", at=((0.0, 0.0), (0.2, 0.3)), stiffness=200.0, damping=1.0))
+    m.add(fb.Bushing("bushing", "ground", "b", at=(0.2, 0.3), stiffness=300.0, torsional_stiffness=1.0))
+    same(m, 0.3, coordinates="absolute")
+
+
 def test_friction_in_joints():
     m = four_bar()
     m.add(fb.JointFriction("dry", joint="D", static=0.2, radius=0.02, stick_speed=1e-3))

@@ -93,6 +93,7 @@ class Stages(Solves):
         S, FK, graph = self.S, self.W.FK, self.graph
         moving = range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES])
         asked = {(k, c) for k in moving for c in range(3)} if far else set()
+        granted = len(graph.granted)
         for reader in readers:
             trial = FK.copy()
             names = {}
@@ -105,14 +106,18 @@ class Stages(Solves):
             except Undecided:
                 found = list(trial[list(moving)].ravel())
             asked |= {names[x.index] for x in operations(found, {}) if x.index in names}
+        del graph.granted[granted:]  # by formulas of symbols that stand in no procedure
         return sorted(asked)
 
     def _progresses(self) -> bool:
         """Whether expressions can say how places on curves go on."""
+        granted = len(self.graph.granted)
         try:
             self._advanced(self.W._replace(FK=self.numbered("FK?", self.W.FK.size).reshape(self.W.FK.shape)))
         except Undecided:
             return False
+        finally:
+            del self.graph.granted[granted:]
         return True
 
     def _advanced(self, W: Work) -> list[Any]:
