@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.bound import Bound, Moulded, Written
+from ..compiler.buffers import PooledBuffer, StructBuffer
+from ..compiler.kernels import BoundKernel
 from ..constraints.registry import KINDS
 from ..equations.engine import POSITION, Sheet, engine, evaluate
 from ..equations.projection import NONE
@@ -72,7 +73,7 @@ class Compiled:
         return w
 
     @cached_property
-    def scratch(self) -> Moulded:
+    def scratch(self) -> PooledBuffer:
         """The same as compiled code has it."""
         made = scratch(self.structure, self.system, self.system.body_x.dtype)
         option = made.array("option")
@@ -83,10 +84,16 @@ class Compiled:
         """An array of the scratch, without the others."""
         return self.scratch.array(name)
 
-    def bound(self, R: Tableau, clock: Clock, out: np.ndarray) -> Bound:
+    def bound(self, R: Tableau, clock: Clock, out: np.ndarray) -> BoundKernel:
         """The engine bound to the tables and the scratch that are its own now; as `engine.motion_kernel` else."""
-        tuples = tables(self.structure, self.system), self.scratch, Written(R), Written(clock), Written(Sheet(out))
-        return Bound(engine, *tuples)
+        tuples = (
+            tables(self.structure, self.system),
+            self.scratch,
+            StructBuffer(R),
+            StructBuffer(clock),
+            StructBuffer(Sheet(out)),
+        )
+        return BoundKernel(engine, *tuples)
 
     @property
     def structure(self) -> Structure:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..equations.variation import variation_kernel
 from ..errors import ModelError, SingularityError
 from ..model.model import Model, listing, suggest
 from ..model.quantities import one
@@ -21,7 +20,7 @@ from .linear.begun import held, start_changes, start_tangents
 from .linear.carried import carried
 from .linear.controlled import determined_copy
 from .linear.curves import over_time, slopes, snapshot
-from .linear.derivatives import Equations, State, announce, stepped_values
+from .linear.derivatives import Equations, State, stepped_values
 from .linear.differences import Found, check, whole
 from .linear.in_motion import moving_copy
 from .linear.jumps import refuse_jumps, refuse_switching
@@ -227,7 +226,6 @@ def _at_instant(a: Question) -> Found:
 
 
 def _motion(a: Question) -> Sensitivity:
-    announce(variation_kernel)
     begun = begin(a.model, a.t, a.parameters, None, a.coordinates)
     base, layer = begun.base, begun.assembly.compiled
     refuse_missing(base, float(a.times[-1]))

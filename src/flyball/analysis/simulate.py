@@ -25,7 +25,6 @@ from .compiled import Compiled
 from .motion import partition
 from .motion.ahead import refuse_missing
 from .motion.choice import AUTO, SimulateOptions, chosen, instead_of, unresolved
-from .motion.compiling import announce_motion
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import TABLES, Engine
 from .motion.events.here import Here
@@ -103,7 +102,6 @@ def _computed(model: Model, o: SimulateOptions, span: Span, auto: bool, part: Pa
     """The motion, or a part of it, by a method that is chosen."""
     started = time.perf_counter()
     t_start, _, times = span
-    announce_motion(model, not isinstance(o.method, Stepping), o.method)
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start, part)

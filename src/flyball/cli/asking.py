@@ -13,16 +13,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 from .common import Changes, Json, Model, Without, app, make_folder, print_json, reported, table
-from .compiling import announce_compiling
 from .docs import described, summary
 from .flags import Flag, Option, options
 from .loading import leave_out, load_mechanism, set_parameters
+from .notices import show_notices
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
 
 EVERYWHERE = ("self", "parameters", "progress")  # parameters are given by --set
-DERIVATIVES = ("motion_kernel", "residual_kernel")
 
 
 @dataclass
@@ -74,7 +73,6 @@ def command(
     method: Callable,
     *,
     name: str = "",
-    kernels: Sequence[str] = (),
     own: Mapping[str, Flag] | None = None,
     without: Sequence[str] = (),
 ) -> Callable[[Conclusion], Conclusion]:
@@ -86,8 +84,6 @@ def command(
         Of a class of `flyball.methods`.
     name : str
         Of the subcommand; the method's if not given.
-    kernels : sequence of str
-        Those that it may compile, of which is told.
     own : mapping of str to Flag
         Arguments that stand otherwise on the command line than their type says.
     without : sequence of str
@@ -108,8 +104,7 @@ def command(
                 given = {o.name: o.read(words[o.name]) for o in known if _told(words[o.name], o)}
                 if "progress" in arguments:
                     given["progress"] = not words["as_json"]
-                refused = kernels and mechanism.events  # what has derivatives knows no events, and says so
-                announce_compiling(not words["as_json"] and not refused, *kernels)
+                show_notices(not words["as_json"])
                 question = Asked(mechanism, method.__name__, given, words["model"], words["as_json"])
                 conclude(question, **{p.name: words[p.name] for p in extra})
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from ..methods.statics import Statics
-from .asking import DERIVATIVES, Asked, command
+from .asking import Asked, command
 from .common import Page, Plot
 
 
-@command(Statics.equilibrium, kernels=DERIVATIVES, without=("start",))
+@command(Statics.equilibrium, without=("start",))
 def equilibrium(asked: Asked, *, out: Page = None) -> None:
     """Print where it is; --out shows it."""
     found = asked.answer()
@@ -15,7 +15,7 @@ def equilibrium(asked: Asked, *, out: Page = None) -> None:
     asked.say(found)
 
 
-@command(Statics.equilibria, kernels=DERIVATIVES, without=("start",))
+@command(Statics.equilibria, without=("start",))
 def equilibria(asked: Asked, *, plot: Plot = None) -> None:
     """Print the series and where it jumps."""
     found = asked.answer()

@@ -9,14 +9,14 @@ import typer
 
 from ..errors import ModelError
 from ..methods.statics import Statics
-from .asking import DERIVATIVES, Asked, command
+from .asking import Asked, command
 from .common import Plot, Resting, Turning
 from .flags import Flag
 
 OWN = {"inputs": Flag(names=("--input",)), "outputs": Flag(names=("--output",))}
 
 
-@command(Statics.linearize, kernels=DERIVATIVES, own=OWN)
+@command(Statics.linearize, own=OWN)
 def linearize(
     asked: Asked,
     *,
@@ -35,7 +35,7 @@ def linearize(
     asked.say(linear)
 
 
-@command(Statics.root_locus, kernels=DERIVATIVES)
+@command(Statics.root_locus)
 def root_locus(asked: Asked, *, plot: Plot = None) -> None:
     """Print the eigenvalues at every value, and the values where one crosses the imaginary axis."""
     found = asked.answer()

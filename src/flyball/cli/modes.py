@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from ..methods.statics import Statics
-from .asking import DERIVATIVES, Asked, command
+from .asking import Asked, command
 from .common import Page, Plot, Resting, Turning
 
 
-@command(Statics.modes, kernels=DERIVATIVES)
+@command(Statics.modes)
 def modes(
     asked: Asked, *, equilibrium: Resting = False, turning: Turning = None, out: Page = None, plot: Plot = None
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import ModelError
 from ..methods.design import Design
-from .asking import DERIVATIVES, Asked, command
+from .asking import Asked, command
 from .flags import Flag, once, quantity, values
 
 
@@ -34,7 +34,7 @@ OWN = {
 }
 
 
-@command(Design.optimize, kernels=DERIVATIVES, own=OWN, without=("minimize",))
+@command(Design.optimize, own=OWN, without=("minimize",))
 def optimize(asked: Asked) -> None:
     """Print the best parameters."""
     goal = _target(asked.given.pop("target", []), len(asked.given["of"]))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from ..methods.design import Design
-from .asking import DERIVATIVES, Asked, command
+from .asking import Asked, command
 from .common import Plot
 
 
-@command(Design.sensitivity, kernels=DERIVATIVES)
+@command(Design.sensitivity)
 def sensitivity(asked: Asked, *, plot: Plot = None) -> None:
     """Print the derivatives."""
     found = asked.answer()

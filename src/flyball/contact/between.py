@@ -6,37 +6,38 @@ read.
 
 from __future__ import annotations
 
-from ..compiler.door import Door, door
-from .broad.desk import ASKED_1, ASKED_2, REACH
+from ..compiler.kernels import Kernel, kernel
+from .broad.desk import ASKED_1, ASKED_2, REACH, Search
 from .kinds import FIELD, PLANAR
 from .narrow.collide import collide, collide_convex, collide_planar
+from .tables import Geometry, Movers
 
 
-@door
-def between(G, M, B, C, D, task):
+@kernel
+def between(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
     """Of any kind."""
     return collide(G, M, B.count[ASKED_1], B.count[ASKED_2], B.real[REACH], B.room)
 
 
-@door
-def between_convex(G, M, B, C, D, task):
+@kernel
+def between_convex(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
     """Of convex kinds."""
     return collide_convex(G, M, B.count[ASKED_1], B.count[ASKED_2], B.real[REACH], B.room)
 
 
-@door
-def between_planar(G, M, B, C, D, task):
+@kernel
+def between_planar(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
     """Of the kinds of planar mechanisms."""
     return collide_planar(G, M, B.count[ASKED_1], B.count[ASKED_2], B.real[REACH], B.room)
 
 
-@door
-def nothing(G, M, B, C, D, task):
+@kernel
+def nothing(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
     """No contacts: stands for `between` where no pair asks for it."""
     return 0
 
 
-def door_for(kinds: set[int]) -> Door:
+def door_for(kinds: set[int]) -> Kernel:
     """The one to compile for shapes of these kinds."""
     if kinds <= PLANAR:
         return between_planar

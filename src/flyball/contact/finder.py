@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from ..compiler.door import Door, enter
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.kernels import Kernel
 from ..errors import ModelError
 from .broad.bounds import holds
 from .broad.classes import classes
@@ -52,17 +48,6 @@ from .tables import (
 
 PAIRS_EACH, PAIRS_ANYWAY = 30, 2_000_000  # pairs for each shape and in all, above which too many are in one place
 THICK = 0.1  # skins, in radii
-
-
-@formula
-def _search(address, G, M, C, O, B, task):
-    return enter(address, G, M, C, O, B, task)
-
-
-@kernel
-def search_kernel(address, G, M, C, O, B, task):
-    """From Python through the door of `search`."""
-    return _search(address, held(G), held(M), held(C), held(O), held(B), task)
 
 
 def no_contacts(capacity: int) -> Contacts:
@@ -134,23 +119,13 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
     )
 
 
-def narrow(G: Geometry) -> Door:
+def narrow(G: Geometry) -> Kernel:
     """The narrow phase that shapes like these ask for; `nothing` where no pair does."""
     from .between import door_for, nothing
 
     kind, bounded = G.shape_i[:, KIND], np.isfinite(holds(G)[:, 3])
     simple = (kind == SPHERE) | (~bounded & (kind == PLANE))
     return nothing if simple.all() else door_for(set(kind.tolist()))
-
-
-def needed(G: Geometry) -> list[tuple[Door, tuple[Any, ...]]]:
-    """The doors that a `Finder` asks for, with tuples of the types that these get."""
-    from .between import nothing
-
-    none = Geometry(*(x[:0] for x in G))
-    B, C, M = search_room(none, 0, 0), no_contacts(0), no_movers(0)
-    doors = [nothing, n] if (n := narrow(G)) is not nothing else [nothing]
-    return [*((d, (none, M, B, B, B)) for d in doors), (search, (none, M, C, C, B))]
 
 
 class Finder:
@@ -174,8 +149,7 @@ class Finder:
         As large; of searches between two of these.
     search : Search
     address : int
-        Of the door. A compiled loop calls ``enter(address, held(geometry), held(movers), held(before), held(now),
-        held(search), STEP)`` in which the third tuple gets the contacts, and has these two change places after each
+        Of the search. A compiled loop calls ``call(address, geometry, movers, before, now, search, STEP)``, in which the third tuple gets the contacts, and has these two change places after each
         call that returned DONE; at another status it returns to Python, which calls `enlarge` and goes on with the
         tuples that are then in ``now``, ``before`` and ``search``.
     """
@@ -186,17 +160,8 @@ class Finder:
         self.now, self.before, self.midway = (no_contacts(4 * ns + 64) for _ in range(3))
         self.search = search_room(geometry, 8 * ns + 64, 4 * ns + 64)
         self.search.real[[MARGIN, SKIN, AHEAD]] = margin, skin, ahead
-        self.address = self._door()
-
-    def _door(self) -> int:
-        """Address of the search; the narrow phase is compiled only where a pair may ask for it."""
-        from .between import nothing
-
-        G, B = self.geometry, self.search
-        tuples = (G, no_movers(0), B, B, B)
-        nothing.address(*tuples)
-        B.count[NARROW] = narrow(G).address(*tuples)
-        return search.address(G, no_movers(0), self.now, self.before, B)
+        self.search.count[NARROW] = narrow(geometry).address
+        self.address = search.address
 
     def find(self, movers: Movers, afresh: bool = False) -> Contacts:
         """Contacts at these poses, into ``now``; ``now`` becomes ``before``.
@@ -215,7 +180,7 @@ class Finder:
         self.now, self.before = self.before, self.now
         while True:
             task = AFRESH if afresh else STEP
-            status = search_kernel(self.address, self.geometry, movers, self.now, self.before, self.search, task)
+            status = search(self.geometry, movers, self.now, self.before, self.search, task)
             if status == DONE:
                 return self.now
             self.now, self.before = self.before, self.now

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+from ..compiler.layout import Float2, Int1, Int2
 
 # columns of Geometry.shape_i
 KIND, MOVER, FIRST, COUNT, FACE_FIRST, FACE_COUNT, MEMBER, MASK, MATERIAL = range(9)
@@ -32,28 +32,28 @@ MARGIN, SKIN, AHEAD = range(3)
 class Geometry(NamedTuple):
     """Shapes. Nothing in it changes during a run."""
 
-    shape_i: np.ndarray  # (ns, 9): kind, mover or -1, first vertex and count, first face and count, groups that it is
+    shape_i: Int2  # (ns, 9): kind, mover or -1, first vertex and count, first face and count, groups that it is
     # of and groups that it meets (bits; two meet if each meets a group of the other), material
-    shape_x: np.ndarray  # (ns, 24): its origin from its mover's and its axes, in the mover's axes; parameters of its
+    shape_x: Float2  # (ns, 24): its origin from its mover's and its axes, in the mover's axes; parameters of its
     # kind (at 12); radius of a sphere about its origin that holds it (inf for what is unbounded)
-    vertex: np.ndarray  # (nv, 3): of hulls and the like, in the shape's axes
-    face: np.ndarray  # (nf,): their faces: count of corners, then the corners counter-clockwise from outside, and so on
-    apart: np.ndarray  # (nx, 2): pairs of movers (the smaller first; -1 what stands still) that never touch, sorted
+    vertex: Float2  # (nv, 3): of hulls and the like, in the shape's axes
+    face: Int1  # (nf,): their faces: count of corners, then the corners counter-clockwise from outside, and so on
+    apart: Int2  # (nx, 2): pairs of movers (the smaller first; -1 what stands still) that never touch, sorted
 
 
 class Movers(NamedTuple):
     """How what carries the shapes is placed and moves, along the world's axes."""
 
-    pose: np.ndarray  # (n, 12): position [m], rotation (rows; takes mover's components to the world's)
-    twist: np.ndarray  # (n, 6): velocity [m/s] of its origin, angular velocity [rad/s]
+    pose: Float2  # (n, 12): position [m], rotation (rows; takes mover's components to the world's)
+    twist: Float2  # (n, 6): velocity [m/s] of its origin, angular velocity [rad/s]
 
 
 class Contacts(NamedTuple):
     """Contacts at one time; two of these are used in turn, so that a contact can be found again in the one before."""
 
-    count: np.ndarray  # type: ignore[assignment]  # (8,): how many, status, how often pairs were looked for afresh, how
+    count: Int1  # type: ignore[assignment]  # (8,): how many, status, how often pairs were looked for afresh, how
     # many pairs there are, number of the search
-    at: np.ndarray  # (capacity, 4): shape 1, shape 2, feature (tells the contacts of a pair apart, and lasts from step
+    at: Int2  # (capacity, 4): shape 1, shape 2, feature (tells the contacts of a pair apart, and lasts from step
     # to step), place of the same contact in the contacts before or -1. Those of a pair stand together.
-    x: np.ndarray  # (capacity, 8): point [m] midway between the surfaces, unit normal from 1 to 2, gap [m] (< 0:
+    x: Float2  # (capacity, 8): point [m] midway between the surfaces, unit normal from 1 to 2, gap [m] (< 0:
     # overlap), all in the world

@@ -2,14 +2,38 @@
 
 from __future__ import annotations
 
-from ..compiler.door import door
-from ..compiler.jit import formula
+from typing import NamedTuple
+
+from ..compiler.kernels import formula, kernel
 from ..math.scalar import atan, sqrt
+from ..numerics.integrators.implicit.desk import AlphaDesk
 from ..numerics.integrators.implicit.even import refuse
 from ..numerics.integrators.implicit.generalised_alpha import attempt, enter
 from ..numerics.integrators.implicit.hermite import between
+from ..tables.system import ComplexSystem, ComplexWork, System, Work
 from .asking import inspect
-from .implicit import PLAN, TURNS, arrive, compose, land, linearise, missed, perform, powers
+from .callbacks import Going, Own
+from .implicit import PLAN, TURNS, Plan, arrive, compose, land, linearise, missed, perform, powers
+from .residual import Bench
+
+
+class AlphaWorkshop(NamedTuple):
+    """`Workshop` of this method."""
+
+    WC: ComplexWork
+    moved: Bench
+    pushed: Bench
+    pressed: Bench
+    plan: Plan
+    desk: AlphaDesk
+
+
+class AlphaMeans(NamedTuple):
+    """`Means` of this method."""
+
+    SC: ComplexSystem
+    own: AlphaWorkshop
+
 
 SMALL = 1e-3  # half a turn [rad] below which arctan(x) / x is its series
 
@@ -56,7 +80,7 @@ def by_alpha(S, W, M, own, going, task):
     return perform((attempt, between, enter, refuse), callbacks, S, W, M, own, going, task)
 
 
-@door
-def alpha_steps(S, W, M, own, going, task):
+@kernel
+def alpha_steps(S: System, W: Work, M: AlphaMeans, own: Own, going: Going, task: int) -> int:
     """`by_alpha` behind an address."""
     return by_alpha(S, W, M, own, going, task)

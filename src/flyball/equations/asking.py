@@ -5,9 +5,7 @@
 
 from __future__ import annotations
 
-from ..compiler.door import ask as through_door
-from ..compiler.door import enter
-from ..compiler.jit import formula
+from ..compiler.kernels import call, call_bound, formula
 from ..numerics.integrators.clock import GROW, NEXT, SPAN, H, T
 from .tasks import ARRIVE, INSPECT, REPORT, TANGENT
 
@@ -17,13 +15,13 @@ ENGINE, S_, W_, R_, OWN, SHEET, GROUP = range(7)
 @formula
 def through(A, task):
     """Have the engine do a task at the state on its desk."""
-    return enter(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[SHEET], task)
+    return call(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[SHEET], task)
 
 
 @formula
 def steps(own, A, K, R, c, task):
     """What a loop asks of a method behind a door."""
-    return through_door(own, task)
+    return call_bound(own, task)
 
 
 @formula

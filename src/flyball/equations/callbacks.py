@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from ..compiler.jit import formula
+from ..compiler.kernels import formula
+from ..compiler.layout import Int1
 from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watching import Watch
@@ -22,7 +21,7 @@ class Own(NamedTuple):
     clock: Clock  # its desk: time and state that it is asked for
     sheet: Sheet
     R: Tableau
-    doors: np.ndarray  # addresses of the engine, and of the residuals where they are asked
+    doors: Int1  # addresses of the engine, and of the residuals where they are asked
 
 
 class Going(NamedTuple):

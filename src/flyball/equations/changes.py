@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.door import enter
-from ..compiler.jit import formula
+from ..compiler.kernels import call, formula
+from ..compiler.layout import Float1, Float2, Int1
 from ..math.scalar import absolute
 from ..tables.system import (
     BODY_LAW,
@@ -43,19 +43,19 @@ NQ, NZ, COUNT, POWERS = range(4)
 class Plan(NamedTuple):
     """Which numbers the parameters change, and what is found on the way."""
 
-    size: np.ndarray  # (4,) coordinates, states, parameters; whether powers stand for works
-    first: np.ndarray  # (n + 1,) first entry of each parameter
-    entry: np.ndarray  # (entries,): place in the tables
-    step: np.ndarray  # (entries,): what stands there
-    tables: np.ndarray  # the complex tables, one behind the other, as real and imaginary parts in turn
-    found: np.ndarray  # (n, nv + nr + nv): changes of accelerations, multipliers, efforts
-    effort: np.ndarray  # (nv,) of the motion itself
-    rate: np.ndarray  # rates of the state, where a row is reported
-    zero: np.ndarray  # (nv,)
-    pressing: np.ndarray  # (m,) rows whose multipliers some friction depends on
-    by_press: np.ndarray  # (m, nv + nr + nv): what friction under a unit of each makes of all
-    by_power: np.ndarray  # (m, nz): and of the powers
-    share: np.ndarray  # (m, m + 1): scratch
+    size: Int1  # (4,) coordinates, states, parameters; whether powers stand for works
+    first: Int1  # (n + 1,) first entry of each parameter
+    entry: Int1  # (entries,): place in the tables
+    step: Float1  # (entries,): what stands there
+    tables: Float1  # the complex tables, one behind the other, as real and imaginary parts in turn
+    found: Float2  # (n, nv + nr + nv): changes of accelerations, multipliers, efforts
+    effort: Float1  # (nv,) of the motion itself
+    rate: Float1  # rates of the state, where a row is reported
+    zero: Float1  # (nv,)
+    pressing: Int1  # (m,) rows whose multipliers some friction depends on
+    by_press: Float2  # (m, nv + nr + nv): what friction under a unit of each makes of all
+    by_power: Float2  # (m, nz): and of the powers
+    share: Float2  # (m, m + 1): scratch
 
 
 @formula
@@ -89,13 +89,13 @@ def step_along(A, dq, dv, task):
         B.steps[0, nv + d] = complex(0.0, STEP * dv[d])
     if nv > 0:
         B.out[0, 0] = complex(np.nan, np.nan)  # what is not found is no number
-    enter(A[RESIDUAL], A[SC_], A[WC_], B, B, B, task)
+    call(A[RESIDUAL], A[SC_], A[WC_], B, B, B, task)
 
 
 @formula
 def respond(A):
     """Solve with the motion's factor, for what stands in the first two rows of the sheet."""
-    enter(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[SHEET], SOLVE)
+    call(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[SHEET], SOLVE)
 
 
 @formula

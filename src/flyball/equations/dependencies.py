@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..compiler.door import enter
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.kernels import call, formula, kernel
+from ..compiler.layout import Float1, Float2, Float3
 from ..numerics.integrators.clock import COUNTS, REALS, Clock, T
-from ..numerics.integrators.tableaux import tableau
+from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.ldl import ldl_factor
 from ..numerics.weakest import strongest, weakest
 from ..tables.system import DIAGONAL, V1, System, Work
@@ -58,7 +57,7 @@ def each(address, S, W, R, clock, sheet, states, scale, block, kept, out):
         for i in range(clock.y.shape[1]):
             if states[n, 1 + i] == states[n, 1 + i]:  # what is not told goes on from the state before
                 clock.y[0, i] = states[n, 1 + i]
-        enter(address, S, W, R, clock, sheet, POSITION)
+        call(address, S, W, R, clock, sheet, POSITION)
         unit_rows(S, W, scale)
         if factor_square(S, W) != 0:
             for i in range(3):
@@ -73,9 +72,21 @@ def each(address, S, W, R, clock, sheet, states, scale, block, kept, out):
 
 
 @kernel
-def dependencies_kernel(address, S, W, R, clock, sheet, states, scale, block, kept, out):
+def dependencies_kernel(
+    address: int,
+    S: System,
+    W: Work,
+    R: Tableau,
+    clock: Clock,
+    sheet: Sheet,
+    states: Float2,
+    scale: Float1,
+    block: Float2,
+    kept: Float3,
+    out: Float2,
+) -> None:
     """The weakest combinations of rows at every state; ``block`` ends with a vector for the largest singular value."""
-    each(address, held(S), held(W), held(R), held(clock), held(sheet), states, scale, block, kept, out)
+    each(address, S, W, R, clock, sheet, states, scale, block, kept, out)
 
 
 def dependencies(
@@ -108,6 +119,5 @@ def dependencies(
     block = np.random.default_rng(0).standard_normal((count + 2, nr))
     kept, out = np.zeros((n, nr, count)), np.zeros((n, 3))
     sheet, R = Sheet(np.zeros((0, 0))), tableau("rk45")
-    address = engine.address(S, W, R, clock, sheet)
-    dependencies_kernel(address, S, W, R, clock, sheet, states, scale, block, kept, out)
+    dependencies_kernel(engine.address, S, W, R, clock, sheet, states, scale, block, kept, out)
     return kept, out

@@ -5,7 +5,7 @@ An unknown kind gives nan, which a run tells of; it is never answered by another
 
 from __future__ import annotations
 
-from ..compiler.written import ladder, written
+from ..compiler.sources import generated, ladder
 from ..constraints.registry import KINDS, RARE
 from ..forces import BRANCHES, EFFORTS, INPUTS, WRENCHES
 from ..tables.system import TERM_KINDS
@@ -33,7 +33,7 @@ wrench = ladder(__name__, "wrench", "par, F, M, laws, values", WRENCHES, f"({NON
 branch = ladder(__name__, "branch", "par, F, M", BRANCHES, f"({NAN}, {NAN}, {NAN}, {NAN}, {NAN})")
 """On which branch of its formula a force between frames is, for kinds whose formula breaks; see `forces.BRANCHES`."""
 
-breaks = written(
+breaks = generated(
     __name__,
     "breaks",
     "kind",
@@ -48,7 +48,7 @@ effort = ladder(__name__, "effort", "par, x, rate, laws, load", EFFORTS, NAN)
 _LOOPS = {name: getattr(rows, name) for name in ("begin", "end", "begin_biases", "end_biases")}
 _ROWS = {"rare": rare} | {f"row_{k.number}": k.row for k in OFTEN}
 
-row_values = written(
+row_values = generated(
     __name__,
     "row_values",
     "S, W, t, z",
@@ -62,7 +62,7 @@ row_values = written(
 )
 """Values, Jacobian and rates of all constraint rows, from the poses; ``z`` are the states that angles lean on."""
 
-row_biases = written(
+row_biases = generated(
     __name__,
     "row_biases",
     "S, W, t, v, z",
@@ -76,7 +76,7 @@ row_biases = written(
 )
 """Gamma of all constraint rows and rates of what is measured, from poses and velocities."""
 
-whole_rows = written(
+whole_rows = generated(
     __name__,
     "whole_rows",
     "S, W, t, v, z, whole",
@@ -93,7 +93,7 @@ whole_rows = written(
 _PLACES = [k for k in KINDS if k.place]
 _FEET = {f"foot_{k.number}": k.foot for k in _PLACES}
 
-progress = written(
+progress = generated(
     __name__,
     "progress",
     "S, W, z, dz",
@@ -103,7 +103,7 @@ progress = written(
 )
 """Rates of the states that count turns of angles and places on curves."""
 
-remember = written(
+remember = generated(
     __name__,
     "remember",
     "S, W, z",

@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.door import door, enter
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.kernels import formula, kernel
+from ..compiler.layout import Float2
 from ..numerics.integrators.clock import COUNTS, GROW, NEXT, REALS, SPAN, STATES, Clock, H, T
 from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import advance, nothing, whole
@@ -111,19 +110,13 @@ def perform(S, W, R, clock, out, task):
 class Sheet(NamedTuple):
     """Where the engine writes."""
 
-    rows: np.ndarray
-
-
-@door
-def engine(S, W, R, clock, sheet, task):
-    """`perform` behind an address."""
-    return perform(S, W, R, clock, sheet.rows, task)
+    rows: Float2
 
 
 @kernel
-def through(address, S, W, R, clock, sheet, task):
-    """From Python through the door."""
-    return enter(address, held(S), held(W), held(R), held(clock), held(sheet), task)
+def engine(S: System, W: Work, R: Tableau, clock: Clock, sheet: Sheet, task: int) -> int:
+    """`perform` behind an address."""
+    return perform(S, W, R, clock, sheet.rows, task)
 
 
 def motion_kernel(S: System, W: Work, R: Tableau, clock: Clock, out: np.ndarray, task: int) -> int:
@@ -156,8 +149,7 @@ def motion_kernel(S: System, W: Work, R: Tableau, clock: Clock, out: np.ndarray,
     int
         Of INTEGRATE and FOLLOW the number of rows written, of the others a status.
     """
-    sheet = Sheet(out)
-    return through(engine.address(S, W, R, clock, sheet), S, W, R, clock, sheet, task)
+    return int(engine(S, W, R, clock, Sheet(out), task))
 
 
 def evaluate(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[int, np.ndarray]:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..compiler.bound import Bound, Written
-from ..compiler.door import door
-from ..compiler.jit import formula
+from ..compiler.buffers import StructBuffer
+from ..compiler.kernels import BoundKernel, formula, kernel
 from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import TRY
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watching import STAGE
+from ..tables.system import System, Work
 from .asking import OWN, arrive, inspect, put, tangent, through
-from .callbacks import meet
+from .callbacks import Going, Own, meet
 from .tasks import MOTION, WATCH
 
 
@@ -44,8 +44,8 @@ def perform(S, W, R, own, going, task):
     return answer((derivative, arrive, tangent, inspect), A, going.watch, R, going.clock, task)
 
 
-@door
-def explicit_steps(S, W, R, own, going, task):
+@kernel
+def explicit_steps(S: System, W: Work, R: Tableau, own: Own, going: Going, task: int) -> int:
     """`perform` behind an address."""
     return perform(S, W, R, own, going, task)
 
@@ -63,6 +63,8 @@ class Explicit:
     def __init__(self, R: Tableau) -> None:
         self.R, self.c, self.stages = R, R.c, int(R.order_i[1])
 
-    def bind(self, tables: Written, scratch: Written, own: Written, going: Written, doors: np.ndarray) -> Bound:
+    def bind(
+        self, tables: StructBuffer, scratch: StructBuffer, own: StructBuffer, going: StructBuffer, doors: np.ndarray
+    ) -> BoundKernel:
         """The door with these tuples bound to it."""
-        return Bound(explicit_steps, tables, scratch, Written(self.R), own, going)
+        return BoundKernel(explicit_steps, tables, scratch, StructBuffer(self.R), own, going)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.door import door, enter
-from ..compiler.jit import formula
+from ..compiler.kernels import call, formula, kernel
+from ..compiler.layout import Float1, Int1, Int2
 from ..math.cayley import rate
 from ..numerics.integrators.clock import ASIDE, NOW, STARTED, TRIED, T
 from ..numerics.integrators.implicit.asked import answer, rates_at_begin
@@ -31,12 +31,14 @@ from ..tables.system import (
     STEADY,
     SWITCH_ROW,
     VALUE,
+    ComplexSystem,
+    ComplexWork,
     System,
     Work,
 )
 from .asking import OWN, S_, SHEET, W_, inspect, through
 from .asking import arrive as arrive_there
-from .callbacks import meet
+from .callbacks import Going, Own, meet
 from .dispatch import progress
 from .residual import Bench
 from .rows import way_of
@@ -53,24 +55,24 @@ PICKED, PICKED_MASS, ROWS, ROWS_METRIC, ROWS_HELD, SIZES, TURNS, PRESSES, END = 
 class Plan(NamedTuple):
     """Where the numbers of the Jacobian come from."""
 
-    first: np.ndarray  # (END + 1,)
-    pick: np.ndarray  # (n, 3): by positions and velocities: number, step, place in what is found; sums of these
-    mass: np.ndarray  # (n, 3): the same by accelerations
-    metric: np.ndarray  # (nv,): D
-    holonomic: np.ndarray  # (nr,): whether a row restrains positions
-    valued: np.ndarray  # (nr,): and does so in its present mode
-    turns: np.ndarray  # first angular velocity of each quaternion
-    pressing: np.ndarray  # rows whose multipliers some friction depends on
-    fixed: np.ndarray  # (1,): whether the mass matrix does not change
-    negative: np.ndarray  # numbers whose negatives stand behind all others and a -1
-    light: np.ndarray  # (nv,): inertia that bodies without any have in the Jacobian, or nothing
-    own_mass: np.ndarray  # (nv,): numbers of the inertia of each velocity alone
+    first: Int1  # (END + 1,)
+    pick: Int2  # (n, 3): by positions and velocities: number, step, place in what is found; sums of these
+    mass: Int2  # (n, 3): the same by accelerations
+    metric: Float1  # (nv,): D
+    holonomic: Int1  # (nr,): whether a row restrains positions
+    valued: Int1  # (nr,): and does so in its present mode
+    turns: Int1  # first angular velocity of each quaternion
+    pressing: Int1  # rows whose multipliers some friction depends on
+    fixed: Int1  # (1,): whether the mass matrix does not change
+    negative: Int1  # numbers whose negatives stand behind all others and a -1
+    light: Float1  # (nv,): inertia that bodies without any have in the Jacobian, or nothing
+    own_mass: Int1  # (nv,): numbers of the inertia of each velocity alone
 
 
 class Workshop(NamedTuple):
     """What steps of an implicit method write to, and what they read it by."""
 
-    WC: Work  # in complex numbers
+    WC: ComplexWork
     moved: Bench  # with steps of positions and velocities
     pushed: Bench  # of accelerations
     pressed: Bench  # without
@@ -81,7 +83,7 @@ class Workshop(NamedTuple):
 class Means(NamedTuple):
     """What steps of an implicit method work with."""
 
-    SC: System  # in complex numbers
+    SC: ComplexSystem
     own: Workshop
 
 
@@ -257,7 +259,7 @@ def lay(y, k, A, B, K):
 @formula
 def differentiate(A, B, task, pick, numbers):
     """Numbers of the Jacobian, by the steps on that bench. Returns a status."""
-    enter(A[RESIDUALS], A[SC_], A[WC_], B, B, B, task)
+    call(A[RESIDUALS], A[SC_], A[WC_], B, B, B, task)
     for e in range(numbers.shape[0]):
         numbers[e] = 0.0
     for e in range(pick.shape[0]):
@@ -276,7 +278,7 @@ def press(A, K, k, n):
     r = P.pressing[n]
     lay(A[OWN].y[0], k, A, B, K)
     B.lam[r] = complex(K.lam[k, r], STEP)
-    enter(A[RESIDUALS], A[SC_], A[WC_], B, B, B, STEPS)
+    call(A[RESIDUALS], A[SC_], A[WC_], B, B, B, STEPS)
     bad = 0.0
     for i in range(nv):
         x = B.out[0, i].imag / STEP
@@ -346,7 +348,7 @@ def by_radau(S, W, M, own, going, task):
     return perform(method, (residual, linearise, compose, land, inspect, arrive_there), S, W, M, own, going, task)
 
 
-@door
-def radau_steps(S, W, M, own, going, task):
+@kernel
+def radau_steps(S: System, W: Work, M: Means, own: Own, going: Going, task: int) -> int:
     """`by_radau` behind an address."""
     return by_radau(S, W, M, own, going, task)

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.door import door, enter
-from ..compiler.jit import formula
+from ..compiler.kernels import call, formula, kernel
+from ..compiler.layout import Float1, Float2, Int1
 from ..math.scalar import magnitude, sqrt
-from ..numerics.cone.dense.problem import ENDED, FOUND, NONE_FOUND
+from ..numerics.cone.dense.problem import ENDED, FOUND, NONE_FOUND, Dense
 from ..numerics.cone.dense.settle import settle
 from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.tableaux import Tableau
@@ -33,6 +33,8 @@ from ..tables.system import (
     SWITCH_MEASURED,
     VALUE,
     X_SOLVED,
+    System,
+    Work,
 )
 from .dispatch import effort
 from .engine import Sheet
@@ -58,7 +60,7 @@ SILENT = 1e-14  # of the fastest velocity: the same, whatever the terms
 class Desk(NamedTuple):
     """What the engine is asked with."""
 
-    address: np.ndarray  # (1,): of the engine
+    address: Int1  # (1,): of the engine
     R: Tableau
     clock: Clock  # time, and state in its first row
     sheet: Sheet
@@ -67,21 +69,19 @@ class Desk(NamedTuple):
 class Bench(NamedTuple):
     """Rows of the small problem, by the switches that they are of, and what each does to everything."""
 
-    which: np.ndarray  # (n,): switch of each row
-    sign: np.ndarray  # (n,): +1, or -1 where the row is turned round: what pushes against an upper side
-    way: (
-        np.ndarray
-    )  # (n,): what friction is asked for: STATIC, or the way it slides; 0: its reach stands in the problem
-    rate: np.ndarray  # (n,): at which it slides
-    Y: np.ndarray  # (n, nv): accelerations by a unit force
-    L: np.ndarray  # (n, nr): multipliers
-    E: np.ndarray  # (n, nv): efforts of what drivers prescribe
-    free: np.ndarray  # (nv,): accelerations with everything off
-    loaded: np.ndarray  # (nr,): multipliers with everything off, or of impulses that went before
-    asks: np.ndarray  # (2,)
-    step: np.ndarray  # (1,): the step of time
-    seen: np.ndarray  # (n,): impulses of the try before
-    now: np.ndarray  # (n,): what friction holds at them
+    which: Int1  # (n,): switch of each row
+    sign: Float1  # (n,): +1, or -1 where the row is turned round: what pushes against an upper side
+    way: Float1  # (n,): what friction is asked for: STATIC, or the way it slides; 0: its reach stands in the problem
+    rate: Float1  # (n,): at which it slides
+    Y: Float2  # (n, nv): accelerations by a unit force
+    L: Float2  # (n, nr): multipliers
+    E: Float2  # (n, nv): efforts of what drivers prescribe
+    free: Float1  # (nv,): accelerations with everything off
+    loaded: Float1  # (nr,): multipliers with everything off, or of impulses that went before
+    asks: Int1  # (2,)
+    step: Float1  # (1,): the step of time
+    seen: Float1  # (n,): impulses of the try before
+    now: Float1  # (n,): what friction holds at them
 
 
 def bench(n: int, nv: int, nr: int) -> Bench:
@@ -94,7 +94,7 @@ def bench(n: int, nv: int, nr: int) -> Bench:
 @formula
 def bare(address, S, W, R, clock, sheet, B, P):
     """The motion with everything off, and what every row does: A, b of the problem. Returns a status."""
-    status = enter(address, S, W, R, clock, sheet, MOTION)
+    status = call(address, S, W, R, clock, sheet, MOTION)
     for d in range(W.vel.shape[1]):
         B.free[d] = W.vel[X_SOLVED, d]
     for k in range(S.row_i.shape[0]):
@@ -139,7 +139,7 @@ def respond(address, S, W, R, clock, sheet, B, i):
     r = nr + S.switch_i[B.which[i], SWITCH_MEASURED]
     for e in range(S.row_p[r], S.row_p[r + 1]):
         out[0, S.col_i[e]] += B.sign[i] * W.G[e]
-    enter(address, S, W, R, clock, sheet, SOLVE)
+    call(address, S, W, R, clock, sheet, SOLVE)
     for d in range(nv):
         B.Y[i, d], B.E[i, d] = out[2, d], W.vel[EFFORT, d]
     for k in range(nr):
@@ -271,8 +271,8 @@ def look(S, W, y, B):
                 B.seen[i] += magnitude(W.G[e]) * (STILL * magnitude(y[nq + S.col_i[e]]) + SILENT * most)
 
 
-@door
-def instant(S, W, desk, B, P, task):
+@kernel
+def instant(S: System, W: Work, desk: Desk, B: Bench, P: Dense, task: int) -> int:
     """What is done at an instant, by its task: BARE, BALANCE, AGAIN (the problem from the states in it), LOOK."""
     if task == BALANCE:
         balanced(S, W, desk.clock.real[T], B, P)
@@ -283,6 +283,6 @@ def instant(S, W, desk, B, P, task):
     address = desk.address[0]
     if task == BARE:
         return bare(address, S, W, desk.R, desk.clock, desk.sheet, B, P)
-    status = enter(address, S, W, desk.R, desk.clock, desk.sheet, MOTION)
+    status = call(address, S, W, desk.R, desk.clock, desk.sheet, MOTION)
     look(S, W, desk.clock.y[0], B)
     return status

@@ -22,8 +22,7 @@ d), four arrays among them, and returns a float:
 
 from __future__ import annotations
 
-from ..compiler.held import held
-from ..compiler.jit import INSIDE, formula, on_numba
+from ..compiler.kernels import by_address, formula, when_compiling
 from ..tables.system import FLAT, MADE, SCRATCH, STABILIZE
 from .tasks import COMPLETE, FOLLOW, INTEGRATE
 
@@ -46,12 +45,14 @@ def choose_code(S, W, task):
         W.info[MADE + k] = S.flat[k] if wanted else 0
 
 
-@on_numba
+@when_compiling
 def _register() -> None:
     from llvmlite import ir
     from numba import types
     from numba.core.errors import TypingError
-    from numba.extending import intrinsic, overload
+    from numba.extending import intrinsic
+
+    from ..compiler.target import overload
 
     @intrinsic
     def jump(typing, address, S, W, t, a, b, c, d):  # type: ignore[no-untyped-def]
@@ -70,10 +71,10 @@ def _register() -> None:
 
         return types.float64(types.int64, S, W, types.float64, *arrays), generate
 
-    @overload(run, jit_options=INSIDE)
+    @overload(run)
     def choose(address, S, W, t, a, b, c, d):  # type: ignore[no-untyped-def]
         if isinstance(a.dtype, types.Complex):
             return lambda address, S, W, t, a, b, c, d: 0.0
         if isinstance(S, types.BaseTuple):  # a loop that does not hand them over by address
-            return lambda address, S, W, t, a, b, c, d: jump(address, held(S), held(W), t, a, b, c, d)  # type: ignore[call-arg]
+            return lambda address, S, W, t, a, b, c, d: jump(address, by_address(S), by_address(W), t, a, b, c, d)  # type: ignore[call-arg]
         return lambda address, S, W, t, a, b, c, d: jump(address, S, W, t, a, b, c, d)  # type: ignore[call-arg]

@@ -7,8 +7,8 @@ out. What that is nobody needs to know here: bits are copied.
 
 from __future__ import annotations
 
-from ..compiler.door import ask
-from ..compiler.jit import OPTIONS, kernel, on_numba
+from ..compiler.kernels import call_bound, kernel, when_compiling
+from ..compiler.layout import Int1, Int2
 
 
 def reckon(address, tables, constants):  # type: ignore[no-untyped-def]
@@ -17,7 +17,19 @@ def reckon(address, tables, constants):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def one_after_another(asked, task, then, made, cells, new, at, x, ends, told, out):  # type: ignore[no-untyped-def]
+def one_after_another(
+    asked: Int1,
+    task: int,
+    then: Int1,
+    made: Int1,
+    cells: Int1,
+    new: Int1,
+    at: Int1,
+    x: Int2,
+    ends: Int1,
+    told: Int1,
+    out: Int2,
+) -> int:
     """Have a task done for each row of ``x``, until one ends as it should not.
 
     Parameters
@@ -54,11 +66,11 @@ def one_after_another(asked, task, then, made, cells, new, at, x, ends, told, ou
             cells[at[j]] = x[k, j]
         if made[0] != 0:
             reckon(made[0], made[1], made[2])
-        found = ask(asked, task)
+        found = call_bound(asked, task)
         good = found == ends[0] and cells[ends[1]] == ends[2]
         if good and then[0] != 0:
             cells[then[6]] = 0
-            good = ask(then, then[7]) == 0
+            good = call_bound(then, then[7]) == 0
         out[k, 0] = found
         for i in range(told.shape[0]):
             out[k, 1 + i] = cells[told[i]]
@@ -67,11 +79,13 @@ def one_after_another(asked, task, then, made, cells, new, at, x, ends, told, ou
     return x.shape[0]
 
 
-@on_numba
+@when_compiling
 def _register() -> None:
     from llvmlite import ir
     from numba import types
-    from numba.extending import intrinsic, overload
+    from numba.extending import intrinsic
+
+    from ..compiler.target import overload
 
     @intrinsic
     def call(typing, address, tables, constants):  # type: ignore[no-untyped-def]
@@ -83,6 +97,6 @@ def _register() -> None:
 
         return types.float64(types.int64, types.int64, types.int64), generate
 
-    @overload(reckon, jit_options=OPTIONS)  # type: ignore[arg-type]
+    @overload(reckon)  # type: ignore[arg-type]
     def choose(address, tables, constants):  # type: ignore[no-untyped-def]
         return lambda address, tables, constants: call(address, tables, constants)  # type: ignore[call-arg]

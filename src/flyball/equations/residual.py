@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compiler.door import enter, stepped_door
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.buffers import StructBuffer
+from ..compiler.kernels import first_order_kernel, formula
+from ..compiler.layout import Complex1, Complex2
 from ..math.vec import add, cross, load3, load9, mv, put3, scale, sub
 from ..tables.system import (
     BIAS,
@@ -37,6 +37,8 @@ from ..tables.system import (
     V0,
     V2,
     VALUE,
+    ComplexSystem,
+    ComplexWork,
 )
 from .control import control
 from .dispatch import row_biases, row_values, whole_rows
@@ -53,13 +55,13 @@ from .tree import column, motion, pose, retract
 class Bench(NamedTuple):
     """A state, steps from it, and what the residuals are there; all complex."""
 
-    t: np.ndarray  # (1,) [s]
-    state: np.ndarray  # (nq + nv + nz,)
-    vdot: np.ndarray  # (nv,)
-    lam: np.ndarray  # (nr,)
-    steps: np.ndarray  # (n, 3 nv + 1): of positions (along the velocities), velocities, accelerations, and of time;
+    t: Complex1  # (1,) [s]
+    state: Complex1  # (nq + nv + nz,)
+    vdot: Complex1  # (nv,)
+    lam: Complex1  # (nr,)
+    steps: Complex2  # (n, 3 nv + 1): of positions (along the velocities), velocities, accelerations, and of time;
     # behind these, if there are more, of states of controllers
-    out: np.ndarray  # (n, nv + 3 nr + 3 nm), or more: what x' = f misses of these where they do not change
+    out: Complex2  # (n, nv + 3 nr + 3 nm), or more: what x' = f misses of these where they do not change
 
 
 @formula
@@ -218,27 +220,10 @@ def accelerated(S, W, b, v, vdot):
     put3(W.BK, b, 21, a)
 
 
-@stepped_door
-def stepped(S, W, bench, _, __, task):
+@first_order_kernel
+def stepped(S: ComplexSystem, W: ComplexWork, bench: Bench, _: Bench, __: Bench, task: int) -> int:
     """`residuals` behind an address; compiled for complex numbers, when first needed."""
     return residuals(S, W, bench, task)
-
-
-@kernel
-def through_stepped(address, S, W, bench, task):
-    """From Python through the door."""
-    b = held(bench)
-    return enter(address, held(S), held(W), b, b, b, task)
-
-
-def address(S: Any, W: Any, bench: Bench) -> int:
-    """Of the door to the residuals, for other loops."""
-    return stepped.address(*asked(S, W, bench))
-
-
-def asked(S: Any, W: Any, bench: Bench) -> tuple[Any, ...]:
-    """What the door is asked with."""
-    return S, W, bench, bench, bench
 
 
 def residual_kernel(
@@ -247,4 +232,5 @@ def residual_kernel(
     """The equations at states near one state, see ``residuals``; nan where they cannot be evaluated."""
     bench = Bench(np.array([t]), state, vdot, lam, steps, out)
     out[:] = np.nan
-    through_stepped(address(S, W, bench), S, W, bench, STEPS)
+    b = StructBuffer(bench)
+    stepped(S, W, b, b, b, STEPS)

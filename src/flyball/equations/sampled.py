@@ -17,9 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.door import enter
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.kernels import call, formula, kernel
+from ..compiler.layout import Float1, Float2, Int1, Int2
 from ..laws.evaluation import evaluate
 from ..numerics.integrators.clock import (
     ACCEPTED,
@@ -60,14 +59,14 @@ SELDOM = 1024  # intervals after which the lower order is tried again, at most
 class Samples(NamedTuple):
     """When what is sampled."""
 
-    clock: np.ndarray  # (ns, 2): period and offset [s]
-    next: np.ndarray  # (ns,): number of the next instant
-    row: np.ndarray  # (nu, 4): clock, state, law, whether all others come first; in order
-    value: np.ndarray  # (nu,): scratch
-    end: np.ndarray  # (1,): end of the motion [s], at which nothing is sampled any more
+    clock: Float2  # (ns, 2): period and offset [s]
+    next: Int1  # (ns,): number of the next instant
+    row: Int2  # (nu, 4): clock, state, law, whether all others come first; in order
+    value: Float1  # (nu,): scratch
+    end: Float1  # (1,): end of the motion [s], at which nothing is sampled any more
     # intervals until the lower order is tried, 0: it is taken, -1: never; how many if it fails; steps taken and refused
     # when this interval began, which may go on in another call
-    lower: np.ndarray  # (4,)
+    lower: Int1  # (4,)
 
 
 @formula
@@ -124,7 +123,7 @@ def sample(A):
     """Sample what is due at the time and state of the clock. Returns the status of the evaluation there."""
     S, W, clock, P = A[S_], A[W_], A[CLOCK], A[PLAN]
     t = clock.real[T]
-    status = enter(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[SHEET], MOTION)
+    status = call(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[SHEET], MOTION)
     if status != 0:
         return status
     z = S.kinds[COORDINATES] + W.vel.shape[1]
@@ -148,15 +147,17 @@ def sample(A):
 
 
 @kernel
-def sample_kernel(address, S, W, R, clock, sheet, P):
+def sample_kernel(address: int, S: System, W: Work, R: Tableau, clock: Clock, sheet: Sheet, P: Samples) -> int:
     """Sample what is due."""
-    return sample((address, held(S), held(W), held(R), held(clock), held(sheet), held(P)))
+    return sample((address, S, W, R, clock, sheet, P))
 
 
 @kernel
-def sampled_kernel(address, S, W, R, clock, sheet, P, lower, out):
+def sampled_kernel(
+    address: int, S: System, W: Work, R: Tableau, clock: Clock, sheet: Sheet, P: Samples, lower: Tableau, out: Float2
+) -> int:
     """Integrate from instant to instant, as `engine.INTEGRATE` does between them. Returns rows written."""
-    A = (address, held(S), held(W), held(R), held(clock), held(sheet), held(P), held(lower))
+    A = (address, S, W, R, clock, sheet, P, lower)
     return advance(by_engine, A, A, A[SHEET].rows, out)
 
 
@@ -167,9 +168,9 @@ def by_engine(A, rows):
     if clock.count[STARTED] != 1:
         lower[TAKEN], lower[REFUSED] = clock.count[ACCEPTED], clock.count[REJECTED]
     if lower[WAIT] == 0:
-        n = enter(A[ENGINE], A[S_], A[W_], A[LOWER], clock, A[SHEET], INTEGRATE)
+        n = call(A[ENGINE], A[S_], A[W_], A[LOWER], clock, A[SHEET], INTEGRATE)
     else:
-        n = enter(A[ENGINE], A[S_], A[W_], A[R_], clock, A[SHEET], INTEGRATE)
+        n = call(A[ENGINE], A[S_], A[W_], A[R_], clock, A[SHEET], INTEGRATE)
     if clock.count[STATUS] == DONE and lower[WAIT] >= 0:
         at_once = clock.count[ACCEPTED] == lower[TAKEN] + 1 and clock.count[REJECTED] == lower[REFUSED]
         if lower[WAIT] > 0:
@@ -235,8 +236,7 @@ class Sampling:
 
     def go_on(self, S: System, W: Work, clock: Clock, out: np.ndarray) -> int:
         """Integrate on, sampling on the way. Returns rows written."""
-        address = engine.address(S, W, self.R, clock, self.sheet)
-        return int(sampled_kernel(address, S, W, self.R, clock, self.sheet, self.plan, self.lower, out))
+        return int(sampled_kernel(engine.address, S, W, self.R, clock, self.sheet, self.plan, self.lower, out))
 
     def differs(self, other: Sampling) -> bool:
         """Whether another one has other instants."""
@@ -252,5 +252,4 @@ class Sampling:
 
     def sample(self, S: System, W: Work, clock: Clock) -> int:
         """Sample what is due now. Returns the status of the evaluation there."""
-        address = engine.address(S, W, self.R, clock, self.sheet)
-        return int(sample_kernel(address, S, W, self.R, clock, self.sheet, self.plan))
+        return int(sample_kernel(engine.address, S, W, self.R, clock, self.sheet, self.plan))

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compiler.bound import Mould, Moulded, Written
+from ..compiler.buffers import PooledBuffer, StructBuffer, StructPool
 from ..laws.call import STACK_RESERVE
 from ..tables.reads import width
 from ..tables.specs import Structure
@@ -41,10 +41,10 @@ def work(s: Structure, system: System, dtype: Any = None) -> Work:
     return W
 
 
-def scratch(s: Structure, system: System, dtype: Any) -> Moulded:
+def scratch(s: Structure, system: System, dtype: Any) -> PooledBuffer:
     """The same as compiled code has it."""
     key = np.dtype(dtype).char, int(system.flat[SCRATCH])
-    made = s.kept.get("scratch", key, MOST, lambda: Mould(blank(s, system, dtype))).new()
+    made = s.kept.get("scratch", key, MOST, lambda: StructPool(blank(s, system, dtype))).new()
     fill(s, system, made.array)
     return made
 
@@ -59,9 +59,9 @@ def fill(s: Structure, system: System, array: Callable[[str], np.ndarray]) -> No
         array("FK")[:n] = at_rest
 
 
-def tables(s: Structure, system: System) -> Written:
+def tables(s: Structure, system: System) -> StructBuffer:
     """The tables as compiled code has them."""
-    return s.kept.get("written", id(system), MOST, lambda: Written(system))  # whose address it keeps from others
+    return s.kept.get("written", id(system), MOST, lambda: StructBuffer(system))  # whose address it keeps from others
 
 
 def on_ground(system: System) -> np.ndarray:

@@ -16,13 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.door import door, enter
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.kernels import call, formula, kernel
+from ..compiler.layout import Float1, Float2, Int1
 from ..constraints.modes import FRICTION, SLIP
 from ..math.scalar import magnitude, sqrt
 from ..numerics.cone.shares import CELLS, OPEN, Shares, best, room
-from ..numerics.integrators.watching import TERMS
+from ..numerics.integrators.clock import Clock
+from ..numerics.integrators.tableaux import Tableau
+from ..numerics.integrators.watching import TERMS, Watch
 from ..tables.system import (
     LAM,
     SHARED,
@@ -33,7 +34,10 @@ from ..tables.system import (
     SWITCH_REST,
     SWITCH_ROW,
     VALUE,
+    System,
+    Work,
 )
+from .engine import Sheet
 from .guards import most
 from .rows import way_of
 from .tasks import SOLVE
@@ -47,11 +51,11 @@ NOT_WATCHED = float("nan")
 class Sharing(NamedTuple):
     """The group: empty where ``Q.count[OPEN]`` is 0."""
 
-    null: np.ndarray  # (ns, nr): multipliers in balance by themselves, the first Q.count[OPEN] rows in use
-    bend: np.ndarray  # (ns, ns): how the most that the friction of a switch holds follows each of them
-    size: np.ndarray  # (1,): the largest force of the group, by its weight
-    t: np.ndarray  # (1,): the time at which its guard is asked for [s]
-    door: np.ndarray  # (1,): address of `shares`, once there is a group
+    null: Float2  # (ns, nr): multipliers in balance by themselves, the first Q.count[OPEN] rows in use
+    bend: Float2  # (ns, ns): how the most that the friction of a switch holds follows each of them
+    size: Float1  # (1,): the largest force of the group, by its weight
+    t: Float1  # (1,): the time at which its guard is asked for [s]
+    door: Int1  # (1,): address of `shares`, once there is a group
     Q: Shares
 
 
@@ -142,7 +146,7 @@ def guard_of_group(S, W, t, G, K, row):
     """
     if G.Q.count[OPEN] > 0:
         G.t[0] = t
-        enter(G.door[0], S, W, G, K, K, row)
+        call(G.door[0], S, W, G, K, K, row)
     elif row >= 0:
         K.g[row, K.way.shape[0] - 1] = NOT_WATCHED
         K.count[TERMS] = 0
@@ -160,8 +164,8 @@ def written(S, W, G, K, row):
     return 0
 
 
-@door
-def shares(S, W, G, K, _, row):
+@kernel
+def shares(S: System, W: Work, G: Sharing, K: Watch, _: Watch, row: int) -> int:
     """`written` behind an address."""
     return written(S, W, G, K, row)
 
@@ -183,7 +187,7 @@ def renewed(address, S, W, R, own, sheet, G):
         for d in range(W.vel.shape[1]):
             left, terms = max(left, magnitude(out[0, d])), max(terms, out[2, d])
         if left > BALANCED * terms:
-            enter(address, S, W, R, own, sheet, SOLVE)
+            call(address, S, W, R, own, sheet, SOLVE)
             for k in range(nr):
                 G.null[j, k] += out[3, k]
 
@@ -227,18 +231,18 @@ def reached(Q, c, i, x):
 
 
 @kernel
-def margin_kernel(S, W, t, G):
+def margin_kernel(S: System, W: Work, t: float, G: Sharing) -> float:
     """`margin`, called from Python."""
-    return margin(held(S), held(W), t, held(G))
+    return margin(S, W, t, G)
 
 
 @kernel
-def shared_kernel(S, W, t, G):
+def shared_kernel(S: System, W: Work, t: float, G: Sharing) -> None:
     """`shared`, called from Python."""
-    shared(held(S), held(W), t, held(G))
+    shared(S, W, t, G)
 
 
 @kernel
-def renewed_kernel(address, S, W, R, own, sheet, G):
+def renewed_kernel(address: int, S: System, W: Work, R: Tableau, own: Clock, sheet: Sheet, G: Sharing) -> None:
     """`renewed`, called from Python."""
-    renewed(address, held(S), held(W), held(R), held(own), held(sheet), held(G))
+    renewed(address, S, W, R, own, sheet, G)

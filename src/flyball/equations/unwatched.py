@@ -1,6 +1,6 @@
 """A motion that goes on by steps of any method and in which nothing is watched: the loop of the integrators, by a door.
 
-All that it works with is laid out once and copied for each run (`bound.Mould`); nothing of it is looked at in Python.
+All that it works with is laid out once and copied for each run (`bound.StructPool`); nothing of it is looked at in Python.
 """
 
 from __future__ import annotations
@@ -10,28 +10,28 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compiler.bound import Bound, Joined, Mould, Written
-from ..compiler.door import door
-from ..compiler.jit import formula
+from ..compiler.buffers import JoinedBuffer, StructBuffer, StructPool
+from ..compiler.kernels import BoundKernel, formula, kernel
+from ..compiler.layout import Float2, Int1
 from ..numerics.integrators.clock import COUNTS, REALS, Clock
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..tables.specs import Structure
-from ..tables.system import System
+from ..tables.system import System, Work
 from .asking import report, steps
 from .callbacks import Going, Own
 from .engine import Sheet, engine
 from .scratch import tables
-from .sharing import shares, sharing
+from .sharing import sharing
 from .watched import idle_tableau, idle_watch
 
 MOST = 4  # layouts of a structure that are known
 
 
 class Out(NamedTuple):
-    """What the method is asked by (`door.ask`), and where rows of output go."""
+    """The method (`BoundKernel.words`), and where rows of output go."""
 
-    asked: np.ndarray
-    rows: np.ndarray
+    asked: Int1
+    rows: Float2
 
 
 @formula
@@ -42,16 +42,16 @@ def onward(S, W, own, going, out):
     return advance(callbacks, A, going.watch, own.R, going.clock, out.rows)
 
 
-@door
-def unwatched(S, W, own, going, out, task):
+@kernel
+def unwatched(S: System, W: Work, own: Own, going: Going, out: Out, task: int) -> int:
     """`onward` behind an address."""
     return onward(S, W, own, going, out)
 
 
 @lru_cache(maxsize=1)
-def _alone() -> Written:
+def _alone() -> StructBuffer:
     """Nothing holds together."""
-    return Written(sharing(0, 0))
+    return StructBuffer(sharing(0, 0))
 
 
 def _own(ny: int, width: int, seen: np.ndarray) -> Own:
@@ -73,7 +73,7 @@ class Unwatched:
         Of the integration.
     s : Structure
     S : System
-    scratch : Written
+    scratch : StructBuffer
         The Work.
     width : int
         Of a row of output, and of what the method has the engine write.
@@ -81,32 +81,25 @@ class Unwatched:
 
     fired = ()
 
-    def __init__(self, steps: Any, clock: Clock, s: Structure, S: System, scratch: Written, width: int) -> None:
+    def __init__(self, steps: Any, clock: Clock, s: Structure, S: System, scratch: StructBuffer, width: int) -> None:
         self.steps, self.clock, self.s, self.scratch = steps, clock, s, scratch
         ny, width, R = clock.y.shape[1], max(width, s.nv, len(s.rows), 1), idle_tableau()
         if clock.seen.shape[1]:
             own = _own(ny, width, clock.seen)
-            self.own, doors = Written(own, R), own.doors
+            self.own, doors = StructBuffer(own, R), own.doors
         else:
-            mould = s.kept.get("own desk", (ny, width), MOST, lambda: Mould(_own(ny, width, clock.seen), R.fields))
+            mould = s.kept.get("own desk", (ny, width), MOST, lambda: StructPool(_own(ny, width, clock.seen), R.fields))
             self.own, doors = (made := mould.new()), made.array("doors")
         watch = idle_watch(steps.c.tobytes(), steps.stages)
-        self.going = Joined(Going, Written(clock), watch, _alone())
+        self.going = JoinedBuffer(Going, StructBuffer(clock), watch, _alone())
         written = tables(s, S)
-        doors[0] = engine.address(*(() if engine.used else (x.fields for x in self._engine(written))))
-        if not unwatched.used:
-            shares.expects(written.fields, scratch.fields, *(x.fields for x in (_alone(), watch, watch)))
+        doors[0] = engine.address
         self.bound = steps.bind(written, scratch, self.own, self.going, doors)
-        self._loop: tuple[np.ndarray, Bound] | None = None
-
-    def _engine(self, written: Written) -> tuple[Written, ...]:
-        """What the engine is made for."""
-        own = self.own.fields
-        return (written, self.scratch, *map(Written, (own.R, own.clock, own.sheet)))
+        self._loop: tuple[np.ndarray, BoundKernel] | None = None
 
     def go_on(self, out: np.ndarray) -> int:
         """Go on until the end, or what else `loop.advance` returns for. Returns rows written."""
         if self._loop is None or self._loop[0] is not out:
-            rows = Written(Out(self.bound.asked, out))
-            self._loop = out, Bound(unwatched, self.bound.tuples[0], self.scratch, self.own, self.going, rows)
+            rows = StructBuffer(Out(self.bound.words, out))
+            self._loop = out, BoundKernel(unwatched, self.bound.buffers[0], self.scratch, self.own, self.going, rows)
         return self._loop[1](0)

@@ -12,14 +12,17 @@ engine and of the residuals.
 
 from __future__ import annotations
 
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
-from ..numerics.integrators.clock import T
+from ..compiler.kernels import formula, kernel
+from ..compiler.layout import Float2
+from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import advance, nothing, whole
-from ..tables.system import BODY_LAW
+from ..numerics.integrators.tableaux import Tableau
+from ..tables.system import BODY_LAW, ComplexSystem, ComplexWork, System, Work
 from .asking import OWN, S_, SHEET, W_, inspect, through
-from .changes import COUNT, NQ, NZ, POWERS, change, closed, press, settle_at
+from .changes import COUNT, NQ, NZ, POWERS, Plan, change, closed, press, settle_at
+from .engine import Sheet
+from .residual import Bench
 from .tasks import ARRIVE, MOTION, REPORT, TANGENT
 
 
@@ -141,7 +144,22 @@ def report(t, y, out, A, P):
 
 
 @kernel
-def variation_kernel(address, residual, S, W, R, own, sheet, SC, WC, bench, plan, clock, states, out):
+def variation_kernel(
+    address: int,
+    residual: int,
+    S: System,
+    W: Work,
+    R: Tableau,
+    own: Clock,
+    sheet: Sheet,
+    SC: ComplexSystem,
+    WC: ComplexWork,
+    bench: Bench,
+    plan: Plan,
+    clock: Clock,
+    states: Float2,
+    out: Float2,
+) -> int:
     """Integrate motion and changes together, or report them at given states; see ``analysis.linear.variation``.
 
     Parameters
@@ -169,12 +187,11 @@ def variation_kernel(address, residual, S, W, R, own, sheet, SC, WC, bench, plan
     int
         The number of rows written.
     """
-    A = (address, held(S), held(W), held(R), held(own), held(sheet), residual, held(SC), held(WC), held(bench))
-    P, c = held(plan), held(clock)
+    A = (address, S, W, R, own, sheet, residual, SC, WC, bench)
     if states.shape[0] == 0:
         callbacks = (answer, (derivative, arrive, tangent, inspect), report, nothing, whole)
-        return advance(callbacks, A, P, held(R), c, out)
+        return advance(callbacks, A, plan, R, clock, out)
     for n in range(states.shape[0]):
-        if report(c.times[n], states[n], out[n], A, P) != 0:
+        if report(clock.times[n], states[n], out[n], A, plan) != 0:
             return n
     return states.shape[0]

@@ -5,16 +5,17 @@ In absolute coordinates: masses are constant, bodies are coupled by rows and for
 
 from __future__ import annotations
 
-from ..compiler.door import door
-from ..compiler.jit import formula
+from ..compiler.kernels import formula, kernel
 from ..math.cayley import bent
 from ..math.scalar import sqrt, tan
 from ..math.vec import add, cross, dot, load9, mv, scale, sub
 from ..numerics.integrators.clock import T
+from ..numerics.integrators.implicit.desk import VariationalDesk
 from ..numerics.integrators.implicit.hermite import between
 from ..numerics.integrators.implicit.variational import answer
-from ..tables.system import COORDINATES, G_VALUE, INERTIA, MASS, NV, V0
+from ..tables.system import COORDINATES, G_VALUE, INERTIA, MASS, NV, V0, System, Work
 from .asking import OWN, S_, SHEET, W_, inspect, through
+from .callbacks import Going, Own
 from .implicit import compose, land
 from .solve import inverse_mass
 from .tasks import POSITION, RESIDUAL, SOLVE
@@ -223,7 +224,7 @@ def by_variation(S, W, M, own, going, task):
     return answer(callbacks, A, M, going.clock, task)
 
 
-@door
-def variational_steps(S, W, M, own, going, task):
+@kernel
+def variational_steps(S: System, W: Work, M: VariationalDesk, own: Own, going: Going, task: int) -> int:
     """`by_variation` behind an address."""
     return by_variation(S, W, M, own, going, task)

@@ -12,9 +12,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..compiler.bound import Bound, Moulded, Written
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.buffers import PooledBuffer, StructBuffer
+from ..compiler.kernels import BoundKernel, formula, kernel
+from ..compiler.layout import Float2, Int1
 from ..numerics.cone.shares import OPEN
 from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.expected import expect
@@ -48,7 +48,7 @@ from .guards import FIRM, KEPT, astray, grains
 from .guards import watch as guards
 from .pace import quickest
 from .rows import measured
-from .sampled import Sampling
+from .sampled import Samples, Sampling
 from .sampled import advance as from_instant_to_instant
 from .scratch import tables
 from .sharing import GRAIN, Sharing, guard_of_group, renewed, shares
@@ -145,11 +145,24 @@ def look(t, h, x, A, K, row):
 
 
 @kernel
-def watched_kernel(doors, S, W, R, own, sheet, group, expected, desk, clock, out):
-    """Go on with a watched integration; ``doors``: what the method is asked by (`door.ask`); the engine's address."""
-    A = (doors[1][0], held(S), held(W), held(R), held(own), held(sheet), held(group), held(expected))
-    callbacks = (steps, doors[0], report, begun, onward, watch, note, look)
-    return advance(callbacks, A, held(desk), held(R), held(clock), out)
+def watched_kernel(
+    method: Int1,
+    address: int,
+    S: System,
+    W: Work,
+    R: Tableau,
+    own: Clock,
+    sheet: Sheet,
+    group: Sharing,
+    expected: Work,
+    desk: Watch,
+    clock: Clock,
+    out: Float2,
+) -> int:
+    """Go on with a watched integration; ``method``: see `kernels.call_bound`; ``address``: the engine's."""
+    A = (address, S, W, R, own, sheet, group, expected)
+    callbacks = (steps, method, report, begun, onward, watch, note, look)
+    return advance(callbacks, A, desk, R, clock, out)
 
 
 @formula
@@ -160,15 +173,27 @@ def by_steps(X, rows):
 
 
 @kernel
-def sampled_steps_kernel(doors, S, W, R, own, sheet, desk, clock, P, part, out):
+def sampled_steps_kernel(
+    method: Int1,
+    address: int,
+    S: System,
+    W: Work,
+    R: Tableau,
+    own: Clock,
+    sheet: Sheet,
+    desk: Watch,
+    clock: Clock,
+    P: Samples,
+    part: Float2,
+    out: Float2,
+) -> int:
     """Go on with an integration in which nothing is watched, from instant to instant of what is sampled.
 
     ``part``: rows of output between two of them.
     """
-    A = (doors[1][0], held(S), held(W), held(R), held(own), held(sheet))
-    c = held(clock)
-    X = ((steps, doors[0], report, nothing, whole), A, held(desk), held(R), c)
-    return from_instant_to_instant(by_steps, X, (*A[:4], c, A[5], held(P)), part, out)
+    A = (address, S, W, R, own, sheet)
+    X = ((steps, method, report, nothing, whole), A, desk, R, clock)
+    return from_instant_to_instant(by_steps, X, (address, S, W, R, clock, sheet, P), part, out)
 
 
 class Steps(Protocol):
@@ -179,7 +204,9 @@ class Steps(Protocol):
     stages: int  # how many of these there are
     failed: Exception | None  # why it does not go on, where that is the method's own reason
 
-    def bind(self, tables: Written, scratch: Written, own: Written, going: Written, doors: np.ndarray) -> Bound:
+    def bind(
+        self, tables: StructBuffer, scratch: StructBuffer, own: StructBuffer, going: StructBuffer, doors: np.ndarray
+    ) -> BoundKernel:
         """The door bound to a System, a Work, an `Own` and a `Going`; ``doors``: of `Own`, its second to be set."""
 
 
@@ -208,16 +235,16 @@ def _desk(S: System, expected: Work, c: np.ndarray, stages: int) -> Watch:
 
 
 @lru_cache(maxsize=16)
-def idle_watch(c: bytes, stages: int) -> Written:
+def idle_watch(c: bytes, stages: int) -> StructBuffer:
     """What a loop keeps where there is nothing to watch, for all of them."""
     none, empty = np.zeros(0, np.int64), (np.zeros((RETURNED + 1, 0)), np.zeros(0))
-    return Written(watching(none, none, np.frombuffer(c).copy(), stages, 0, none, none, empty))
+    return StructBuffer(watching(none, none, np.frombuffer(c).copy(), stages, 0, none, none, empty))
 
 
 @lru_cache(maxsize=1)
-def idle_tableau() -> Written:
+def idle_tableau() -> StructBuffer:
     """A tableau that the engine does not look at."""
-    return Written(tableau("rk45"))
+    return StructBuffer(tableau("rk45"))
 
 
 class Loop:
@@ -230,7 +257,7 @@ class Loop:
         Of the integration.
     s : Structure
     S : System
-    scratch : Moulded
+    scratch : PooledBuffer
         The Work.
     width : int
         Of a row of output, and of what the method has the engine write.
@@ -239,7 +266,7 @@ class Loop:
     """
 
     def __init__(
-        self, steps: Any, clock: Clock, s: Structure, S: System, scratch: Moulded, width: int, group: Sharing
+        self, steps: Any, clock: Clock, s: Structure, S: System, scratch: PooledBuffer, width: int, group: Sharing
     ) -> None:
         self.steps, self.clock, self.s, self.S, self.scratch = steps, clock, s, S, scratch
         W = scratch.fields
@@ -258,10 +285,9 @@ class Loop:
             clock.seen,
         )  # fmt: skip
         self.group, nv = group, W.vel.shape[1]
-        shares.expects(S, W, group, self.desk, self.desk)
         sheet = Sheet(np.zeros((4, max(width, len(S.guard_i), nv, len(S.row_i), 1))))
         self.own = Own(own, sheet, self._known[0].fields, np.zeros(2, np.int64))
-        self._bound: Bound | None = None
+        self._bound: BoundKernel | None = None
 
     def go_on(self, S: System, out: np.ndarray, sampling: Sampling | None = None) -> int:
         """Go on until an event, the end, or what else `loop.advance` returns for. Returns rows written.
@@ -270,17 +296,16 @@ class Loop:
         """
         x, W = self.own, self.scratch.fields
         if self._bound is None or S is not self.S:
-            x.doors[0] = engine.address(S, W, x.R, x.clock, x.sheet)
-            own, going = (Written(f, *self._known) for f in (x, Going(self.clock, self.desk, self.group)))
+            x.doors[0] = engine.address
+            own, going = (StructBuffer(f, *self._known) for f in (x, Going(self.clock, self.desk, self.group)))
             self.S, self._bound = S, self.steps.bind(tables(self.s, S), self.scratch, own, going, x.doors)
         if self.group.Q.count[OPEN] and not self.group.door[0]:
-            self.group.door[0] = shares.address(S, W, self.group, self.desk, self.desk)
-        doors = self._bound.asked, x.doors
-        asked = S, W, x.R, x.clock, x.sheet
+            self.group.door[0] = shares.address
+        asked = self._bound.words, engine.address, S, W, x.R, x.clock, x.sheet
         if not len(S.guard_i) and sampling is not None:
             plan, part = sampling.plan, sampling.sheet.rows
-            return int(sampled_steps_kernel(doors, *asked, self.desk, self.clock, plan, part, out))
-        return int(watched_kernel(doors, *asked, self.group, self.expected, self.desk, self.clock, out))
+            return int(sampled_steps_kernel(*asked, self.desk, self.clock, plan, part, out))
+        return int(watched_kernel(*asked, self.group, self.expected, self.desk, self.clock, out))
 
     @property
     def fired(self) -> tuple[int, ...]:

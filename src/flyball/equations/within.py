@@ -13,7 +13,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from ..compiler.jit import formula
+from ..compiler.kernels import formula
 from ..forces import BRANCHES
 from ..laws.evaluation import evaluate, evaluate_jet
 from ..laws.manner import brief

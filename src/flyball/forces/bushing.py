@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from ..compiler.jit import formula
+from ..compiler.kernels import formula
 from ..errors import ModelError
 from ..math.rotation import log_gradient, rotation_vector
 from ..math.scalar import choose

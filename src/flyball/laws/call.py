@@ -11,7 +11,7 @@ import math
 from typing import Any
 from weakref import WeakValueDictionary
 
-from ..compiler.jit import INSIDE, formula, on_numba
+from ..compiler.kernels import formula, when_compiling
 from .opcodes import ADDRESS, COUNT, INDEX
 
 STACK_RESERVE = 3
@@ -75,12 +75,14 @@ def note_missed(stack, law, table, x, t):
     stack[last + 1, 1] = t
 
 
-@on_numba
+@when_compiling
 def _register() -> None:
     """In compiled code: a jump to the address; complex numbers are not for such code, their value stays nan."""
     from llvmlite import ir
     from numba import types
-    from numba.extending import intrinsic, overload
+    from numba.extending import intrinsic
+
+    from ..compiler.target import overload
 
     @intrinsic
     def jump(typing, address, stack, row):
@@ -93,7 +95,7 @@ def _register() -> None:
 
         return types.void(types.int64, getattr(stack, "array", stack), types.int64), generate  # the whole array
 
-    @overload(call, jit_options=INSIDE)
+    @overload(call)
     def choose(address, stack, row):
         if isinstance(stack.dtype, types.Complex):
             return lambda address, stack, row: None

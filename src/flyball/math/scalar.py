@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.jit import INSIDE, formula, on_numba
+from ..compiler.kernels import formula, when_compiling
 
 Function = Callable[..., Any]
 
@@ -270,16 +270,17 @@ def quintic_rise(s):
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
 
-@on_numba
+@when_compiling
 def _register() -> None:
     """Tell the compiler what these functions are for real and complex numbers."""
     from numba import types
-    from numba.extending import overload
+
+    from ..compiler.target import overload
 
     def analytic(function: Function, name: str) -> None:
         real, complex_ = getattr(math, name), getattr(cmath, name)
 
-        @overload(function, jit_options=INSIDE)
+        @overload(function)
         def choose(x):
             return (lambda x: complex_(x)) if isinstance(x, types.Complex) else (lambda x: real(x))
 
@@ -290,7 +291,7 @@ def _register() -> None:
     def stepped(function: Function, real: Function, complex_: Function) -> None:
         """Overload a function whose complex argument carries a step: of first order, which is what it is for."""
 
-        @overload(function, jit_options=INSIDE)
+        @overload(function)
         def choose(x):
             return complex_ if isinstance(x, types.Complex) else real
 
@@ -319,7 +320,7 @@ def _register() -> None:
     def either(function: Function, real: Function, complex_: Function) -> None:
         """Overload a function of two numbers, of which one or both may be complex."""
 
-        @overload(function, jit_options=INSIDE)
+        @overload(function)
         def choose(a, b):
             return complex_ if isinstance(a, types.Complex) or isinstance(b, types.Complex) else real
 
@@ -327,48 +328,48 @@ def _register() -> None:
         turned, square = x.real * y.imag - y.real * x.imag, x.real * x.real + y.real * y.real
         return complex(math.atan2(y.real, x.real), turned / square if turned != 0.0 else 0.0)
 
-    @overload(atan2, jit_options=INSIDE)
+    @overload(atan2)
     def choose_atan2(y, x):
         is_complex = isinstance(y, types.Complex) or isinstance(x, types.Complex)
         return complex_atan2 if is_complex else (lambda y, x: math.atan2(y, x))
 
-    @overload(absolute, jit_options=INSIDE)
+    @overload(absolute)
     def choose_absolute(x):
         return lambda x: -x if x.real < 0 else x
 
-    @overload(sign, jit_options=INSIDE)
+    @overload(sign)
     def choose_sign(x):
         if isinstance(x, types.Complex):
             return lambda x: complex(sign(x.real), 0.0)
         return lambda x: x * 1.0 if x != x else float((x > 0) - (x < 0))
 
-    @overload(rounded, jit_options=INSIDE)
+    @overload(rounded)
     def choose_rounded(x):
         if isinstance(x, types.Complex):
             return lambda x: complex(np.floor(x.real + 0.5), 0.0)
         return lambda x: np.floor(x + 0.5)
 
-    @overload(magnitude, jit_options=INSIDE)
+    @overload(magnitude)
     def choose_magnitude(x):
         return lambda x: x.real if x.real > 0.0 else -x.real
 
-    @overload(larger, jit_options=INSIDE)
+    @overload(larger)
     def choose_larger(a, b):
         return lambda a, b: a if a > b else b
 
-    @overload(nonzero, jit_options=INSIDE)
+    @overload(nonzero)
     def choose_nonzero(x):
         return lambda x: not (x.real == 0.0 or x.real != x.real)
 
-    @overload(positive, jit_options=INSIDE)
+    @overload(positive)
     def choose_positive(x):
         return lambda x: x.real > 0.0
 
-    @overload(choose, jit_options=INSIDE)
+    @overload(choose)
     def choose_choose(x, a, b):
         return lambda x, a, b: a if x.real > 0 else b
 
-    @overload(unless_zero, jit_options=INSIDE)
+    @overload(unless_zero)
     def choose_unless_zero(x, a, b):
         return lambda x, a, b: a if x.real != 0.0 else b
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.jit import INSIDE, formula, on_numba
+from ..compiler.kernels import formula, when_compiling
 
 GRACE = 1e-9  # part of a table's width by which rounding may go beyond its ends
 BREAKS = 2  # place of the first break
@@ -157,15 +157,15 @@ def symbolic(data: Any, at: int, x: Any) -> Any:
     return sympy.Piecewise(*pieces)
 
 
-@on_numba
+@when_compiling
 def _register() -> None:
     """In compiled code x is one number."""
-    from numba.extending import overload
+    from ..compiler.target import overload
 
-    @overload(piece, jit_options=INSIDE)
+    @overload(piece)
     def choose(data, at, x):
         return found
 
-    @overload(spline, jit_options=INSIDE)
+    @overload(spline)
     def choose_spline(data, at, x):
         return lambda data, at, x: on_pieces(data, at, x)

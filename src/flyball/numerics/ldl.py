@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.jit import formula, kernel
+from ..compiler.kernels import formula, kernel
+from ..compiler.layout import Float1, Int1
 from ..math.scalar import nonzero
 from .dissection import minimum_degree, nested_dissection
 
@@ -22,14 +23,14 @@ FILLED = 100.0  # and products for each unknown
 class Pattern(NamedTuple):
     """Structure of A (upper triangle, permuted) and L. Column k of A is row k of the lower triangle."""
 
-    perm: np.ndarray  # (n,): place of unknown i in the factored order
-    Ap: np.ndarray  # (n + 1,)
-    Ai: np.ndarray  # (nA,): the diagonal is the last entry of each column
-    Lp: np.ndarray  # (n + 1,): first entry of each column of L
-    Li: np.ndarray  # (nL,): rows of L
-    Rp: np.ndarray  # (n + 1,): first entry of each row of L
-    Ri: np.ndarray  # (nL,): columns of that row, ascending
-    Rx: np.ndarray  # (nL,): their places in the columns of L
+    perm: Int1  # (n,): place of unknown i in the factored order
+    Ap: Int1  # (n + 1,)
+    Ai: Int1  # (nA,): the diagonal is the last entry of each column
+    Lp: Int1  # (n + 1,): first entry of each column of L
+    Li: Int1  # (nL,): rows of L
+    Rp: Int1  # (n + 1,): first entry of each row of L
+    Ri: Int1  # (nL,): columns of that row, ascending
+    Rx: Int1  # (nL,): their places in the columns of L
 
 
 @formula
@@ -148,6 +149,6 @@ def _lower(n: int, i: np.ndarray, j: np.ndarray, perm: np.ndarray) -> Lower:
 
 
 @kernel
-def factor_kernel(P, A, L, D, Y):
+def factor_kernel(P: Pattern, A: Float1, L: Float1, D: Float1, Y: Float1) -> None:
     """Factor a sparse symmetric matrix; see ``ldl_factor``."""
     return ldl_factor(P, A, L, D, Y)

@@ -12,21 +12,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.jit import formula, kernel
+from ..compiler.kernels import formula, kernel
+from ..compiler.layout import Int1
 from ..math.scalar import nonzero
 
 
 class Rows(NamedTuple):
     """Structure of A, L and U by rows, in the order of elimination; columns ascend, diagonals of L and U left out."""
 
-    perm: np.ndarray  # (n,): place of unknown i in the order of elimination
-    Ap: np.ndarray  # (n + 1,)
-    Aj: np.ndarray  # (nA,)
-    Lp: np.ndarray  # (n + 1,)
-    Lj: np.ndarray  # (nL,)
-    Up: np.ndarray  # (n + 1,)
-    Uj: np.ndarray  # (nU,)
-    twin: np.ndarray  # (n,): whether row i of U has i + 1 and then what row i + 1 has
+    perm: Int1  # (n,): place of unknown i in the order of elimination
+    Ap: Int1  # (n + 1,)
+    Aj: Int1  # (nA,)
+    Lp: Int1  # (n + 1,)
+    Lj: Int1  # (nL,)
+    Up: Int1  # (n + 1,)
+    Uj: Int1  # (nU,)
+    twin: Int1  # (n,): whether row i of U has i + 1 and then what row i + 1 has
 
 
 @formula
@@ -135,7 +136,7 @@ def pointers(rows: np.ndarray, n: int) -> np.ndarray:
 
 
 @kernel
-def fill_in(Ap, Aj, Lp, Lj, Up, Uj, seen):
+def fill_in(Ap: Int1, Aj: Int1, Lp: Int1, Lj: Int1, Up: Int1, Uj: Int1, seen: Int1) -> int:
     """Patterns of L and U of rows eliminated in turn. Returns 0, or 1 if there is no room for them."""
     n = Ap.shape[0] - 1
     for k in range(n):

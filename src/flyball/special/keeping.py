@@ -15,15 +15,12 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Iterator
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..compiler.cache import cache_of
-from ..compiler.jit import start_numba
-from ..equations.engine import engine
+from ..compiler.store import cache_folder
 from ..tables.system import System
 from ..tables.values import Values
 from .machine import Loaded, assembled
@@ -95,7 +92,6 @@ def code(p: Plan, x: Values) -> tuple[Made, str]:
 
 
 def _made(p: Plan, x: Values) -> Made:
-    start_numba()
     begun = time.process_time()
     try:
         text = traced(x.structure, x.system)
@@ -138,10 +134,8 @@ def _remember(p: Plan, S: System, entries: list[Entry], made: Made) -> None:
 # -- on disk
 
 
-@lru_cache(maxsize=1)
 def _folder() -> Path | None:
-    start_numba()
-    return getattr(cache_of(engine.function), "folder", None)
+    return cache_folder()
 
 
 def _files(p: Plan) -> list[Path]:

@@ -1,40 +1,38 @@
 """From text in LLVM's language to machine code, and from there to addresses.
 
-`llvmlite` comes with Numba; no pass of Numba is run. The object file that comes out is what is kept on disk.
+No pass of Numba is run. The object code that comes out is what is kept on disk.
 """
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
-from ..compiler.jit import start_numba
+from ..compiler.layout import DATA, Struct, struct
+from ..compiler.machine import LoadedCode, assembled, baseline, llvm, triple
 from ..graph.printers.llvm import Module
 from ..tables.system import System, Work
 from ..tracing.trace import TABLES
-from .layout import DIMENSIONS
 from .linked import ENTRIES, Linked
 
+__all__ = ["Loaded", "assembled", "machine", "module_of", "tables_of"]
 ARGUMENTS = "ptr %S, ptr %W, double %t, ptr %a, ptr %b, ptr %c, ptr %d"
-HEAD, DATA, A_DIMENSION = 40, 32, 16
-"""Bytes of an array of a held tuple without its shape, where its numbers' address stands, and of a dimension."""
-_LOCK = threading.RLock()
 
 
 @lru_cache(maxsize=1)
 def offsets() -> dict[str, int]:
-    """Where, from the begin of a held `System` or `Work`, the addresses of their arrays' numbers stand."""
-    out: dict[str, int] = {}
-    for letter, of in (("S", System), ("W", Work)):
-        at = 0
-        for name, dimensions in DIMENSIONS[of.__name__]:
-            out[f"{letter}_{name}"] = at + DATA
-            at += HEAD + A_DIMENSION * dimensions
-    return out
+    """Where, from the begin of a `System` or `Work`, the addresses of their arrays' numbers stand [bytes]."""
+    return dict(_places(struct(System), "S_", DATA)) | dict(_places(struct(Work), "W_", DATA))
+
+
+def _places(of: Struct, prefix: str, at: int) -> Iterator[tuple[str, int]]:
+    for name, x in of.fields:
+        if isinstance(x, Struct):
+            yield from _places(x, f"{prefix}{name}_", at + of.offset(name))
+        else:
+            yield prefix + name, at + of.offset(name)
 
 
 def module_of(linked: Linked) -> str:
@@ -60,51 +58,12 @@ def _based(base: str) -> list[str]:
     ]
 
 
-def _target() -> Any:
-    """A target machine; whoever makes an engine of it, owns it."""
-    start_numba()
-    import llvmlite.binding as llvm
-
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    features = llvm.get_host_cpu_features().flatten()
-    target = llvm.Target.from_default_triple()
-    return target.create_target_machine(
-        cpu=llvm.get_host_cpu_name(),
-        features=features,
-        opt=2,
-        jit=True,
-        codemodel="jitdefault",
-    )
-
-
 @lru_cache(maxsize=1)
 def machine() -> str:
-    """What the code is for: processor, its features, versions."""
-    start_numba()
+    """What the code is for: processor, versions."""
     import llvmlite
-    import llvmlite.binding as llvm
 
-    features = llvm.get_host_cpu_features().flatten()
-    versions = f"{llvmlite.__version__} {llvm.llvm_version_info}"
-    return f"{llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features} {versions}"
-
-
-def assembled(text: str) -> bytes:
-    """The object file of a module."""
-    import llvmlite.binding as llvm
-
-    with _LOCK:
-        target = _target()
-        module = llvm.parse_assembly(text)
-        module.triple = llvm.get_default_triple()
-        module.data_layout = str(target.target_data)
-        options = llvm.create_pipeline_tuning_options(speed_level=2)
-        options.slp_vectorization = False  # measured: slower, and longer in the making
-        builder = llvm.create_pass_builder(target, options)
-        passes = builder.getModulePassManager()
-        passes.run(module, builder)
-        return bytes(target.emit_object(module))
+    return f"{triple()} {baseline()} {llvmlite.__version__} {llvm().llvm_version_info}"
 
 
 class Loaded:
@@ -117,14 +76,9 @@ class Loaded:
     """
 
     def __init__(self, code: bytes, laws: Sequence[str] = ()) -> None:
-        import llvmlite.binding as llvm
-
-        with _LOCK:
-            self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target())
-            self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-            self._engine.finalize_object()
-            names = ("CONSTANTS", *ENTRIES[1:-1], *filter(None, laws))
-            self.addresses = {name: int(self._engine.get_function_address(name)) for name in names}
+        self._code = LoadedCode(code)
+        names = ("CONSTANTS", *ENTRIES[1:-1], *filter(None, laws))
+        self.addresses = {name: self._code.address(name) for name in names}
 
 
 def tables_of(S: System) -> np.ndarray:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..compiler.stamp import PACKAGE, TEXTS, compiled_files
+from ..compiler.sources import PACKAGE, TEXTS, compiled_files
 from ..tables.specs import Structure
 from ..tables.system import System
 from ..tables.values import Values

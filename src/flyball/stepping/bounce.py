@@ -14,8 +14,7 @@ What is hit may reach something else within the same step: impacts go in rounds 
 
 from __future__ import annotations
 
-from ..compiler.door import enter
-from ..compiler.jit import formula
+from ..compiler.kernels import call, formula
 from ..contact.surfaces import RESTITUTION
 from ..contact.tables import FOUND, GAP, MATERIAL, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
@@ -188,7 +187,7 @@ def solve_afresh(address, R, Z, W, O, F, pace):
         Z.line[k] = 0.0
     O.count[MOST] = MORE * pace.count[SWEEPS]
     O.real[ENOUGH] = pace.real[ENOUGH_V]
-    enter(address, R, Z, W, O, F.impacts, 0)
+    call(address, R, Z, W, O, F.impacts, 0)
     if O.count[ENDED] != CONVERGED and O.real[RESIDUAL] > pace.real[ROUGH] * pace.real[STEP]:
         pace.count[CUTS] += 1
 

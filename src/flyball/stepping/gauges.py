@@ -7,8 +7,7 @@ themselves resist.
 
 from __future__ import annotations
 
-from ..compiler.door import enter
-from ..compiler.jit import formula
+from ..compiler.kernels import call, formula
 from ..equations.records import load
 from ..equations.tasks import POSITION
 from ..equations.tree import retract
@@ -87,7 +86,7 @@ def put_right(A):
     q = A.clock.y[0, : A.S.kinds[COORDINATES]]
     step = A.mixing[0]
     for _ in range(PASSES):
-        enter(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, POSITION)
+        call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, POSITION)
         worst = 0.0
         for i in range(A.count[SPRINGS]):
             x = A.spring_x[i]

@@ -15,8 +15,7 @@ M + J' A J, with A = h^2 k b' + h c (1 + b) / 2, is inverted by Sherman, Morriso
 
 from __future__ import annotations
 
-from ..compiler.door import enter
-from ..compiler.jit import formula
+from ..compiler.kernels import call, formula
 from ..equations.records import load
 from ..equations.slopes import DAMPING, DIRECTIONS, STIFFNESS, direction
 from ..equations.solve import inverse_mass
@@ -85,7 +84,7 @@ def respond(A, force, out):
         rows[0, d] = force[d]
     for r in range(nr):
         rows[1, r] = 0.0
-    enter(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, SOLVE)
+    call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, SOLVE)
     for d in range(nv):
         out[d] = rows[2, d]
 
@@ -97,7 +96,7 @@ def take_springs(A, h):
     A.count[SPRINGS] = 0
     if S.force_i.shape[0] == 0:
         return
-    enter(A.door[0], S, W, A.R, A.clock, A.slopes, SLOPES)
+    call(A.door[0], S, W, A.R, A.clock, A.slopes, SLOPES)
     found = A.slopes.rows
     used = 0
     for k in range(S.force_i.shape[0]):

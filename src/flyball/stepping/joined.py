@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..compiler.layout import Float1, Float2, Int1, Int2
 from ..equations.engine import Sheet
 from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.tableaux import Tableau
@@ -65,26 +66,26 @@ class Joined(NamedTuple):
     clock: Clock
     sheet: Sheet  # (4, width)
     slopes: Sheet  # (forces, SLOPE_WIDTH)
-    door: np.ndarray  # (1,): the engine's address
-    real: np.ndarray  # (8,)
-    count: np.ndarray  # type: ignore[assignment]  # (8,)
-    mover: np.ndarray  # (movers, 2): row of the body table, group
-    group: np.ndarray  # (ng + 1,)
-    wide: np.ndarray  # (8, nv)
-    lam: np.ndarray  # (3, nr): multipliers without contact; impulses of contacts and the rest over the step; those of
+    door: Int1  # (1,): the engine's address
+    real: Float1  # (8,)
+    count: Int1  # type: ignore[assignment]  # (8,)
+    mover: Int2  # (movers, 2): row of the body table, group
+    group: Int1  # (ng + 1,)
+    wide: Float2  # (8, nv)
+    lam: Float2  # (3, nr): multipliers without contact; impulses of contacts and the rest over the step; those of
     # impacts before it
-    spring_x: np.ndarray  # (springs, 10)
-    spring_J: np.ndarray  # (springs, nv)
-    spring_Y: np.ndarray  # (springs, nv)
-    stiff: np.ndarray  # (springs, springs): Cholesky factor
-    mixing: np.ndarray  # (MIXING, nv)
-    weight: np.ndarray  # (MIXED + 1, MIXED + 1)
-    line: np.ndarray  # (lines, 3)
-    line_x: np.ndarray  # (lines, 8)
-    active: np.ndarray  # (2 lines, 3)
-    job: np.ndarray  # (2 contacts + lines, 3)
-    queue: np.ndarray  # (ng,): the next job of each group
-    pose: np.ndarray  # (movers, 12): before they were put onto the joints
+    spring_x: Float2  # (springs, 10)
+    spring_J: Float2  # (springs, nv)
+    spring_Y: Float2  # (springs, nv)
+    stiff: Float2  # (springs, springs): Cholesky factor
+    mixing: Float2  # (MIXING, nv)
+    weight: Float2  # (MIXED + 1, MIXED + 1)
+    line: Int2  # (lines, 3)
+    line_x: Float2  # (lines, 8)
+    active: Int2  # (2 lines, 3)
+    job: Int2  # (2 contacts + lines, 3)
+    queue: Int1  # (ng,): the next job of each group
+    pose: Float2  # (movers, 12): before they were put onto the joints
 
 
 def _none(of: type, dimensions: str, **parts: Any) -> Any:

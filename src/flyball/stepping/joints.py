@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ..compiler.door import door, enter
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.kernels import call, formula, kernel
+from ..contact.tables import Contacts, Movers
 from ..equations.rows import row_times
 from ..equations.tasks import ARRIVE, MOTION, POSITION, SOLVE
 from ..equations.tree import retract
 from ..math.vec import load3, load9, put3, put9
+from ..numerics.cone.problem import Problem, State
 from ..numerics.integrators.clock import T
 from ..tables.system import (
     BODY_LAW,
@@ -55,6 +55,7 @@ from .joined import (
     V_BEFORE,
     VELOCITIES,
     WAY,
+    Joined,
 )
 from .ledger import kinetic, reactions_work, settle_account, weigh_mean
 from .lines import lines_done, press, stops_only
@@ -127,7 +128,7 @@ def make_consistent(A, X):
         rows[0, d] = 0.0
     for r in range(A.S.row_i.shape[0]):
         rows[1, r] = A.W.row[NU, r] - row_times(A.S, A.W, r, X.wide)
-    enter(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, SOLVE)
+    call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, SOLVE)
     for d in range(A.wide.shape[1]):
         A.wide[WAY, d] = X.wide[d] + 0.5 * rows[2, d]
         X.wide[d] += rows[2, d]
@@ -141,7 +142,7 @@ def start(A, M, X):
     """Evaluate where the motion begins, which must be on the constraints: accelerations, multipliers, efforts."""
     A.count[BEGUN] = 0
     A.clock.real[T] = A.real[TIME]
-    status = enter(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, MOTION)
+    status = call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, MOTION)
     put_aside(A, A.real[STEP])
     nq = A.S.kinds[COORDINATES]
     for d in range(A.wide.shape[1]):
@@ -238,7 +239,7 @@ def evaluate_again(A, part):
     for d in range(A.wide.shape[1]):
         mean = A.wide[V_BEFORE, d] + 0.5 * A.wide[CHANGE, d]
         A.clock.y[0, nq + d] = mean + part * A.wide[STRUCK, d]
-    return enter(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, MOTION)
+    return call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, MOTION)
 
 
 @formula
@@ -344,29 +345,23 @@ def finish(A, M, X):
     put_right(A)
     A.real[KINETIC] = -1.0
     if struck(A) or moved(X.wide):
-        enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)
+        call(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)
         A.real[KINETIC] = kinetic(A)
         put_aside_poses(A)
     A.W.option[PLACED] = 1.0
-    status = enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, ARRIVE)
+    status = call(A.door[0], S, A.W, A.R, A.clock, A.sheet, ARRIVE)
     A.W.option[PLACED] = 0.0
     if status != 0:
         return status
-    enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)
+    call(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)
     show(A, M, True)
     return 0
 
 
-@door
-def joined(A, M, C, P, X, task):
+@kernel
+def joined(A: Joined, M: Movers, C: Contacts, P: Problem, X: State, task: int) -> int:
     """The mechanism: ``A`` as `Joined`, then movers, contacts, problem and state of the step; see ``joined.py``.
 
     Returns 0, NO_ROOM, or the engine's status.
     """
     return ask(A, M, C, P, X, task)
-
-
-@kernel
-def joined_kernel(address, A, M, C, P, X, task):
-    """From Python through the door."""
-    return enter(address, held(A), held(M), held(C), held(P), held(X), task)

@@ -2,15 +2,39 @@
 
 from __future__ import annotations
 
-from ..compiler.door import enter
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.kernels import by_address, call, formula, kernel
+from ..contact.broad.desk import Search
 from ..contact.broad.search import FASTER, MIDWAY
 from ..contact.broad.search import STEP as STEP_ON
-from ..contact.tables import AHEAD, BEFORE, DONE, FOUND, FULL_CONTACTS, GAP, NORMAL, NUMBER, POINT
+from ..contact.surfaces import Surfaces
+from ..contact.tables import (
+    AHEAD,
+    BEFORE,
+    DONE,
+    FOUND,
+    FULL_CONTACTS,
+    GAP,
+    NORMAL,
+    NUMBER,
+    POINT,
+    Contacts,
+    Geometry,
+    Movers,
+)
 from ..math.vec import load3, put3
 from ..numerics.cone.operator import push, seen
-from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
+from ..numerics.cone.problem import (
+    CONVERGED,
+    ENDED,
+    ENOUGH,
+    FORCE_RESIDUAL,
+    MOST,
+    RESIDUAL,
+    Choices,
+    Problem,
+    Scratch,
+    State,
+)
 from ..tables.system import COORDINATES
 from .bounce import ROUNDS, bounce, hits, no_kicks
 from .joined import (
@@ -30,6 +54,7 @@ from .joined import (
     POSES,
     ROWS,
     TOO_LONG,
+    Joined,
 )
 from .joined import STEP as JOINTS_STEP
 from .joined import TIME as JOINTS_TIME
@@ -41,6 +66,7 @@ from .onward import begin_contacts, half_on, keep_start, kicked, lead, middle_ro
 from .penalty import FEW, PASSES, aim, find_yielding, linearise, put_back, settled, start_rows, store
 from .record import book, book_turning
 from .rows import fill_rows, sides, static_where_stuck, warm
+from .solvers import Solvers
 from .tables import (
     CUTS,
     ENDLESS,
@@ -79,6 +105,9 @@ from .tables import (
     WORST_OVERLAP,
     WORST_RESIDUAL,
     YIELDING,
+    Free,
+    Pace,
+    Tracks,
 )
 
 
@@ -87,7 +116,7 @@ def solved(address, P, X, W, O, F, pace, most, enough):
     """Go through a solver's door; keeps what came of it."""
     O.count[MOST] = most
     O.real[ENOUGH] = enough
-    pace.count[ITERATIONS] += enter(address, P, X, W, O, F, 0)
+    pace.count[ITERATIONS] += call(address, P, X, W, O, F, 0)
     return O.count[ENDED]
 
 
@@ -96,7 +125,7 @@ def held_by_joints(A, M, C, P, X, pace, task):
     """Ask something of the mechanism, if there is one; see ``joined.py``."""
     if pace.door[JOINTS] == 0:
         return DONE
-    return enter(pace.door[JOINTS], A, M, C, P, X, task)
+    return call(pace.door[JOINTS], A, M, C, P, X, task)
 
 
 @formula
@@ -232,7 +261,7 @@ def search_again(G, M, C, H, B, Z, pace, now):
 
     What was hit, and is none any more or has another normal or place, stays a contact: its impulse acts where it did.
     """
-    status, most = enter(pace.door[SEARCHING], G, M, H, C, B, FASTER), H.at.shape[0]
+    status, most = call(pace.door[SEARCHING], G, M, H, C, B, FASTER), H.at.shape[0]
     n = H.count[FOUND]
     if status != DONE:
         C.count[FOUND] = n
@@ -312,7 +341,7 @@ def onward(G, A, M, C, D, H, B, N, P, X, L, pace, now, before, hit):
         return DONE
     half_on(N, M, X, pace.real[STEP])
     held_by_joints(A, M, C, P, X, pace, POSES)
-    status = enter(pace.door[SEARCHING], G, M, H, C, B, MIDWAY)
+    status = call(pace.door[SEARCHING], G, M, H, C, B, MIDWAY)
     found = status == DONE and middle_rows(G, M, C, H, P, L, now)
     put_back_poses(N, M)
     if status != DONE:
@@ -343,7 +372,7 @@ def taken(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, be
     if without_contact(A, M, C, P, X, N, pace) != DONE:
         return NO_WAY
     B.real[AHEAD] = pace.real[STEP]
-    status = enter(pace.door[SEARCHING], G, M, C, D, B, STEP_ON)
+    status = call(pace.door[SEARCHING], G, M, C, D, B, STEP_ON)
     if status != DONE:
         return status
     fill_rows(G, M, C, P, L, pace)
@@ -386,9 +415,32 @@ def march(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
 
 
 @kernel
-def march_kernel(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
+def march_kernel(
+    G: Geometry,
+    A: Joined,
+    M: Movers,
+    C: Contacts,
+    D: Contacts,
+    H: Contacts,
+    B: Search,
+    P: Problem,
+    Q: Problem,
+    R: Problem,
+    X: State,
+    Y: State,
+    Z: State,
+    E: State,
+    W: Scratch,
+    O: Choices,
+    F: Solvers,
+    N: Free,
+    L: Surfaces,
+    pace: Pace,
+    T: Tracks,
+    U: Tracks,
+) -> int:
     """Take ``pace.count[LEFT]`` steps. Returns what the search said last, NO_ROOM, NO_WAY, or TOO_LONG."""
     return march(
-        held(G), held(A), held(M), held(C), held(D), held(H), held(B), held(P), held(Q), held(R), held(X), held(Y),
-        held(Z), held(E), held(W), held(O), held(F), held(N), held(L), held(pace), held(T), held(U),
+        by_address(G), by_address(A), by_address(M), by_address(C), by_address(D), by_address(H), by_address(B), by_address(P), by_address(Q), by_address(R), by_address(X), by_address(Y),
+        by_address(Z), by_address(E), by_address(W), by_address(O), by_address(F), by_address(N), by_address(L), by_address(pace), by_address(T), by_address(U),
     )  # fmt: skip

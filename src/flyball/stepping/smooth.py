@@ -8,8 +8,7 @@ linearly on itself is as good as GMRES; springs and dampers that are stiff are s
 
 from __future__ import annotations
 
-from ..compiler.door import enter
-from ..compiler.jit import formula
+from ..compiler.kernels import call, formula
 from ..equations.tasks import MOTION
 from ..equations.tree import retract
 from ..math.scalar import sqrt
@@ -42,7 +41,7 @@ def free_velocities(A):
     for n in range(MOST):
         for d in range(nv):
             y[0, nq + d] = before[d] + 0.5 * change[d]
-        status = enter(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, MOTION)
+        status = call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, MOTION)
         A.count[EVALUATED] += 1
         if status != 0:
             return status

@@ -15,7 +15,7 @@ from ..numerics.cone.problem import Choices, Problem, Scratch, State
 from ..numerics.cone.rooms import rooms, unfilled
 from .free import rotation_matrices
 from .joined import ANYHOW, JOBS, NEEDED, NO_ROOM, NO_WAY, START, TOO_LONG, Joined, no_mechanism
-from .joints import joined, joined_kernel
+from .joints import joined
 from .march import march_kernel
 from .solvers import Solvers, solvers, told
 from .tables import (
@@ -189,17 +189,14 @@ class Stepper:
         self.quota = 1
         self.enough = float(pace.real[ENOUGH_V])  # residual of velocities [m/s] in a step that is not very short
         self.halved = 0  # steps that were taken in shorter ones
-        self._open(joints is not None)
+        if joints is not None:
+            self._start_joints()
 
-    def _open(self, joints: bool) -> None:
-        """The door of the mechanism, and its start; where there is none, its types."""
-        r, f, A = self.rooms, self.finder, self.joints
-        if not joints:
-            joined.expects(A, self.movers, f.now, r.P, r.X)
-            return
-        A.door[0] = engine.address(A.S, A.W, A.R, A.clock, A.sheet)
-        self.pace.door[JOINTS] = joined.address(A, self.movers, f.now, r.P, r.X)
-        if joined_kernel(self.pace.door[JOINTS], A, self.movers, f.now, r.P, r.X, START) != 0:
+    def _start_joints(self) -> None:
+        """The mechanism at its start."""
+        self.joints.door[0] = engine.address
+        self.pace.door[JOINTS] = joined.address
+        if joined(self.joints, self.movers, self.finder.now, self.rooms.P, self.rooms.X, START) != 0:
             raise NoWay
 
     def run(self, steps: int, h: float) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+from ..compiler.layout import Float1, Float2, Int1
 
 # columns of Free.body: mass, its inverse, inertia and its inverse about the mass centre in body axes (each xx yy zz xy
 # xz yz), 1 if the inertia is the same about every axis
@@ -55,22 +55,22 @@ NO_RESTITUTION, POISSON, NEWTON, MOREAU = range(4)  # Pace.count[LAW]
 class Free(NamedTuple):
     """Bodies on nothing but gravity and contact."""
 
-    body: np.ndarray  # (n, 16)
-    turn: np.ndarray  # (n, 4): unit quaternion, body axes to the world
-    before: np.ndarray  # (n, 8): velocities at the start of the step
-    move: np.ndarray  # (n, 8): velocities that bodies are displaced with
-    start: np.ndarray  # (movers, 18): poses of all movers at the start of the step, and twists
+    body: Float2  # (n, 16)
+    turn: Float2  # (n, 4): unit quaternion, body axes to the world
+    before: Float2  # (n, 8): velocities at the start of the step
+    move: Float2  # (n, 8): velocities that bodies are displaced with
+    start: Float2  # (movers, 18): poses of all movers at the start of the step, and twists
 
 
 class Tracks(NamedTuple):
     """What is remembered of each contact; one for each of the two tables of contacts."""
 
-    kept: np.ndarray  # (capacity, TRACKS)
+    kept: Float2  # (capacity, TRACKS)
 
 
 class Pace(NamedTuple):
     """Time, choices and sums of a run."""
 
-    real: np.ndarray  # (REALS,)
-    count: np.ndarray  # type: ignore[assignment]  # (COUNTS,)
-    door: np.ndarray  # (8,)
+    real: Float1  # (REALS,)
+    count: Int1  # type: ignore[assignment]  # (COUNTS,)
+    door: Int1  # (8,)

@@ -18,15 +18,13 @@ from ..analysis.assembly.start import Assembly
 from ..analysis.compiled import Compiled, compiled
 from ..analysis.motion.layer import THIN, known
 from ..analysis.motion.start import begin
-from ..equations.engine import engine
-from ..errors import AnalysisError, PerformanceNotice, warn
+from ..errors import AnalysisError
 from ..graph.values import evaluated
 from ..model.model import Model
 from ..tables.spanning import spanning
 from ..tables.system import MASS, SEMIDEFINITE
 from ..tracing.trace import plain, traced
 
-NOTICE = "compiling the engine for this machine, once: about half a minute (for where the mechanism starts)"
 RANK = 1e-6  # of the largest singular value of the constraints' Jacobian, above which rows surely are independent
 
 
@@ -105,7 +103,6 @@ def _free(G: np.ndarray) -> np.ndarray:
 
 def _engine_s(model: Model, parameters: Mapping[str, float] | None, wish: str) -> Chosen:
     """The choice that a motion makes."""
-    announce()
     try:
         start = begin(model, 0.0, parameters, None, "joint" if wish == "auto" else wish)
     except AnalysisError as error:  # friction that follows loads which joint coordinates do not know
@@ -124,16 +121,9 @@ def started(model: Model, parameters: Mapping[str, float] | None, tree: tuple[st
     AssemblyError
         If the mechanism cannot be assembled.
     """
-    announce()
     a = assemble(model, parameters=parameters)
     if not tree:
         return a
     c = compiled(model, parameters=parameters, tree=tree)
     q, v = c.take(a.compiled, a.t, a.q, a.v)
     return replace(a, compiled=c, q=q, v=v)
-
-
-def announce() -> None:
-    """Say that the engine is compiled first, if it is."""
-    if engine.cold:  # type: ignore[attr-defined]
-        warn(NOTICE, PerformanceNotice)

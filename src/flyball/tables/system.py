@@ -6,10 +6,9 @@ Uniform tables, one row per element, sorted by kind; every loop of the house run
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-import numpy as np
-
+from ..compiler.layout import COMPLEX, Float1, Int1, Int2, Number1, Number2
 from ..constraints.registry import KINDS
 from ..numerics.ldl import Pattern
 
@@ -91,63 +90,64 @@ TERM_KINDS = len(KINDS)
 class System(NamedTuple):
     """A mechanism in arrays. Nothing in it changes during an analysis."""
 
-    body_i: np.ndarray  # (nb, 8): parent, tree joint kind, first q, first v, number of q, of v, law, its work
-    body_x: np.ndarray  # (nb, 59): mass properties, their inverses and stand-ins; frames of tree joints, their offset
-    frame_i: np.ndarray  # (nf,): body; frames on ground (-1) come first
-    frame_x: np.ndarray  # (nf, 12): position from the body's centre of mass and rotation, in body axes
-    term_i: np.ndarray  # (nt, 6): row (measured quantities after the rows), frame F, M, segments, state it leans on
-    term_x: np.ndarray  # (nt, 8): parameters of the formula, the last one the coefficient in the row
-    seg_i: np.ndarray  # (ns, 3): body, side (+1 M, -1 F), first entry in Work.G
-    row_i: np.ndarray  # (nr, 3): law or -1, wrapped angle or not, work state or -1
-    row_p: np.ndarray  # (nr + nm + 1,): first entry of each row, then of each measured quantity, in Work.G
-    col_i: np.ndarray  # (nG,): velocity of each entry of Work.G
-    mix_i: np.ndarray  # (nx, 5): drivers that follow sensors: row, slot, entries of G to and from, count
-    force_i: np.ndarray  # (nk, 10): F, M, three laws, state of its work, its load (or -1), kind, family, switch or -1
-    force_x: np.ndarray  # (nk, 16): parameters of the formula
-    angle_i: np.ndarray  # (na, 3): frame F, frame M, state that counts its turns
-    load_i: np.ndarray  # (nj, 2): terms that make up the reaction behind a load: load, term; see `reads` too
-    switch_i: np.ndarray  # (nw, 6): rows with modes: row, measured quantity, kind, force that slides, law, another
-    switch_x: np.ndarray  # (nw, 8): parameters of each, by its kind
-    guard_i: np.ndarray  # (ng, 3): what is watched for zeros: kind, switch or law, which way
-    control_i: np.ndarray  # (nc, 1): states of controllers, the first of all states: law of the rate
-    kinds: (
-        np.ndarray
-    )  # first row of each kind of term; solver; number of q; frames that are kept up to date, those of them on ground
-    code: np.ndarray  # bytecode of the laws
-    const: np.ndarray  # parameters, literals of the laws, splines
-    glob: np.ndarray  # (7 + nm,): gravity, relative regularisation, semidefinite mass or not, size, pace (`UNIT`)
-    mass_i: np.ndarray  # (nM, 3): entries of M: row, column, place in A; only for the coupled matrix
-    pair_i: np.ndarray  # (np, 4): products of G blocks that add up to S: first, second entry, length, place in A
-    block_i: np.ndarray  # (ne, 3): blocks of G: body, first entry, row
+    body_i: Int2  # (nb, 8): parent, tree joint kind, first q, first v, number of q, of v, law, its work
+    body_x: Number2  # (nb, 59): mass properties, their inverses and stand-ins; frames of tree joints, their offset
+    frame_i: Int1  # (nf,): body; frames on ground (-1) come first
+    frame_x: Number2  # (nf, 12): position from the body's centre of mass and rotation, in body axes
+    term_i: Int2  # (nt, 6): row (measured quantities after the rows), frame F, M, segments, state it leans on
+    term_x: Number2  # (nt, 8): parameters of the formula, the last one the coefficient in the row
+    seg_i: Int2  # (ns, 3): body, side (+1 M, -1 F), first entry in Work.G
+    row_i: Int2  # (nr, 3): law or -1, wrapped angle or not, work state or -1
+    row_p: Int1  # (nr + nm + 1,): first entry of each row, then of each measured quantity, in Work.G
+    col_i: Int1  # (nG,): velocity of each entry of Work.G
+    mix_i: Int2  # (nx, 5): drivers that follow sensors: row, slot, entries of G to and from, count
+    force_i: Int2  # (nk, 10): F, M, three laws, state of its work, its load (or -1), kind, family, switch or -1
+    force_x: Number2  # (nk, 16): parameters of the formula
+    angle_i: Int2  # (na, 3): frame F, frame M, state that counts its turns
+    load_i: Int2  # (nj, 2): terms that make up the reaction behind a load: load, term; see `reads` too
+    switch_i: Int2  # (nw, 6): rows with modes: row, measured quantity, kind, force that slides, law, another
+    switch_x: Number2  # (nw, 8): parameters of each, by its kind
+    guard_i: Int2  # (ng, 3): what is watched for zeros: kind, switch or law, which way
+    control_i: Int2  # (nc, 1): states of controllers, the first of all states: law of the rate
+    # first row of each kind of term; solver; number of q; frames that are kept up to date, those of them on ground
+    kinds: Int1
+    code: Int1  # bytecode of the laws
+    const: Number1  # parameters, literals of the laws, splines
+    glob: Number1  # (7 + nm,): gravity, relative regularisation, semidefinite mass or not, size, pace (`UNIT`)
+    mass_i: Int2  # (nM, 3): entries of M: row, column, place in A; only for the coupled matrix
+    pair_i: Int2  # (np, 4): products of G blocks that add up to S: first, second entry, length, place in A
+    block_i: Int2  # (ne, 3): blocks of G: body, first entry, row
     ldl: Pattern  # the sparse factor
-    flat: np.ndarray  # (15,): code made for this mechanism: length of its scratch, addresses; all 0: there is none
+    flat: Int1  # (15,): code made for this mechanism: length of its scratch, addresses; all 0: there is none
 
 
 class Work(NamedTuple):
     """Scratch of one run on one thread: nothing is allocated inside the loops."""
 
-    BK: np.ndarray  # (nb, 24): kinematics of the bodies
-    FK: np.ndarray  # (nf, 24): kinematics of the frames
-    X: np.ndarray  # (nv, 14): world twist column of each velocity, at its body's reference point; then its factor
-    O: np.ndarray  # (nb, 3): that reference point
-    FB: np.ndarray  # (nb, 6): force on each body, torque about its centre of mass
-    IC: np.ndarray  # (nb, 30): composite inertias; articulated inertias, and what solves with them pass on
-    M: np.ndarray  # (nM,): mass matrix entries
-    G: np.ndarray  # (nG,): constraint Jacobian, then gradients of the measured quantities
-    H: np.ndarray  # (nG,): M^-1 G^T
-    T: np.ndarray  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
-    row: np.ndarray  # (9, nr)
-    vel: np.ndarray  # (8, nv)
-    sensed: np.ndarray  # (6 + nl, 2 nm + nl + ne + nc + nw): value, rate, bias measured; loads; forces; controls; ways
-    switch: np.ndarray  # (12 + nw, nw): of each row with modes: its mode, where it is held, how far it may go; slopes
-    A: np.ndarray  # matrix to be factored
-    L: np.ndarray  # its factor
-    D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side
-    stack: np.ndarray  # law evaluation
-    y: np.ndarray  # (3, ny): states in the making
-    option: np.ndarray  # (11,): choices of the analysis, largest violations reported, what is solved for
-    info: np.ndarray  # (23,): status, guilty row, counters, how many loads' slopes are known, one more; addresses
-    flat: np.ndarray  # scratch of code made for the mechanism
+    BK: Number2  # (nb, 24): kinematics of the bodies
+    FK: Number2  # (nf, 24): kinematics of the frames
+    X: Number2  # (nv, 14): world twist column of each velocity, at its body's reference point; then its factor
+    O: Number2  # (nb, 3): that reference point
+    FB: Number2  # (nb, 6): force on each body, torque about its centre of mass
+    IC: Number2  # (nb, 30): composite inertias; articulated inertias, and what solves with them pass on
+    M: Number1  # (nM,): mass matrix entries
+    G: Number1  # (nG,): constraint Jacobian, then gradients of the measured quantities
+    H: Number1  # (nG,): M^-1 G^T
+    T: Number2  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
+    row: Number2  # (9, nr)
+    vel: Number2  # (8, nv)
+    sensed: Number2  # (6 + nl, 2 nm + nl + ne + nc + nw): value, rate, bias measured; loads; forces; controls; ways
+    switch: Number2  # (12 + nw, nw): of each row with modes: its mode, where it is held, how far it may go; slopes
+    A: Number1  # matrix to be factored
+    L: Number1  # its factor
+    D: Number2  # (3, n): inverse diagonal, scratch, right-hand side
+    stack: Number2  # law evaluation
+    y: Number2  # (3, ny): states in the making
+    option: Float1  # (11,): choices of the analysis, largest violations reported, what is solved for
+    info: Int1  # (23,): status, guilty row, counters, how many loads' slopes are known, one more; addresses
+    flat: Number1  # scratch of code made for the mechanism
 
 
+ComplexSystem = Annotated[System, COMPLEX]
+ComplexWork = Annotated[Work, COMPLEX]
 # kinematic record of a body or frame: p 0:3, R 3:12, w 12:15, v 15:18, alpha_bias 18:21, a_bias 21:24

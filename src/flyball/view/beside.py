@@ -14,9 +14,9 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-from ..compiler.second import cores, started
 from .artist import draw, files
 from .recording import Picture
+from .second_process import cores, started
 
 
 class Artist:

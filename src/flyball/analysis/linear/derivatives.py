@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from ...equations.engine import MOTION
-from ...equations.residual import residual_kernel, stepped
+from ...equations.residual import residual_kernel
 from ...equations.scratch import work
-from ...errors import AnalysisError, ModelError, PerformanceNotice, warn
+from ...errors import AnalysisError, ModelError
 from ...laws.evaluation import evaluate_jet
 from ...laws.opcodes import BY_TIME
 from ...tables.specs import Structure
@@ -42,7 +42,6 @@ from ..compiled import Compiled
 from ..motion.reasons import broken_force
 from .loads import STEP, as_complex, by_reactions, complex_tables, derivative
 
-NOTICE = "compiling the derivatives of the equations for this machine, once: about a quarter of a minute"
 CHUNK = 128  # directions a call
 
 
@@ -158,7 +157,6 @@ class Equations:
         return complex_tables(self.state.c)
 
     def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
-        announce()
         S, W = self.complex_tables if system is None else (system, work(self.state.c.structure, system, complex))
         x = self.state
         y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
@@ -225,12 +223,6 @@ def _sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
         return sp.csc_matrix(np.ones((width, s.nv), bool)), np.arange(s.nv)
     touched = sp.csc_matrix(pattern(s, S))
     return touched, grouped(touched)
-
-
-def announce(*kernels: Any) -> None:
-    """Say that the derivatives of the equations, or loops over them, are compiled first, if they are."""
-    if stepped.cold or any(k.cold for k in kernels):
-        warn(NOTICE, PerformanceNotice)
 
 
 def stepped_values(c: Compiled, name: str) -> Values:

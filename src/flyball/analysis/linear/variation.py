@@ -227,8 +227,18 @@ class Variation:
     def _call(self, clock: ex.Clock, states: np.ndarray, out: np.ndarray) -> int:
         S, W = self.c.values.system, self.c.work
         given = (S, W, self.R, self.own, self.sheet)
-        doors = engine.address(*given), residual.address(self.system, self.scratch, self.bench)
-        return variation_kernel(*doors, *given, self.system, self.scratch, self.bench, self.plan, clock, states, out)
+        return variation_kernel(
+            engine.address,
+            residual.stepped.address,
+            *given,
+            self.system,
+            self.scratch,
+            self.bench,
+            self.plan,
+            clock,
+            states,
+            out,
+        )
 
     def _clock(self, changes: np.ndarray) -> ex.Clock:
         """Of motion and changes."""

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...compiler.notice import compiled_since
 from ...errors import SimulationError
 from ...model.touching import nothing_touches
 from ...numerics.integrators import clock as ex
@@ -19,7 +20,6 @@ from ...results.result import Owed, Result
 from ...results.touched import contacts
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from ..assembly.start import Assembly
-from ..compile_time import compiled_since
 from ..mobility import mobility
 from .crossed import crossed
 from .events.carried import carried

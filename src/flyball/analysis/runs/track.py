@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiler.bound import Bound, Mould, Written
+from ...compiler.buffers import StructBuffer, StructPool
+from ...compiler.kernels import BoundKernel
 from ...equations.engine import Sheet, engine
 from ...equations.many import one_after_another
 from ...equations.tasks import COMPLETE
@@ -108,7 +109,7 @@ class Track:
 
     def __init__(self, c: Compiled, clock: Clock, rows: np.ndarray, method: Tableau, task: int) -> None:
         fields = Memory(Numbers(*(getattr(c.values.system, n) for n in TABLES)), c.work, clock, Sheet(rows))
-        mould = Mould(fields, (clock.times, clock.accounts))
+        mould = StructPool(fields, (clock.times, clock.accounts))
         block = mould.block.copy()
         own = mould.fill(block)
         self._cells = block.view(np.int64)
@@ -123,8 +124,8 @@ class Track:
         c.system = S
         vars(c)["work"] = own.work
         self._made = np.array(made, np.int64)
-        self._given = [Written(x) for x in (S, own.work, method, own.clock, own.sheet)]
-        self._bound = Bound(engine, *self._given)
+        self._given = [StructBuffer(x) for x in (S, own.work, method, own.clock, own.sheet)]
+        self._bound = BoundKernel(engine, *self._given)
         self._then = np.zeros(8, np.int64)
         self.arrays: dict[str, np.ndarray] = own.tables._asdict()
         self.arrays |= {"FK": own.work.FK, "y": own.clock.y, "real": own.clock.real, "option": own.work.option}
@@ -155,7 +156,7 @@ class Track:
     def completes(self) -> None:
         """From now on accelerations and multipliers are solved for when a run has ended (`later.solved`)."""
         S, W, method, _, sheet = self._given
-        self._complete = Bound(engine, S, W, method, Written(standing(self.clock.y.shape[1])), sheet)
+        self._complete = BoundKernel(engine, S, W, method, StructBuffer(standing(self.clock.y.shape[1])), sheet)
         cell = self.cells(self.arrays["option"])[LATER]
         self._then = np.array([*self._complete.asked, cell, COMPLETE], np.int64)
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+from ...compiler.layout import Float1, Float2, Int1, Int2, Short2
 
 # entries of Search.real, after MARGIN, SKIN, AHEAD of `tables`: where the frame is, by how much it goes on with the
 # next search, its velocity, how far it lags behind; a usual radius; largest gap that the narrow phase is asked about;
@@ -55,30 +55,30 @@ CLASSES = 12  # at most
 class Search(NamedTuple):
     """All of it; `finder.Finder` makes it."""
 
-    real: np.ndarray  # (REALS,)
-    count: np.ndarray  # type: ignore[assignment]  # (COUNTS,)
-    hold: np.ndarray  # (ns, 8): by shape
-    kin: np.ndarray  # (ns,): classes of shapes; those of one class meet the same classes
-    meets: np.ndarray  # (classes, classes)
-    slot: np.ndarray  # (ns, 5)
-    now: np.ndarray  # (ns, 8): by slot
-    fat: np.ndarray  # (ns, 8): by slot
-    axes: np.ndarray  # (ns, 9): axes in the world of what is no sphere, by slot
-    turn: np.ndarray  # (ns, 9): these when the envelope was made
-    wide: np.ndarray  # (wide, 20)
-    raw: np.ndarray  # (ns, 18): now, fat, and how large it may become, by shape
-    key: np.ndarray  # (ns,): cells, by slot
-    link: np.ndarray  # (ns,): next slot at the same place of `head`, or -1
-    head: np.ndarray  # first slot at a place, or -1
-    level_i: np.ndarray  # (levels, 6)
-    level_x: np.ndarray  # (levels, 8)
-    sums: np.ndarray  # (classes * SIZES, 10): of the shapes of one size
-    pair: np.ndarray  # (capacity, 3): slots, that of the smaller shape first; in which way they are looked at
-    seen: np.ndarray  # (2, capacity): the pair's first contact of the last search, or -1; and of this one
-    mark: np.ndarray  # (ns,): by slot, whether it has left its envelope
-    moved: np.ndarray  # (ns,): slots that have
-    names: np.ndarray  # (places,): a table of pairs, by hashing
-    firsts: np.ndarray  # (places,): their first contacts
-    taken: np.ndarray  # (places / 2,): places that are not empty
-    room: np.ndarray  # (ROOM, 8): of the narrow phase
-    kept: np.ndarray  # (2, 12): poses of a pair that is carried on
+    real: Float1  # (REALS,)
+    count: Int1  # type: ignore[assignment]  # (COUNTS,)
+    hold: Float2  # (ns, 8): by shape
+    kin: Int1  # (ns,): classes of shapes; those of one class meet the same classes
+    meets: Int2  # (classes, classes)
+    slot: Int2  # (ns, 5)
+    now: Float2  # (ns, 8): by slot
+    fat: Float2  # (ns, 8): by slot
+    axes: Float2  # (ns, 9): axes in the world of what is no sphere, by slot
+    turn: Float2  # (ns, 9): these when the envelope was made
+    wide: Float2  # (wide, 20)
+    raw: Float2  # (ns, 18): now, fat, and how large it may become, by shape
+    key: Int1  # (ns,): cells, by slot
+    link: Int1  # (ns,): next slot at the same place of `head`, or -1
+    head: Int1  # first slot at a place, or -1
+    level_i: Int2  # (levels, 6)
+    level_x: Float2  # (levels, 8)
+    sums: Float2  # (classes * SIZES, 10): of the shapes of one size
+    pair: Short2  # (capacity, 3): slots, that of the smaller shape first; in which way they are looked at
+    seen: Short2  # (2, capacity): the pair's first contact of the last search, or -1; and of this one
+    mark: Int1  # (ns,): by slot, whether it has left its envelope
+    moved: Int1  # (ns,): slots that have
+    names: Int1  # (places,): a table of pairs, by hashing
+    firsts: Int1  # (places,): their first contacts
+    taken: Int1  # (places / 2,): places that are not empty
+    room: Float2  # (ROOM, 8): of the narrow phase
+    kept: Float2  # (2, 12): poses of a pair that is carried on

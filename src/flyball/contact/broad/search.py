@@ -13,9 +13,22 @@ others; they are put back.
 
 from __future__ import annotations
 
-from ...compiler.door import door
-from ...compiler.jit import formula
-from ..tables import AHEAD, DONE, FOUND, FULL_CONTACTS, FULL_PAIRS, NOT_FINITE, NUMBER, PAIRS, REBUILT, STATUS
+from ...compiler.kernels import formula, kernel
+from ..tables import (
+    AHEAD,
+    DONE,
+    FOUND,
+    FULL_CONTACTS,
+    FULL_PAIRS,
+    NOT_FINITE,
+    NUMBER,
+    PAIRS,
+    REBUILT,
+    STATUS,
+    Contacts,
+    Geometry,
+    Movers,
+)
 from .desk import (
     AFRESH_SO_FAR,
     BOUNDED,
@@ -32,6 +45,7 @@ from .desk import (
     STRIDE,
     TRUE,
     WIDE,
+    Search,
 )
 from .listed import touch
 from .listing import drop, list_all, list_moved, refit
@@ -149,8 +163,8 @@ def find(G, M, C, O, B, task):
     return DONE
 
 
-@door
-def search(G, M, C, O, B, task):
+@kernel
+def search(G: Geometry, M: Movers, C: Contacts, O: Contacts, B: Search, task: int) -> int:
     """Contacts at the movers' poses: a status (DONE, FULL_*, NOT_FINITE), also in ``C.count[STATUS]``."""
     C.count[STATUS] = find(G, M, C, O, B, task)
     C.count[REBUILT] = B.count[AFRESH_SO_FAR]

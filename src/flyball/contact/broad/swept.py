@@ -8,8 +8,7 @@ along the normals found there.
 
 from __future__ import annotations
 
-from ...compiler.door import enter
-from ...compiler.jit import formula
+from ...compiler.kernels import call, formula
 from ...math.scalar import cos, sin
 from ...math.vec import add, load3, load9, mm, norm, put3, put9, quaternion_matrix, scale
 from ..tables import AHEAD, MARGIN
@@ -51,7 +50,7 @@ def carry(M, B, row, m, time):
 def ask(G, M, B, s, t, reach):
     """Contacts of the pair of slots as it stands, up to this gap, into ``room``: how many."""
     B.count[ASKED_1], B.count[ASKED_2], B.real[REACH] = B.slot[s, SHAPE], B.slot[t, SHAPE], reach
-    return enter(B.count[NARROW], G, M, B, B, B, 0)
+    return call(B.count[NARROW], G, M, B, B, B, 0)
 
 
 @formula

@@ -5,8 +5,8 @@ A shape of an unknown kind has its surface nowhere (nan).
 
 from __future__ import annotations
 
-from ...compiler.jit import formula
-from ...compiler.written import ladder
+from ...compiler.kernels import formula
+from ...compiler.sources import ladder
 from ...math.vec import put3
 from .shapes.registry import SHAPES
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from math import inf
 
-from ...compiler.jit import formula
-from ...compiler.written import written
+from ...compiler.kernels import formula
+from ...compiler.sources import generated
 from ...math.vec import add, dot, load3, load9, mm, mv, sub
 from ..kinds import FIELD, PLANAR
 from ..tables import AXES, KIND, MOVER, PLACE
@@ -27,7 +27,7 @@ def _by_kinds(name, kinds, otherwise):
             names[f"way_{number}"] = WAYS[pair]
             test = f"a == {pair[0]}" + ("" if pair[1] is None else f" and b == {pair[1]}")
             lines += [f"if {test}:", f"    return way_{number}(G, i, j, A, B, reach, room)"]
-    return written(__name__, name, "a, b, G, i, j, A, B, reach, room", [*lines, f"return {otherwise}"], names)
+    return generated(__name__, name, "a, b, G, i, j, A, B, reach, room", [*lines, f"return {otherwise}"], names)
 
 
 _by_kinds_all = _by_kinds("by_kinds", ALL, "any_pair(G, i, j, A, B, reach, room)")

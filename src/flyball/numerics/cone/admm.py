@@ -9,9 +9,7 @@ the convex problem that they make is nearly solved.
 
 from __future__ import annotations
 
-from ...compiler.door import door
-from ...compiler.held import held
-from ...compiler.jit import formula
+from ...compiler.kernels import by_address, formula, kernel
 from .blocks import factor, solve
 from .fill import fill_rows, hand_back, make_safe, residual, set_own, set_slips, span_of
 from .gather import BLOCKS, ROWS
@@ -27,6 +25,11 @@ from .problem import (
     MOST,
     RESIDUAL,
     USED,
+    Choices,
+    Factor,
+    Problem,
+    Scratch,
+    State,
 )
 from .prox import DY, HELD, IDLE, KIND, METRIC, OWN, ROOT_N, ROOT_T, WIDE, Q, U, nearest, set_metric, slipped
 from .smooth import add_impulse, add_row, clear_matrix, from_held, product
@@ -136,7 +139,7 @@ def admm_solve(P, X, O, F):
         return 0
     if not prepare(P, span, F, O):
         return 0
-    R = held(rows_of(P, F, F.places[:16]))
+    R = by_address(rows_of(P, F, F.places[:16]))
     fill_rows(P, X, R, span)
     from_held(R)
     set_own(R)
@@ -154,7 +157,7 @@ def admm_solve(P, X, O, F):
     return O.count[USED]
 
 
-@door
-def admm(P, X, W, O, F, task):  # type: ignore[no-untyped-def]
+@kernel
+def admm(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, task: int) -> int:
     """Alternating directions; returns iterations. For what stands in `Choices.count[ENDED]` see `newton.newton`."""
     return admm_solve(P, X, O, F)

@@ -8,11 +8,25 @@ velocity.
 
 from __future__ import annotations
 
-from ...compiler.door import door
-from ...compiler.jit import formula
+from ...compiler.kernels import formula, kernel
 from ...math.scalar import sqrt
 from .passes import backward, forward
-from .problem import BROKEN, CONVERGED, COULOMB, CUT, ENDED, ENOUGH, HISTORY, MOST, USED
+from .problem import (
+    BROKEN,
+    CONVERGED,
+    COULOMB,
+    CUT,
+    ENDED,
+    ENOUGH,
+    HISTORY,
+    MOST,
+    USED,
+    Choices,
+    Factor,
+    Problem,
+    Scratch,
+    State,
+)
 from .residual import lines_of
 from .start import begin, tell, unused
 from .steps import TORQUE
@@ -53,8 +67,8 @@ def next_step(dd, curved, square, odd):
     return min(max(up / down, SHORTEST), LONGEST) if down > 0.0 and up > 0.0 else 1.0
 
 
-@door
-def barzilai_borwein(P, X, W, O, F, task):  # type: ignore[no-untyped-def]
+@kernel
+def barzilai_borwein(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, task: int) -> int:
     """Iterations until a step would change velocities by less than `ENOUGH`, at most `MOST`; how many there were.
 
     Of the convex form: the line search needs an objective, and Coulomb's law has none. Asked for it, it ends `BROKEN`

@@ -8,11 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from ...compiler.door import door, enter
-from ...compiler.held import held
-from ...compiler.jit import formula
+from ...compiler.kernels import by_address, call, formula, kernel
+from ...compiler.layout import Float1, Int1
 from .islands import Islands, find_islands
 from .problem import (
     BROKEN,
@@ -28,8 +25,10 @@ from .problem import (
     SMALL,
     STALLED,
     USED,
+    Choices,
     Factor,
     Problem,
+    Scratch,
     State,
 )
 
@@ -50,15 +49,15 @@ CALLS, ISLANDS, BY_ONE, BY_OTHER, HANDED_ON, CONTACTS_BY_ONE, LARGEST, TOLD = ra
 class Auto(NamedTuple):
     """In place of `Factor`: rooms for factors, a copy of the problem by islands, addresses, what was picked."""
 
-    numbers: np.ndarray
-    places: np.ndarray
+    numbers: Float1
+    places: Int1
     P: Problem
     X: State
     islands: Islands
-    pick: np.ndarray  # (ni,): islands, the small ones first
-    doors: np.ndarray
-    limit: np.ndarray
-    told: np.ndarray
+    pick: Int1  # (ni,): islands, the small ones first
+    doors: Int1
+    limit: Int1
+    told: Int1
 
 
 @formula
@@ -203,13 +202,13 @@ def by_one(P, X, W, O, F, f):
     O.real[ENOUGH] = max(FINER * enough, min(enough, FINEST))
     if O.count[MOST_STEPS] > 0:
         O.count[MOST] = O.count[MOST_STEPS]
-    enter(F.doors[SMALL_ISLANDS], P, X, W, O, f, 0)
+    call(F.doors[SMALL_ISLANDS], P, X, W, O, f, 0)
     O.real[ENOUGH], O.count[MOST] = enough, most
     if (O.count[ENDED] == CUT or O.count[ENDED] == STALLED) and O.real[RESIDUAL] <= enough:
         O.count[ENDED] = CONVERGED
     if F.doors[THE_REST] != 0 and (O.count[ENDED] == SMALL or O.count[ENDED] == BROKEN):
         F.told[HANDED_ON] += 1
-        enter(F.doors[THE_REST], P, X, W, O, f, 0)
+        call(F.doors[THE_REST], P, X, W, O, f, 0)
 
 
 @formula
@@ -224,7 +223,7 @@ def one_by_one(P, X, Y, W, O, F, f, count, some):
         sofar = gather(O, sofar)
     if some < count:
         O.count[ISLAND] = some
-        enter(F.doors[THE_REST], Q, Y, W, O, f, 0)
+        call(F.doors[THE_REST], Q, Y, W, O, f, 0)
         sofar = gather(O, sofar)
     O.count[ISLAND] = -1
     O.real[RESIDUAL], O.real[FORCE_RESIDUAL], O.count[USED], O.count[ENDED] = sofar
@@ -234,7 +233,7 @@ def one_by_one(P, X, Y, W, O, F, f, count, some):
 @formula
 def solve_all(P, X, W, O, F):
     """See `auto`."""
-    f, I = held(Factor(F.numbers[:], F.places[:])), F.islands
+    f, I = by_address(Factor(F.numbers[:], F.places[:])), F.islands
     O.count[USED], O.count[ENDED], O.count[ISLAND] = 0, CONVERGED, -1
     O.real[RESIDUAL], O.real[FORCE_RESIDUAL] = 0.0, 0.0
     nc, nn, ng, nl = P.size[0], P.size[1], P.size[2], P.size[3]
@@ -243,15 +242,17 @@ def solve_all(P, X, W, O, F):
     if count == 0:
         return 0
     if some == 0:
-        enter(F.doors[THE_REST], P, X, W, O, f, 0)
+        call(F.doors[THE_REST], P, X, W, O, f, 0)
     elif count == 1:
         by_one(P, X, W, O, F, f)
     else:
-        one_by_one(P, X, held(State(F.X.p[:], F.X.torque[:], F.X.line[:], X.v[:], X.wide[:])), W, O, F, f, count, some)
+        one_by_one(
+            P, X, by_address(State(F.X.p[:], F.X.torque[:], F.X.line[:], X.v[:], X.wide[:])), W, O, F, f, count, some
+        )
     return O.count[USED]
 
 
-@door
-def auto(P, X, W, O, F, task):  # type: ignore[no-untyped-def]
+@kernel
+def auto(P: Problem, X: State, W: Scratch, O: Choices, F: Auto, task: int) -> int:
     """Every island by the solver picked for it; returns the most iterations that one took. F is `Auto`."""
     return solve_all(P, X, W, O, F)

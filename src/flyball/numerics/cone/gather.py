@@ -11,9 +11,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from ...compiler.jit import formula
+from ...compiler.kernels import formula
+from ...compiler.layout import Float1, Int1
 from ...math.scalar import sqrt
 from .problem import NONE
 
@@ -27,22 +26,22 @@ RANK, NOTHING = 1e-11, 1e-14  # of a row's own mobility, of the largest in its g
 class Rows(NamedTuple):
     """Rooms of one island inside `Factor`."""
 
-    size: np.ndarray  # (16,)
-    head: np.ndarray  # (nn + 3 ng,): first block of each node and group; blocks of each group; first side in its chain
-    chain: np.ndarray  # (2 m,): next side of the same group
-    entry_p: np.ndarray  # (m + 1,)
-    side: np.ndarray  # (2 m,): first entry of each side or -1
-    block: np.ndarray  # (ne,): block of each entry, by its place in the order of elimination
-    pair_p: np.ndarray  # (m + 1,): first pair of entries of each row
-    pair: np.ndarray  # (np,): where the product of the pair goes
-    graph: np.ndarray  # (7, nb + 1) flat: start, length, room, mark, place, order, Lp
-    pool: np.ndarray  # lists of neighbours
-    Li: np.ndarray  # rows of the factor's columns
-    G: np.ndarray  # (ne, 18)
-    row: np.ndarray  # (m, 32): see the columns in `prox.py`
-    blocks: np.ndarray  # (4, nb, 6) flat: e, gradient, step, e of p
-    D: np.ndarray  # (nb, 36)
-    L: np.ndarray  # (2, nnz, 36) flat: below the diagonal, above it
+    size: Int1  # (16,)
+    head: Int1  # (nn + 3 ng,): first block of each node and group; blocks of each group; first side in its chain
+    chain: Int1  # (2 m,): next side of the same group
+    entry_p: Int1  # (m + 1,)
+    side: Int1  # (2 m,): first entry of each side or -1
+    block: Int1  # (ne,): block of each entry, by its place in the order of elimination
+    pair_p: Int1  # (m + 1,): first pair of entries of each row
+    pair: Int1  # (np,): where the product of the pair goes
+    graph: Int1  # (7, nb + 1) flat: start, length, room, mark, place, order, Lp
+    pool: Int1  # lists of neighbours
+    Li: Int1  # rows of the factor's columns
+    G: Float1  # (ne, 18)
+    row: Float1  # (m, 32): see the columns in `prox.py`
+    blocks: Float1  # (4, nb, 6) flat: e, gradient, step, e of p
+    D: Float1  # (nb, 36)
+    L: Float1  # (2, nnz, 36) flat: below the diagonal, above it
 
 
 @formula

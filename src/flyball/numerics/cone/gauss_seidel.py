@@ -7,8 +7,7 @@ where that would be worse than no impulse at all: p' N p / 2 + b' p is never abo
 
 from __future__ import annotations
 
-from ...compiler.door import door
-from ...compiler.jit import formula
+from ...compiler.kernels import formula, kernel
 from .ending import finish
 from .operator import push_line
 from .pack import (
@@ -27,7 +26,22 @@ from .pack import (
     take_nodes,
 )
 from .packed import remaining
-from .problem import CONVERGED, COULOMB, CUT, ENDED, ENOUGH, HISTORY, MOST, USED, WRITTEN
+from .problem import (
+    CONVERGED,
+    COULOMB,
+    CUT,
+    ENDED,
+    ENOUGH,
+    HISTORY,
+    MOST,
+    USED,
+    WRITTEN,
+    Choices,
+    Factor,
+    Problem,
+    Scratch,
+    State,
+)
 from .residual import contacts_of, lines_of, nodes_of
 from .sweeps import visit_ball, visit_rough, visit_smooth, visit_smooth_ball
 from .sweeps_any import visit_any, visit_line
@@ -135,8 +149,8 @@ def prepare(P, X, W, O):
     return many
 
 
-@door
-def gauss_seidel(P, X, W, O, F, task):  # type: ignore[no-untyped-def]
+@kernel
+def gauss_seidel(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, task: int) -> int:
     """Sweeps until velocities change by less than `ENOUGH`, at most `MOST` of them; how many there were."""
     many = prepare(P, X, W, O)
     used, O.count[ENDED], O.count[WRITTEN] = 0, CUT, 0

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiler.jit import formula, kernel
+from ...compiler.kernels import formula, kernel
+from ...compiler.layout import Int1, Int2
 from ..forest import root, unite
 from .problem import NONE
 
@@ -17,15 +18,15 @@ from .problem import NONE
 class Islands(NamedTuple):
     """Contacts, lines, nodes and groups by island; islands in the order of their first contacts, then first lines."""
 
-    parent: np.ndarray  # (nn + ng,): forest over nodes, then groups; afterwards the island of each or -1
-    order: np.ndarray  # (nc,): contact that stands at each place when those of an island stand together
-    island: np.ndarray  # (ni + 1,): as in `Problem`; room for one more than there are contacts and lines
-    line_order: np.ndarray  # (nl,): likewise of lines
-    line_p: np.ndarray  # (ni + 1,)
-    member: np.ndarray  # (nn,): nodes of islands; the rest of the array is not used
-    member_p: np.ndarray  # (ni + 1,)
-    team: np.ndarray  # (ng,)
-    team_p: np.ndarray  # (ni + 1,)
+    parent: Int1  # (nn + ng,): forest over nodes, then groups; afterwards the island of each or -1
+    order: Int1  # (nc,): contact that stands at each place when those of an island stand together
+    island: Int1  # (ni + 1,): as in `Problem`; room for one more than there are contacts and lines
+    line_order: Int1  # (nl,): likewise of lines
+    line_p: Int1  # (ni + 1,)
+    member: Int1  # (nn,): nodes of islands; the rest of the array is not used
+    member_p: Int1  # (ni + 1,)
+    team: Int1  # (ng,)
+    team_p: Int1  # (ni + 1,)
 
 
 @formula
@@ -164,7 +165,7 @@ def find_islands(at, line_at, sizes, I):
 
 
 @kernel
-def islands_kernel(at, line_at, sizes, I):
+def islands_kernel(at: Int2, line_at: Int2, sizes: Int1, I: Islands) -> int:
     """Find islands; see `islands_of`."""
     return find_islands(at, line_at, (sizes[0], sizes[1], sizes[2], sizes[3]), I)
 

@@ -7,12 +7,25 @@ one here that needs no order of contacts.
 
 from __future__ import annotations
 
-from ...compiler.door import door
-from ...compiler.jit import formula
+from ...compiler.kernels import formula, kernel
 from ...math.scalar import sqrt
 from .pack import B_IN, B_IT, BALL, IN, SLIDE
 from .passes import backward, forward
-from .problem import CONVERGED, COULOMB, CUT, ENDED, ENOUGH, HISTORY, MOST, NONE
+from .problem import (
+    CONVERGED,
+    COULOMB,
+    CUT,
+    ENDED,
+    ENOUGH,
+    HISTORY,
+    MOST,
+    NONE,
+    Choices,
+    Factor,
+    Problem,
+    Scratch,
+    State,
+)
 from .residual import contacts_of, lines_of
 from .start import begin, place_of, tell
 from .steps import METRIC, STEPS
@@ -69,8 +82,8 @@ def split(P, W, O, many):
         W.lines[METRIC, k] *= W.wide[0, P.group[P.line_at[k, 0]]]
 
 
-@door
-def jacobi(P, X, W, O, F, task):  # type: ignore[no-untyped-def]
+@kernel
+def jacobi(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, task: int) -> int:
     """Iterations until a step changes velocities by less than `ENOUGH`, at most `MOST`; how many there were."""
     many = begin(P, X, W, O, False)
     split(P, W, O, many)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.held import held
-from ...compiler.jit import formula
+from ...compiler.kernels import by_address, formula
 from .blocks import columns, eliminate, entry_of, join
 from .gather import (
     BEFORE_TURNING,
@@ -102,7 +101,7 @@ def measure(P, span, F, O, size):
     size[BEFORE_TURNING] = size[CONTACTS] + span[3] - span[2]
     if not fits(P, F, O, size):
         return False
-    R = held(rows_of(P, F, size))
+    R = by_address(rows_of(P, F, size))
     size[BLOCKS] = survey(P, span, R.head, R.chain)
     size[ENTRIES], size[PAIRS] = count_entries(P, span, R.head)
     size[POOL] = 16 * size[BLOCKS] + 4 * size[PAIRS]
@@ -188,7 +187,7 @@ def prepare(P, span, F, O):
         return False
     if not measure(P, span, F, O, size):
         return False
-    R = held(rows_of(P, F, size))
+    R = by_address(rows_of(P, F, size))
     list_entries(P, span, R)
     fill = order(R, size[BLOCKS])
     if fill < 0:
@@ -199,7 +198,7 @@ def prepare(P, span, F, O):
     size[FILL] = fill
     if not fits(P, F, O, size):
         return False
-    R = held(rows_of(P, F, size))
+    R = by_address(rows_of(P, F, size))
     fill_entries(P, span, R, R.row)
     pattern(R, size[BLOCKS])
     return True

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from ...compiler.door import door
+from ...compiler.kernels import kernel
 from .accelerated import accelerated
+from .problem import Choices, Factor, Problem, Scratch, State
 
 
-@door
-def lean(P, X, W, O, F, task):  # type: ignore[no-untyped-def]
+@kernel
+def lean(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, task: int) -> int:
     """Iterations until a step would change velocities by less than `ENOUGH`, at most `MOST`; how many there were.
 
     L starts at 1, since the metric is that of the blocks; the bound may be missed by a fiftieth, which near the

@@ -11,9 +11,7 @@ get closer. Coulomb's law: De Saxce's addition mu |u_t| to the normal velocity i
 
 from __future__ import annotations
 
-from ...compiler.door import door
-from ...compiler.held import held
-from ...compiler.jit import formula
+from ...compiler.kernels import by_address, formula, kernel
 from ...math.scalar import sqrt
 from .blocks import factor, solve
 from .fill import fill_rows, hand_back, make_safe, residual, set_own, set_slips, span_of
@@ -31,6 +29,11 @@ from .problem import (
     RESIDUAL,
     STALLED,
     USED,
+    Choices,
+    Factor,
+    Problem,
+    Scratch,
+    State,
 )
 from .prox import (
     CONTACT,
@@ -285,7 +288,7 @@ def newton_solve(P, X, O, F):
         return 0
     if not prepare(P, span, F, O):
         return 0
-    R = held(rows_of(P, F, F.places[:16]))
+    R = by_address(rows_of(P, F, F.places[:16]))
     fill_rows(P, X, R, span)
     from_held(R)
     coulomb = 1.0 * O.count[COULOMB]
@@ -303,8 +306,8 @@ def newton_solve(P, X, O, F):
     return O.count[USED]
 
 
-@door
-def newton(P, X, W, O, F, task):
+@kernel
+def newton(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, task: int) -> int:
     """Newton's method; returns factorisations.
 
     In `Choices.count[ENDED]` SMALL: enlarge `Factor`, call again; BROKEN: not finite, or the convex form with rolling

@@ -6,7 +6,7 @@ and to p' N p.
 
 from __future__ import annotations
 
-from ...compiler.jit import formula
+from ...compiler.kernels import formula
 from ...math.scalar import sqrt
 from .pack import (
     B_BIAS,

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+from ...compiler.layout import Float1, Float2, Float3, Int1, Int2
 
 NONE = -1  # in Problem.at: nothing there moves; n >= 0: node n; -2 - k: group k
 # columns of Problem.node
@@ -46,63 +46,63 @@ H_ITERATION, H_VELOCITY, H_FORCE, H_OBJECTIVE = range(4)
 class Problem(NamedTuple):
     """What does not change while impulses are looked for. Capacity may be larger than ``size`` says."""
 
-    size: np.ndarray  # (4,): contacts, nodes, groups, lines
-    at: np.ndarray  # (nc, 2): side 1, side 2
-    frame: np.ndarray  # (nc, 9): rows n (from 1 to 2), t1, t2 in the world; anisotropic friction scales t2
-    arm: np.ndarray  # (nc, 6): from the node's centre to the contact, side 1, side 2, in the world
-    bias: np.ndarray  # (nc, 3): what is added to the velocities D v: max(gap, 0) / h, surface velocities
-    mu: np.ndarray  # (nc,): friction coefficient
-    soft: np.ndarray  # (nc,): compliance of the normal impulse [velocity per impulse], 0 if it is hard
-    turn: np.ndarray  # (nc, 2) or (0, 2): rolling and spinning friction [m]: torques (about t1 and t2, about n)
-    least: np.ndarray  # (nc,) or (0,): least normal impulse (what a restitution gives back); 0 if there is none
-    node: np.ndarray  # (nn, 8): 1/m, symmetric block xx yy zz xy xz yz in the world, 1 if the block is a multiple of 1
-    group: np.ndarray  # (ng + 1,): first velocity of each group in State.wide
-    block: np.ndarray  # (nc, 2): where J and Y of a side that is in a group begin, or -1
-    J: np.ndarray
-    Y: np.ndarray
-    line_at: np.ndarray  # (nl, 2): group, where its J and Y (n numbers each) begin
-    line_x: np.ndarray  # (nl, 4): bias, compliance, least, largest impulse
-    island: np.ndarray  # (ni + 1,): first contact of each island; one island if nothing is known
-    member: np.ndarray  # (nn,): nodes by island
-    member_p: np.ndarray  # (ni + 1,): where those of an island begin in ``member``
-    line_p: np.ndarray  # (ni + 1,): first line of each island (an island may have lines and no contacts)
+    size: Int1  # (4,): contacts, nodes, groups, lines
+    at: Int2  # (nc, 2): side 1, side 2
+    frame: Float2  # (nc, 9): rows n (from 1 to 2), t1, t2 in the world; anisotropic friction scales t2
+    arm: Float2  # (nc, 6): from the node's centre to the contact, side 1, side 2, in the world
+    bias: Float2  # (nc, 3): what is added to the velocities D v: max(gap, 0) / h, surface velocities
+    mu: Float1  # (nc,): friction coefficient
+    soft: Float1  # (nc,): compliance of the normal impulse [velocity per impulse], 0 if it is hard
+    turn: Float2  # (nc, 2) or (0, 2): rolling and spinning friction [m]: torques (about t1 and t2, about n)
+    least: Float1  # (nc,) or (0,): least normal impulse (what a restitution gives back); 0 if there is none
+    node: Float2  # (nn, 8): 1/m, symmetric block xx yy zz xy xz yz in the world, 1 if the block is a multiple of 1
+    group: Int1  # (ng + 1,): first velocity of each group in State.wide
+    block: Int2  # (nc, 2): where J and Y of a side that is in a group begin, or -1
+    J: Float1
+    Y: Float1
+    line_at: Int2  # (nl, 2): group, where its J and Y (n numbers each) begin
+    line_x: Float2  # (nl, 4): bias, compliance, least, largest impulse
+    island: Int1  # (ni + 1,): first contact of each island; one island if nothing is known
+    member: Int1  # (nn,): nodes by island
+    member_p: Int1  # (ni + 1,): where those of an island begin in ``member``
+    line_p: Int1  # (ni + 1,): first line of each island (an island may have lines and no contacts)
 
 
 class State(NamedTuple):
     """Impulses and velocities; on entry the warm start and the velocities without any impulse, on exit both solved."""
 
-    p: np.ndarray  # (nc, 3)
-    torque: np.ndarray  # (nc, 3) or (0, 3): about n, t1, t2
-    line: np.ndarray  # (nl,)
-    v: np.ndarray  # (nn, 8): v, w in the world, two unused
-    wide: np.ndarray  # velocities of the groups
+    p: Float2  # (nc, 3)
+    torque: Float2  # (nc, 3) or (0, 3): about n, t1, t2
+    line: Float1  # (nl,)
+    v: Float2  # (nn, 8): v, w in the world, two unused
+    wide: Float1  # velocities of the groups
 
 
 class Choices(NamedTuple):
     """How it is solved, and what came of it."""
 
-    count: np.ndarray  # type: ignore[assignment]  # (16,)
-    real: np.ndarray  # (16,)
-    history: np.ndarray  # (rows, 4): iteration, velocity residual, force residual, objective
+    count: Int1  # type: ignore[assignment]  # (16,)
+    real: Float1  # (16,)
+    history: Float2  # (rows, 4): iteration, velocity residual, force residual, objective
 
 
 class Scratch(NamedTuple):
     """Rooms to work in, as large as the problem; compiled code allocates nothing."""
 
-    rows: np.ndarray  # (17, nc, 3): vectors of impulses and velocities; of torques from the eighth on; the last: steps
-    nodes: np.ndarray  # (6, nn, 8)
-    wide: np.ndarray  # (6, nw): of the groups' velocities
-    lines: np.ndarray  # (9, nl): the same of lines
-    own: np.ndarray  # (nn + 1, 8): of each node v, w, 1/m, mean of its block; the last is what stands still
-    inner: np.ndarray  # (nn + 1, 8): its block, two unused
-    free: np.ndarray  # (nn + 1, 8): v, w without impulses, two unused
-    free_wide: np.ndarray  # velocities of the groups without impulses
-    pack: np.ndarray  # (32 nc,): contacts in the order of sweeps, each all in one place
-    sides: np.ndarray  # (nc, 3): in that order its nodes in ``own``, and which it is
+    rows: Float3  # (17, nc, 3): vectors of impulses and velocities; of torques from the eighth on; the last: steps
+    nodes: Float3  # (6, nn, 8)
+    wide: Float2  # (6, nw): of the groups' velocities
+    lines: Float2  # (9, nl): the same of lines
+    own: Float2  # (nn + 1, 8): of each node v, w, 1/m, mean of its block; the last is what stands still
+    inner: Float2  # (nn + 1, 8): its block, two unused
+    free: Float2  # (nn + 1, 8): v, w without impulses, two unused
+    free_wide: Float1  # velocities of the groups without impulses
+    pack: Float1  # (32 nc,): contacts in the order of sweeps, each all in one place
+    sides: Int2  # (nc, 3): in that order its nodes in ``own``, and which it is
 
 
 class Factor(NamedTuple):
     """Rooms of solvers that factor matrices; empty for the others. What stands in them lasts from call to call."""
 
-    numbers: np.ndarray
-    places: np.ndarray
+    numbers: Float1
+    places: Int1

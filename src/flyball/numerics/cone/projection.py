@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.jit import formula
+from ...compiler.kernels import formula
 from ...math.scalar import sqrt
 
 

@@ -9,14 +9,30 @@ from __future__ import annotations
 
 import math
 
-from ...compiler.door import door
-from ...compiler.jit import formula
+from ...compiler.kernels import formula, kernel
 from ...math.scalar import atan2, cos, sin
 from .ending import finish
 from .gauss_seidel import sweep_lines
 from .operator import push, push_line, seen
 from .pack import BIAS, IMPULSE, IN, LEAST, MU, NS, NT, SLIDE, SOFT, count_kinds, pack, take_nodes
-from .problem import BROKEN, CONVERGED, COULOMB, CUT, DIRECTIONS, ENDED, ENOUGH, HISTORY, MOST, USED, WRITTEN
+from .problem import (
+    BROKEN,
+    CONVERGED,
+    COULOMB,
+    CUT,
+    DIRECTIONS,
+    ENDED,
+    ENOUGH,
+    HISTORY,
+    MOST,
+    USED,
+    WRITTEN,
+    Choices,
+    Factor,
+    Problem,
+    Scratch,
+    State,
+)
 from .residual import contacts_of, larger, lines_of, nodes_of, residuals
 
 ALL_BY_FRAME = 2  # no contact is taken as one of balls
@@ -101,8 +117,8 @@ def begin_pyramids(P, X, W, O):
     return last - first
 
 
-@door
-def pyramid(P, X, W, O, F, task):  # type: ignore[no-untyped-def]
+@kernel
+def pyramid(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, task: int) -> int:
     """Sweeps until velocities change by less than `ENOUGH`, at most `MOST`; how many there were.
 
     Of Coulomb's law on a pyramid of `DIRECTIONS` edges, at least three; without rolling friction. Asked for anything

@@ -1,4 +1,4 @@
-"""Solvers by name. A new one is a file with a door, and a line here."""
+"""Solvers by name. A new one is a file with a kernel, and a line here."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...compiler.door import Door
+from ...compiler.kernels import Kernel
 from .admm import admm
 from .apgd import apgd
 from .barzilai_borwein import barzilai_borwein
@@ -19,7 +19,7 @@ from .newton import newton
 from .problem import Choices, Factor, Problem, Scratch, State
 from .rooms import rooms, unfilled
 
-SOLVERS: dict[str, Door] = {
+SOLVERS: dict[str, Kernel] = {
     "gauss-seidel": gauss_seidel,
     "newton": newton,
     "jacobi": jacobi,
@@ -72,33 +72,21 @@ def ready(name: str, P: Problem, X: State, W: Scratch, O: Choices) -> Ready:
     """
     if name != "auto" and name not in FACTORED:
         F = Factor(np.zeros(0), np.zeros(0, np.int64))
-        return Ready(SOLVERS[name].address(P, X, W, O, F), F, np.zeros(0, np.int64))
+        return Ready(SOLVERS[name].address, F, np.zeros(0, np.int64))
     whole = name != "auto"
     made = room_for_all(P, whole)
-    f = Factor(made.numbers, made.places)
     first = SOLVERS["newton" if name == "auto" else name]
-    made.doors[SMALL_ISLANDS] = first.address(P, X, W, O, f)
+    made.doors[SMALL_ISLANDS] = first.address
     if name == "auto" and is_small(len(P.node), len(P.group) - 1, len(P.turn) > 0):
         made.limit[:] = room_for_any(P)  # few bodies: nothing is left for sweeps, which have no door
     else:
-        made.doors[THE_REST] = gauss_seidel.address(P, X, W, O, f)
-    return Ready(auto.address(P, X, W, O, made), made, made.told)
+        made.doors[THE_REST] = gauss_seidel.address
+    return Ready(auto.address, made, made.told)
 
 
 def is_small(nodes: int, groups: int, turning: bool) -> bool:
     """Whether Newton's method is all that `auto` needs."""
     return nodes <= EVEN[1] and groups == 0 and not turning
-
-
-def needed(name: str, small: bool) -> list[tuple[Door, tuple[Any, ...]]]:
-    """The doors that `ready` asks for, with tuples of the types that these get; ``small``: see `is_small`."""
-    P = unfilled(1, 1)
-    X, W, O, F = rooms(P)
-    if name != "auto" and name not in FACTORED:
-        return [(SOLVERS[name], (P, X, W, O, F))]
-    first = [SOLVERS["newton" if name == "auto" else name]]
-    rest = [] if name == "auto" and small else [gauss_seidel]
-    return [*((d, (P, X, W, O, F)) for d in [*first, *rest]), (auto, (P, X, W, O, room_for_all(P, False)))]
 
 
 def room_for_any(P: Problem) -> tuple[int, ...]:

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiler.jit import formula, kernel
+from ...compiler.kernels import formula, kernel
+from ...compiler.layout import Float1, Float2, Float3, Int1
 from ...math.scalar import sqrt
 
 CELLS, OPEN = range(2)  # entries of Shares.count: cells in use, unknowns
@@ -32,13 +33,13 @@ class Shares(NamedTuple):
     ``D[c, i, 0]`` is what q, a, b (i = 0, 1, 2) of cell c are at y = 0, ``D[c, i, 1:]`` how they follow y.
     """
 
-    count: np.ndarray  # type: ignore[assignment]  # (2,)
-    D: np.ndarray  # (cells, 3, 1 + n): each divided by the w of its cell
-    y: np.ndarray  # (n + 1,): the y found, and s
-    now: np.ndarray  # (cells, 3): q, a, b there, less s
-    slope: np.ndarray  # (2, n + 1)
-    step: np.ndarray  # (n + 1,)
-    H: np.ndarray  # (n + 1, n + 1)
+    count: Int1  # type: ignore[assignment]  # (2,)
+    D: Float3  # (cells, 3, 1 + n): each divided by the w of its cell
+    y: Float1  # (n + 1,): the y found, and s
+    now: Float2  # (cells, 3): q, a, b there, less s
+    slope: Float2  # (2, n + 1)
+    step: Float1  # (n + 1,)
+    H: Float2  # (n + 1, n + 1)
 
 
 def room(cells: int, n: int) -> Shares:
@@ -230,6 +231,6 @@ def solved(Q):
 
 
 @kernel
-def best_kernel(Q):
+def best_kernel(Q: Shares) -> float:
     """`best`, called from Python."""
     return best(Q)

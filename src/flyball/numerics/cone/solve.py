@@ -1,25 +1,17 @@
-"""A solver called from Python: by its door, as the stepper does."""
+"""A solver called from Python."""
 
 from __future__ import annotations
 
-from ...compiler.door import Door, enter
-from ...compiler.held import held
-from ...compiler.jit import kernel
+from ...compiler.kernels import Kernel
 from .problem import Choices, Factor, Problem, Scratch, State
 
 
-@kernel
-def solve_kernel(address, P, X, W, O, F):
-    """Go through the door at an address."""
-    return enter(address, held(P), held(X), held(W), held(O), held(F), 0)
-
-
-def solve(solver: Door, P: Problem, X: State, W: Scratch, O: Choices, F: Factor) -> int:
+def solve(solver: Kernel, P: Problem, X: State, W: Scratch, O: Choices, F: Factor) -> int:
     """Solve in place.
 
     Parameters
     ----------
-    solver : Door
+    solver : Kernel
         Of a file of this folder: `gauss_seidel.gauss_seidel`, ...
     P, X, W, O, F : Problem, State, Scratch, Choices, Factor
         See `problem` and `rooms`.
@@ -29,4 +21,4 @@ def solve(solver: Door, P: Problem, X: State, W: Scratch, O: Choices, F: Factor)
     int
         Iterations used; how it ended, and how well, stands in O.
     """
-    return int(solve_kernel(solver.address(P, X, W, O, F), P, X, W, O, F))
+    return int(solver(P, X, W, O, F, 0))

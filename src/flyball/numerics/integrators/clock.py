@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...compiler.layout import Float1, Float2, Int1
+
 # entries of Clock.real
 T, H, T_END, RTOL, ATOL, H_MAX, GROW, LARGEST, SCALE, LEDGER, SPAN = range(11)
 # (of the steps refused since the last accepted one: the last error, the least, its width; an error that is good enough)
@@ -37,10 +39,10 @@ NOTHING = np.zeros((6, 0))
 class Clock(NamedTuple):
     """Everything an interrupted integration needs to go on."""
 
-    real: np.ndarray  # (REALS,)
-    count: np.ndarray  # type: ignore[assignment]  # (COUNTS,)
-    times: np.ndarray  # output times, ascending
-    y: np.ndarray  # (STATES, ny)
-    K: np.ndarray  # (stages + 1, ny): derivatives of the stages, and one within the step
-    accounts: np.ndarray  # components that are integrals of the motion: works
-    seen: np.ndarray = NOTHING  # what the inspection of laws within a step keeps; no columns: nothing is inspected
+    real: Float1  # (REALS,)
+    count: Int1  # type: ignore[assignment]  # (COUNTS,)
+    times: Float1  # output times, ascending
+    y: Float2  # (STATES, ny)
+    K: Float2  # (stages + 1, ny): derivatives of the stages, and one within the step
+    accounts: Int1  # components that are integrals of the motion: works
+    seen: Float2 = NOTHING  # what the inspection of laws within a step keeps; no columns: nothing is inspected

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...compiler.layout import Float1, Float2, Int1
 from . import dop853
 
 ASTRAY, BELOW = 1.6e-3, 0.2
@@ -28,12 +29,12 @@ class Tableau(NamedTuple):
     y(t + x h) = y + h sum_j K[j] sum_p P[j, p] x^(p + 1).
     """
 
-    A: np.ndarray  # (all stages, all stages)
-    c: np.ndarray  # (all stages,)
-    E: np.ndarray  # (2, all stages): two error estimates; the second damps the first (zero: not used)
-    P: np.ndarray  # (all stages, degree)
-    D: np.ndarray  # (2, all stages): error of the interpolant, and what damps it; zero where that of the step bounds it
-    order_i: np.ndarray  # order that the step control assumes, stages of a step, all stages
+    A: Float2  # (all stages, all stages)
+    c: Float1  # (all stages,)
+    E: Float2  # (2, all stages): two error estimates; the second damps the first (zero: not used)
+    P: Float2  # (all stages, degree)
+    D: Float2  # (2, all stages): error of the interpolant, and what damps it; zero where that of the step bounds it
+    order_i: Int1  # order that the step control assumes, stages of a step, all stages
 
 
 def _rk45() -> Tableau:

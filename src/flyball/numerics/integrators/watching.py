@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...compiler.layout import Float1, Float2, Float3, Int1, Int2
+
 # what a guard's way means: which passing of zero is an event
 FALLING, EITHER, RISING = -1, 0, 1
 # rows of Watch.g: guards at the start and end of the step; of the equations within; expected within; sides in the
@@ -35,32 +37,32 @@ EVENT = 6  # a status beside those of the clock: the step ends on events, told i
 class Watch(NamedTuple):
     """What a watched integration keeps besides its clock."""
 
-    way: np.ndarray  # (ng,): which passing of zero is an event
-    kept: np.ndarray  # (ng,): 1 of those that are above zero by what holds now
-    firm: np.ndarray  # (ng,): 1 of those that get no farther below zero by rounding than they begin
-    grain: np.ndarray  # (ng,): what is rounding of them; of those that may be anything, the less of both ends
-    tied: np.ndarray  # (ng,): size of what those are of that others keep at zero; 0 of the rest
-    still: np.ndarray  # (nm,): size of rates that others keep at zero; 0 of the rest
-    side: np.ndarray  # (ng,): 1 where the guard is above zero, -1 below; as a segment begins 0 if it has just fired
-    fired: np.ndarray  # (ng,): 1 for those that the step ends on
-    g: np.ndarray  # (GUARDS, ng + terms of a group)
-    poly: np.ndarray  # (NODES,): a guard over a panel, in powers
-    basis: np.ndarray  # (NODES, NODES): powers from values at the nodes
-    nodes: np.ndarray  # (NODES + CHECKS,): places in a panel
-    checks: np.ndarray  # (CHECKS, NODES): the polynomial through the nodes where it is checked
-    real: np.ndarray  # (REAL,)
-    count: np.ndarray  # type: ignore[assignment]  # (COUNT,)
-    stages: np.ndarray  # of a step, where levels are kept
-    met: np.ndarray  # of a step, at which guards are kept
-    met_at: np.ndarray  # where in the step these are
-    met_g: np.ndarray  # (met, ng + terms): guards there
-    moving: np.ndarray  # (2, 3, nm): measured quantities, rates, accelerations, at the start and the end
-    levels: np.ndarray  # (2 + stages, rows + spots): what has no known rate: multipliers, loads
-    places: np.ndarray  # (2 + stages,): where in the step these were seen
-    rows: np.ndarray  # multipliers that guards depend on
-    spots: np.ndarray  # (..., 2): rows and columns of what else is sensed
-    sensed: np.ndarray  # what is expected to be sensed: values and rates in its first rows; then rates as values
-    lam: np.ndarray  # multipliers expected
+    way: Int1  # (ng,): which passing of zero is an event
+    kept: Int1  # (ng,): 1 of those that are above zero by what holds now
+    firm: Int1  # (ng,): 1 of those that get no farther below zero by rounding than they begin
+    grain: Float1  # (ng,): what is rounding of them; of those that may be anything, the less of both ends
+    tied: Float1  # (ng,): size of what those are of that others keep at zero; 0 of the rest
+    still: Float1  # (nm,): size of rates that others keep at zero; 0 of the rest
+    side: Float1  # (ng,): 1 where the guard is above zero, -1 below; as a segment begins 0 if it has just fired
+    fired: Int1  # (ng,): 1 for those that the step ends on
+    g: Float2  # (GUARDS, ng + terms of a group)
+    poly: Float1  # (NODES,): a guard over a panel, in powers
+    basis: Float2  # (NODES, NODES): powers from values at the nodes
+    nodes: Float1  # (NODES + CHECKS,): places in a panel
+    checks: Float2  # (CHECKS, NODES): the polynomial through the nodes where it is checked
+    real: Float1  # (REAL,)
+    count: Int1  # type: ignore[assignment]  # (COUNT,)
+    stages: Int1  # of a step, where levels are kept
+    met: Int1  # of a step, at which guards are kept
+    met_at: Float1  # where in the step these are
+    met_g: Float2  # (met, ng + terms): guards there
+    moving: Float3  # (2, 3, nm): measured quantities, rates, accelerations, at the start and the end
+    levels: Float2  # (2 + stages, rows + spots): what has no known rate: multipliers, loads
+    places: Float1  # (2 + stages,): where in the step these were seen
+    rows: Int1  # multipliers that guards depend on
+    spots: Int2  # (..., 2): rows and columns of what else is sensed
+    sensed: Float2  # what is expected to be sensed: values and rates in its first rows; then rates as values
+    lam: Float1  # multipliers expected
 
 
 @lru_cache(maxsize=1)

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....compiler.bound import Bound, Written
+from ....compiler.buffers import StructBuffer
+from ....compiler.kernels import BoundKernel
 from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....equations.engine import Sheet, engine
 from ....equations.instant import AGAIN, BALANCE, BARE, IMPULSES, LOOK, Bench, Desk, bench, instant
@@ -67,7 +68,7 @@ class Room(NamedTuple):
 
     B: Bench
     P: Dense
-    do: Bound
+    do: BoundKernel
 
 
 class Instant:
@@ -103,9 +104,11 @@ class Instant:
         seen = np.zeros((here.clock.seen.shape[0], 0))
         self.desk = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, ny)), none, seen)
         R, self.sheet = tableau("rk45"), Sheet(np.zeros((4, width)))
-        self.tables = Written(S), Written(self.W)
-        self.engine = Bound(engine, *self.tables, Written(R), Written(self.desk), Written(self.sheet))
-        self.asked = Written(Desk(np.array([self.engine.address]), R, self.desk, self.sheet))
+        self.tables = StructBuffer(S), StructBuffer(self.W)
+        self.engine = BoundKernel(
+            engine, *self.tables, StructBuffer(R), StructBuffer(self.desk), StructBuffer(self.sheet)
+        )
+        self.asked = StructBuffer(Desk(np.array([self.engine.address]), R, self.desk, self.sheet))
         self.units = units(s)
         self.tempo = float(S.glob[TEMPO].real)
         self.unit, metric = sizes(s, c.values.length), [unit == "m" for unit in self.units]
@@ -145,7 +148,7 @@ class Instant:
         """Room for a small problem of n rows."""
         if n not in self.rooms:
             B, P = bench(n, self.here.structure.nv, len(self.S.row_i)), dense(n)
-            self.rooms[n] = Room(B, P, Bound(instant, *self.tables, self.asked, Written(B), Written(P)))
+            self.rooms[n] = Room(B, P, BoundKernel(instant, *self.tables, self.asked, StructBuffer(B), StructBuffer(P)))
         return self.rooms[n]
 
     def ways(self) -> np.ndarray:

@@ -26,7 +26,7 @@ def share(here: Here, rows: np.ndarray) -> None:
     seen, state = np.zeros((ROWS, 0)), np.zeros((STATES, ny))
     own = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), state, np.zeros((1, ny)), none, seen)
     sheet = Sheet(np.zeros((4, max(s.nv, len(S.row_i), 1))))
-    address = engine.address(S, W, R, own, sheet)
+    address = engine.address
     lam = slice(1 + ny + s.nv, 1 + ny + s.nv + len(S.row_i))
     for row in rows:
         again.z = row[1 + s.nq + s.nv : 1 + ny].copy()

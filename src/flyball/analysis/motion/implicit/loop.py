@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....compiler.bound import Bound, Joined, Mould, Moulded, Written
+from ....compiler.buffers import JoinedBuffer, PooledBuffer, StructBuffer, StructPool
+from ....compiler.kernels import BoundKernel
 from ....equations import residual
 from ....equations.implicit import SIZES, Means, Plan, Workshop, radau_steps
 from ....equations.residual import Bench
@@ -41,7 +42,7 @@ class Implicit:
         Whether velocities are not held to the constraints.
     """
 
-    door = radau_steps
+    door, workshop, means = radau_steps, Workshop, Means
 
     def __init__(self, c: Compiled, clock: ex.Clock, index_3: bool = False) -> None:
         refuse_functions(c.structure)
@@ -52,31 +53,26 @@ class Implicit:
         self.width, self.system = x.width, S
         self.light = c.values.kept.get("light", None, 1, lambda: light(c))
         key = type(self).__name__, index_3, self.light.tobytes(), int(S.flat[SCRATCH])
-        self.own: Moulded = s.kept.get("implicit steps", key, MOST, lambda: self._mould(clock.y.shape[1])).new()
+        self.own: PooledBuffer = s.kept.get("implicit steps", key, MOST, lambda: self._mould(clock.y.shape[1])).new()
         fill(s, self._stepped(S).fields, lambda name: self.own.array(f"WC.{name}"))
         if len(s.rows):
             self.own.array("plan.metric")[:] = metric(c, float(clock.real[ex.T]), clock.y[ex.NOW])
         self.count = self.own.array("desk.count")
         self._settle(self.own.array("desk.real"), len(S.angle_i) > 0)
 
-    def bind(self, tables: Written, scratch: Written, own: Written, going: Written, doors: np.ndarray) -> Bound:
+    def bind(
+        self, tables: StructBuffer, scratch: StructBuffer, own: StructBuffer, going: StructBuffer, doors: np.ndarray
+    ) -> BoundKernel:
         """The door with these tuples bound to it."""
         S = tables.fields
         if S is not self.system:  # other values of parameters: masses too, perhaps
             self.system = S
             self.count[ds.JACOBIANS] = 0
-        means = Joined(Means, self._stepped(S), self.own)
-        doors[1] = self._residuals(means)
-        return Bound(self.door, tables, scratch, means, own, going)
+        means = JoinedBuffer(self.means, self._stepped(S), self.own)
+        doors[1] = residual.stepped.address
+        return BoundKernel(self.door, tables, scratch, means, own, going)
 
-    def _residuals(self, means: Joined) -> int:
-        """Where residuals in complex numbers are."""
-        door = residual.stepped
-        if door.used:
-            return door.address()
-        return door.address(*residual.asked(means.fields.SC, means.fields.own.WC, means.fields.own.moved))
-
-    def _mould(self, ny: int) -> Mould:
+    def _mould(self, ny: int) -> StructPool:
         """What steps work with besides tables, as it is new: scratch, benches, plan, desk."""
         x, S = self.layout, self.system
         still = [y for y in (*vars(x).values(), *x.terms, *x.mass, *x.P, *x.whole_P)
@@ -89,11 +85,11 @@ class Implicit:
         desk = self._desk(len(self.compiled.structure.states), springy)
         benches = self._benches(ny)
         still += [self.light, springy, *(b.steps for b in benches)]
-        return Mould(Workshop(blank(x.s, self._stepped(S).fields, complex), *benches, plan, desk), still)
+        return StructPool(self.workshop(blank(x.s, self._stepped(S).fields, complex), *benches, plan, desk), still)
 
-    def _stepped(self, S: System) -> Written:
+    def _stepped(self, S: System) -> StructBuffer:
         """Tables in complex numbers, as compiled code has them: the same for every run with them."""
-        return self.layout.s.kept.get("stepped", id(S), MOST, lambda: (S, Written(as_complex(S))))[1]
+        return self.layout.s.kept.get("stepped", id(S), MOST, lambda: (S, StructBuffer(as_complex(S))))[1]
 
     @property
     def failed(self) -> SimulationError | None:

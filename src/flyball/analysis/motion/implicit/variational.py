@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from ....compiler.bound import Bound, Written
+from ....compiler.buffers import StructBuffer
+from ....compiler.kernels import BoundKernel
 from ....equations.tree import quaternion_at
 from ....equations.variational import variational_steps
 from ....errors import ModelError, SimulationError
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
+from ....numerics.integrators.implicit.desk import VariationalDesk
 from ....numerics.integrators.tableaux import tableau
 from ....tables.system import EXCESS, EXCESS_MASS, LENGTH, SEMIDEFINITE
 from ...compiled import Compiled
@@ -22,28 +22,6 @@ from .suited import VARIATIONAL
 TIGHT, CLOSED = 1e-15, 1e-9  # parts of the mechanism's length: violations that are none; that rounding may leave
 
 KEPT = 12  # steps that the iteration remembers
-
-
-class Desk(NamedTuple):
-    """Scratch of one run; what has the same name as in `numerics.integrators.implicit.desk` is the same."""
-
-    count: np.ndarray  # type: ignore[assignment]
-    real: np.ndarray
-    d: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    lam: np.ndarray
-    found: np.ndarray
-    z: np.ndarray
-    rate: np.ndarray
-    ends: np.ndarray  # (2, nv): accelerations at the ends of the step
-    turns: np.ndarray  # first angular velocity of each quaternion
-    p: np.ndarray  # (4, nv): momenta of the free way, on arrival, at the begin of the step and at its end
-    f: np.ndarray  # (3, nv): forces at its begin, at its end, and as they were thought to be there
-    g: np.ndarray  # (nr,): violations
-    rows: np.ndarray  # (2, nG): G at the begin and at the end
-    steps: np.ndarray  # (KEPT, nr): of the iteration for positions
-    pushes: np.ndarray  # (KEPT, nv): and of that for forces
 
 
 class Variational:
@@ -68,14 +46,16 @@ class Variational:
         real, count = np.zeros(ds.REALS), np.zeros(ds.COUNTS, np.int64)
         real[ds.NEWTON], real[ds.ROUGH] = TIGHT * S.glob[LENGTH], CLOSED * S.glob[LENGTH]
         n, z = int(S.row_p[nr]), np.zeros
-        self.desk = Desk(
+        self.desk = VariationalDesk(
             count, real, z((4, nv)), z((4, nv)), z((4, nv)), z((4, nr)), z(nr), z((4, nz)), z((4, nz)), z((2, nv)),
             np.array(turns, np.int64), z((4, nv)), z((3, nv)), z(nr), z((2, n)), z((KEPT, nr)), z((KEPT, nv)),
         )  # fmt: skip
 
-    def bind(self, tables: Written, scratch: Written, own: Written, going: Written, doors: np.ndarray) -> Bound:
+    def bind(
+        self, tables: StructBuffer, scratch: StructBuffer, own: StructBuffer, going: StructBuffer, doors: np.ndarray
+    ) -> BoundKernel:
         """The door with these tuples bound to it."""
-        return Bound(variational_steps, tables, scratch, Written(self.desk), own, going)
+        return BoundKernel(variational_steps, tables, scratch, StructBuffer(self.desk), own, going)
 
     @property
     def failed(self) -> SimulationError | None:

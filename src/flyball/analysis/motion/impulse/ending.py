@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from ....compiler.notice import compiled_since
 from ....model.touching import nothing_touches
 from ....numerics.cone.choose import BY_ONE, BY_OTHER, HANDED_ON
 from ....results import doubts
@@ -34,7 +35,6 @@ from ....stepping.tables import (
 )
 from ....tables.contact import Touching
 from ...assembly.start import Assembly
-from ...compile_time import compiled_since
 from ...mobility import mobility
 from .collect import Collected, coordinates, sets
 from .scene import smallest

@@ -8,14 +8,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ....compiler.beside import Beside
-from ....contact.surfaces import ROLLING, SPINNING
-from ....errors import AnalysisError, PerformanceNotice, SimulationError, warn
+from ....errors import AnalysisError, SimulationError
 from ....model.model import Model
-from ....numerics.cone.registry import is_small
 from ....results.result import Result
 from ....results.sides import Sides
-from ....stepping.needed import needed
 from ....stepping.stepper import NoWay, Stepper
 from ....stepping.tables import TIME
 from ....tables.contact import Touching, touching
@@ -35,7 +31,6 @@ NO_WAY = (
     "a force or a law gives no finite number, the equations have no solution, or joints cannot be closed: give shorter "
     "steps, method=fb.Stepping(step=...)"
 )
-NOTICE = "compiling steps with contact for this machine, once: about a quarter of a minute"
 EACH, SLICE = 1000, 1.0  # steps after which it is told how far it is, and seconds that they take at most
 
 
@@ -65,11 +60,9 @@ def impulse_motion(
     found = parts(model, acting_values(model, values, parameters))
     scene = touching(model, values.given, (*found.free, *found.held))
     free = len(scene.carriers.mass) - len(found.held)
-    with made_ready(scene, o, free, bool(found.held)) as ready:
-        drawn = as_drawn(plain, span[0]) if before is None else None
-        base = drawn or base_of(model, span[0], parameters, before)
-        held = held_apart(values, span[0], parameters, found, free, base if before is not None else None)
-        ready.finish()
+    drawn = as_drawn(plain, span[0]) if before is None else None
+    base = drawn or base_of(model, span[0], parameters, before)
+    held = held_apart(values, span[0], parameters, found, free, base if before is not None else None)
     at = movers(scene, moving(drawn)) if drawn else placed(scene, base)
     if before is not None:
         place_sets(scene, at, before)
@@ -92,17 +85,6 @@ def impulse_motion(
     message = INTERRUPTED if interrupted else KEPT if part.paused else REACHED
     message = message.format(float(stepper.pace.real[TIME]))
     return counted(result_of(base, scene, stepper, kept, sides, o, since, message), before, part)
-
-
-def made_ready(scene: Touching, o: Stepping, free: int, mechanism: bool) -> Beside:
-    """What compiles what the steps need; says so if it takes long."""
-    turning = bool((scene.surfaces.pair[..., ROLLING : SPINNING + 1] > 0.0).any())
-    small = is_small(free, int(mechanism), turning)
-    parts = needed(scene.geometry, o.solver, small, mechanism)
-    ready = Beside(parts.wanted, parts.behind)
-    if ready.cold:
-        warn(NOTICE, PerformanceNotice)
-    return ready
 
 
 def _size(scene: Touching, name: str) -> int:

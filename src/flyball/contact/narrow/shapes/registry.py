@@ -21,7 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
 
-from ....compiler.jit import formula
+from ....compiler.kernels import formula
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ....compiler.layout import Float1, Float2, Float3, Int1
+
 OUT, HOLDS, PUSHES, GRIPS, DRIVEN, TURNS, WITH = range(7)
 # states that are found: no impulse; at rest; at one end or the other of what it holds; as DRIVEN says;
 # a pair that slips
@@ -33,27 +35,27 @@ SCALE, BIAS, CONST, FIRST, REST, STEP, WAY, KEEN, BEFORE, MISSED = range(10)
 class Dense(NamedTuple):
     """What is asked, what is found, and scratch."""
 
-    A: np.ndarray  # (n, n)
-    b: np.ndarray  # (n,)
-    grain: np.ndarray  # (n,): rounding of b
-    rule: np.ndarray  # (n,)
-    const: np.ndarray  # (n,)
-    gain: np.ndarray  # (n, n)
-    lean: np.ndarray  # (n,)
-    state: np.ndarray  # (n,): what is tried first, and what is found
-    x: np.ndarray  # (n,)
-    u: np.ndarray  # (n,)
-    reach: np.ndarray  # (n,)
-    info: np.ndarray  # (3,)
-    N: np.ndarray  # (n, n): A, scaled
-    gained: np.ndarray  # (n, n): the same of the gain
-    K: np.ndarray  # (n, n): equations of a set of states; its factor
-    swap: np.ndarray  # (n,): order of its pivots
-    row: np.ndarray  # (10, n)
-    T: np.ndarray  # (m, 2 m + 2): pivoting
-    basis: np.ndarray  # (m,)
-    at: np.ndarray  # (n + 1,): first unknown of each row in it
-    Q: np.ndarray  # (2, n, n + 1): x and reach by what pivoting looks for
+    A: Float2  # (n, n)
+    b: Float1  # (n,)
+    grain: Float1  # (n,): rounding of b
+    rule: Int1  # (n,)
+    const: Float1  # (n,)
+    gain: Float2  # (n, n)
+    lean: Float1  # (n,)
+    state: Int1  # (n,): what is tried first, and what is found
+    x: Float1  # (n,)
+    u: Float1  # (n,)
+    reach: Float1  # (n,)
+    info: Int1  # (3,)
+    N: Float2  # (n, n): A, scaled
+    gained: Float2  # (n, n): the same of the gain
+    K: Float2  # (n, n): equations of a set of states; its factor
+    swap: Int1  # (n,): order of its pivots
+    row: Float2  # (10, n)
+    T: Float2  # (m, 2 m + 2): pivoting
+    basis: Int1  # (m,)
+    at: Int1  # (n + 1,): first unknown of each row in it
+    Q: Float3  # (2, n, n + 1): x and reach by what pivoting looks for
 
 
 def dense(n: int) -> Dense:

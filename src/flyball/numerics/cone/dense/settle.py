@@ -6,7 +6,7 @@ where everything else has its own rules: Josephy 1979).
 
 from __future__ import annotations
 
-from ....compiler.jit import formula, kernel
+from ....compiler.kernels import formula, kernel
 from ....math.scalar import exp, log, sqrt
 from .pivots import pivoted
 from .problem import (
@@ -211,7 +211,7 @@ def settle(P):
 
 
 @kernel
-def settle_kernel(P):
+def settle_kernel(P: Dense) -> None:
     """`settle`, called from Python."""
     settle(P)
 

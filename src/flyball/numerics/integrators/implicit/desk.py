@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
+from ....compiler.layout import Complex1, Complex2, Float1, Float2, Int1, Int2
 from ...lu import Rows
 
 # entries of Desk.count: what was done; whether the Jacobian is that of the present state (1), serves (0) or not (-1);
@@ -33,48 +32,106 @@ START = 3  # row of the state at which a step begins, and of the error estimate
 class Desk(NamedTuple):
     """Scratch and tables of one run."""
 
-    count: np.ndarray  # type: ignore[assignment]  # (COUNTS,)
-    real: np.ndarray  # (REALS,)
-    d: np.ndarray  # (4, nv): increments at the stages; last: of the estimate
-    v: np.ndarray  # (4, nv)
-    dd: np.ndarray  # (4, nv): rates of both
-    a: np.ndarray  # (4, nv)
-    lam: np.ndarray  # (4, nr): multipliers; last: at the begin of the step
-    found: np.ndarray  # (nr,): multipliers at the state last arrived at
-    led: np.ndarray  # (3, nr): multipliers that rows, where they are soft, give way beyond (`share`)
-    mu: np.ndarray  # (4, nr): of the stabilisation
-    z: np.ndarray  # (4, nz): x and integrals of the motion at the stages; last: at the begin of the step
-    rate: np.ndarray  # (4, nz): their rates, as the equations say
-    xd: np.ndarray  # (4, nx): rates of x as stage values say
-    out: np.ndarray  # (4, n): what the equations miss
-    before_v: np.ndarray  # (4, nv): of the step before: stages, and where it began
-    before_lam: np.ndarray  # (3, nr)
-    before_x: np.ndarray  # (4, nx)
-    tol: np.ndarray  # (2, nv): tolerances of d and v in this step
-    tol_x: np.ndarray  # (nx,): and of x
-    place: np.ndarray  # (nv,): component of the state that a velocity is the rate of, or -1: a turn
-    x: np.ndarray  # (3, n): solution, right-hand side, product
-    w: np.ndarray  # (3, n), complex
-    J: np.ndarray  # (4, n): numbers of the Jacobian at the stages and where the step begins; the first is 1
-    spring: np.ndarray  # (entries, 5): equation and velocity; numbers of the Jacobian by increment, rate, velocity
-    put: np.ndarray  # (entries, 2): place in the matrix, number of the Jacobian: times 1, h-scale, its inverse
-    part: np.ndarray  # (2,): ends of the first two groups of these
-    real_A: np.ndarray  # the real matrix and its factors
-    real_L: np.ndarray
-    real_U: np.ndarray
-    real_D: np.ndarray
-    real_Y: np.ndarray
-    pair_A: np.ndarray  # the complex one
-    pair_L: np.ndarray
-    pair_U: np.ndarray
-    pair_D: np.ndarray
-    pair_Y: np.ndarray
+    count: Int1  # type: ignore[assignment]  # (COUNTS,)
+    real: Float1  # (REALS,)
+    d: Float2  # (4, nv): increments at the stages; last: of the estimate
+    v: Float2  # (4, nv)
+    dd: Float2  # (4, nv): rates of both
+    a: Float2  # (4, nv)
+    lam: Float2  # (4, nr): multipliers; last: at the begin of the step
+    found: Float1  # (nr,): multipliers at the state last arrived at
+    led: Float2  # (3, nr): multipliers that rows, where they are soft, give way beyond (`share`)
+    mu: Float2  # (4, nr): of the stabilisation
+    z: Float2  # (4, nz): x and integrals of the motion at the stages; last: at the begin of the step
+    rate: Float2  # (4, nz): their rates, as the equations say
+    xd: Float2  # (4, nx): rates of x as stage values say
+    out: Float2  # (4, n): what the equations miss
+    before_v: Float2  # (4, nv): of the step before: stages, and where it began
+    before_lam: Float2  # (3, nr)
+    before_x: Float2  # (4, nx)
+    tol: Float2  # (2, nv): tolerances of d and v in this step
+    tol_x: Float1  # (nx,): and of x
+    place: Int1  # (nv,): component of the state that a velocity is the rate of, or -1: a turn
+    x: Float2  # (3, n): solution, right-hand side, product
+    w: Complex2  # (3, n), complex
+    J: Float2  # (4, n): numbers of the Jacobian at the stages and where the step begins; the first is 1
+    spring: Int2  # (entries, 5): equation and velocity; numbers of the Jacobian by increment, rate, velocity
+    put: Int2  # (entries, 2): place in the matrix, number of the Jacobian: times 1, h-scale, its inverse
+    part: Int1  # (2,): ends of the first two groups of these
+    real_A: Float1  # the real matrix and its factors
+    real_L: Float1
+    real_U: Float1
+    real_D: Float1
+    real_Y: Float1
+    pair_A: Complex1  # the complex one
+    pair_L: Complex1
+    pair_U: Complex1
+    pair_D: Complex1
+    pair_Y: Complex1
     P: Rows
-    whole_put: np.ndarray  # (entries, 4): place in the matrix of all stages, row of J, number, what it is multiplied by
-    whole_x: np.ndarray  # (3, 3 n)
-    whole_A: np.ndarray
-    whole_L: np.ndarray
-    whole_U: np.ndarray
-    whole_D: np.ndarray
-    whole_Y: np.ndarray
+    whole_put: Int2  # (entries, 4): place in the matrix of all stages, row of J, number, what it is multiplied by
+    whole_x: Float2  # (3, 3 n)
+    whole_A: Float1
+    whole_L: Float1
+    whole_U: Float1
+    whole_D: Float1
+    whole_Y: Float1
     whole_P: Rows
+
+
+class AlphaDesk(NamedTuple):
+    """Scratch and tables of one run; of the generalised-alpha method; what has the same name in `Desk` is the same."""
+
+    count: Int1  # type: ignore[assignment]
+    real: Float1
+    rho: Float1  # (1,): spectral radius at infinity
+    d: Float2
+    v: Float2
+    dd: Float2
+    a: Float2
+    lam: Float2
+    found: Float1
+    mu: Float2
+    z: Float2
+    rate: Float2
+    xd: Float2
+    out: Float2
+    tol: Float2
+    tol_x: Float1
+    place: Int1
+    x: Float2
+    J: Float2
+    spring: Int2
+    put: Int2
+    part: Int1
+    real_A: Float1
+    real_L: Float1
+    real_U: Float1
+    real_D: Float1
+    real_Y: Float1
+    P: Rows
+    past: Float2  # (4, nv + nx): accelerations that the method remembers, and rates of x
+    ends: Float2  # (2, nv): accelerations at the ends of the step
+    turns: Int1  # first angular velocity of each quaternion
+
+
+class VariationalDesk(NamedTuple):
+    """Scratch of one run of the variational method; what has the same name in `Desk` is the same."""
+
+    count: Int1  # type: ignore[assignment]
+    real: Float1
+    d: Float2
+    v: Float2
+    a: Float2
+    lam: Float2
+    found: Float1
+    z: Float2
+    rate: Float2
+    ends: Float2  # (2, nv): accelerations at the ends of the step
+    turns: Int1  # first angular velocity of each quaternion
+    p: Float2  # (4, nv): momenta of the free way, on arrival, at the begin of the step and at its end
+    f: Float2  # (3, nv): forces at its begin, at its end, and as they were thought to be there
+    g: Float1  # (nr,): violations
+    rows: Float2  # (2, nG): G at the begin and at the end
+    steps: Float2  # (KEPT, nr): of the iteration for positions
+    pushes: Float2  # (KEPT, nv): and of that for forces

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....compiler.jit import formula
+from ....compiler.kernels import formula
 from ..clock import ACCEPTED, GROW, NEW, NOW, STEP, H, T
 
 GROWN = 6.0  # what tells that the last step was not refused

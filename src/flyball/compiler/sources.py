@@ -1,16 +1,21 @@
-"""What a cached kernel must agree with: a hash of every source file that it is made of.
+"""The sources that a kernel is made of: their hash, and formulas that are put together at import.
 
-Numba's own cache looks at the file of the kernel only, and silently serves old code after an edit of a callee
-elsewhere. Here the stamp covers the kernel's file and all that this imports, as far as it holds formulas or constants
-of theirs; an edit of what one kernel does not import leaves its code in the cache.
+The hash covers the kernel's file and all that this imports, as far as it holds formulas or constants of theirs; an edit
+of what a kernel does not import leaves its code valid.
 """
 
 from __future__ import annotations
 
 import hashlib
+import linecache
+import math
 import re
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
+
+from .kernels import formula
 
 PACKAGE = Path(__file__).parent.parent
 COMPILED = (
@@ -27,7 +32,7 @@ COMPILED = (
 )
 """Files and folders that hold formulas and kernels, and all constants that these take from elsewhere."""
 TEXTS: dict[str, str] = {}
-"""Sources of formulas that were put together at import (`written`): module and name -> text."""
+"""Sources of formulas that were put together at import (`generated`): module and name -> text."""
 
 _IMPORT = re.compile(r"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|[\w ,*]+)", re.MULTILINE)
 _SEARCH = re.compile(r"^import pkgutil$", re.MULTILINE)
@@ -42,7 +47,7 @@ def compiled_files() -> set[Path]:
     return files
 
 
-def stamped(file: Path) -> list[Path]:
+def sources_of(file: Path) -> list[Path]:
     """The source files that a kernel which stands in ``file`` is made of: all, where it is not one of ours."""
     known, seen, todo = compiled_files(), set[Path](), [file, *Path(__file__).parent.glob("*.py")]
     if not file.is_relative_to(PACKAGE):
@@ -71,11 +76,15 @@ def _imported(path: Path) -> frozenset[Path]:
     return frozenset(p for p in out if p.is_file())
 
 
+def source_hash(function: Callable[..., Any]) -> str:
+    """Hash of every source that a kernel is made of."""
+    return _hash(Path(function.__code__.co_filename))
+
+
 @cache
-def source_stamp(file: Path) -> str:
-    """Hash of every source that a kernel which stands in ``file`` is made of."""
+def _hash(file: Path) -> str:
     digest = hashlib.sha256()
-    files = stamped(file)
+    files = sources_of(file)
     for path in files:
         digest.update(str(path.relative_to(PACKAGE)).encode() if path.is_relative_to(PACKAGE) else path.name.encode())
         digest.update(path.read_bytes())
@@ -84,3 +93,42 @@ def source_stamp(file: Path) -> str:
         if name.rpartition(".")[0] in own:
             digest.update(text.encode())
     return digest.hexdigest()
+
+
+def generated(home: str, name: str, arguments: str, lines: Sequence[str], names: Mapping[str, Any]) -> Any:
+    """A formula with these lines.
+
+    Parameters
+    ----------
+    home : str
+        The module that it belongs to: ``__name__``.
+    name, arguments : str
+        As in ``def name(arguments)``.
+    lines : sequence of str
+        The body, without indentation of its own.
+    names : mapping
+        What the body calls.
+    """
+    text = "".join([f"def {name}({arguments}):\n", *(f"    {line}\n" for line in lines)])
+    file = f"<{home}.{name}>"
+    made = dict(names)
+    exec(compile(text, file, "exec"), made)
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+    TEXTS[f"{home}.{name}"] = text
+    return formula(made[name])
+
+
+def ladder(home: str, name: str, arguments: str, cases: Mapping[int, Callable], otherwise: str) -> Any:
+    """A formula ``name(kind, arguments)`` that hands on to the one of that kind.
+
+    ``otherwise`` is what an unknown kind answers: nan, so that no element is ever answered by another one's formula.
+    """
+    names: dict[str, Any] = {f"{_plain(f)}_{kind}": f for kind, f in sorted(cases.items())}
+    lines = []
+    for called, kind in zip(names, sorted(cases), strict=True):
+        lines += [f"if kind == {kind}:", f"    return {called}({arguments})"]
+    return generated(home, name, f"kind, {arguments}", [*lines, f"return {otherwise}"], names | {"nan": math.nan})
+
+
+def _plain(f: Callable) -> str:
+    return f"{f.__module__.rpartition('.')[2]}_{f.__name__}"

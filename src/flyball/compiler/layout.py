@@ -1,0 +1,121 @@
+"""Layouts of what kernels take: structures of arrays, declared by annotations.
+
+A named tuple whose fields are annotated with the names below (``mass: Float1``, ``pattern: Pattern``) is a structure of
+arrays; a parameter of a kernel is such a structure, one array, or a number. An array is described by seven words
+and two for each dimension, as Numba describes it: two that own memory (0 here), its length, the bytes of an entry, the
+address of its numbers, its shape, its strides. A structure is its arrays one after the other.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+Float1 = Float2 = Float3 = Complex1 = Complex2 = Int1 = Int2 = Int3 = Short2 = np.ndarray
+Number1 = Number2 = np.ndarray  # of floats, or of complex numbers where a structure is annotated as COMPLEX
+COMPLEX = "complex"
+"""``ComplexSystem = Annotated[System, COMPLEX]``: the structure whose numbers are complex."""
+
+_TYPES = {"Float": "f8", "Complex": "c16", "Int": "i8", "Short": "i4"}
+HEAD, DATA, DIMENSION = 40, 32, 16
+"""Bytes of an array's description without its shape, those before the address of its numbers, those of a dimension."""
+
+
+class Array(NamedTuple):
+    """An array without gaps, in C order."""
+
+    dtype: str
+    ndim: int
+
+    @property
+    def size(self) -> int:
+        """Bytes of its description."""
+        return HEAD + DIMENSION * self.ndim
+
+    def __str__(self) -> str:
+        return f"{self.dtype}x{self.ndim}"
+
+
+class Struct(NamedTuple):
+    """A named tuple of arrays and of structures."""
+
+    of: type
+    complex: bool
+    fields: tuple[tuple[str, Any], ...]
+
+    @property
+    def size(self) -> int:
+        """Bytes of it."""
+        return sum(x.size for _, x in self.fields)
+
+    def offset(self, name: str) -> int:
+        """Where a field begins [bytes]."""
+        at = 0
+        for field, x in self.fields:
+            if field == name:
+                return at
+            at += x.size
+        raise AttributeError(f"{self.of.__name__} has no field {name!r}")
+
+    def arrays(self) -> Iterator[Array]:
+        """The arrays of it and of structures in it."""
+        for _, x in self.fields:
+            yield from x.arrays() if isinstance(x, Struct) else (x,)
+
+    def __str__(self) -> str:
+        return f"{self.of.__name__}({','.join(f'{name}:{x}' for name, x in self.fields)})"
+
+
+@cache
+def struct(of: type, is_complex: bool = False) -> Struct:
+    """Layout of a named tuple."""
+    scope = vars(sys.modules[of.__module__])
+    fields = tuple((name, _of(text, scope, is_complex)) for name, text in of.__annotations__.items())
+    if is_complex and (plain := struct(of)).fields == fields:
+        return plain
+    return Struct(of, is_complex, fields)
+
+
+def parameters(function: Callable[..., Any]) -> tuple[tuple[Any, ...], type | None]:
+    """Layouts of a kernel's parameters (`int` and `float` are numbers), and the type that it returns.
+
+    Raises
+    ------
+    TypeError
+        If a parameter is not annotated with a layout or a number.
+    """
+    code = function.__code__
+    names = code.co_varnames[: code.co_argcount]
+    texts = function.__annotations__
+    found: list[Any] = []
+    for name in names:
+        try:
+            found.append(_of(texts[name], function.__globals__, False))
+        except (KeyError, TypeError) as error:
+            raise TypeError(
+                f"kernel {function.__qualname__}: parameter {name!r} needs the annotation of a structure of arrays, of "
+                f"an array ({', '.join(_TYPES)}, and the number of dimensions), int or float: {error}"
+            ) from None
+    returned = {"int": int, "float": float, "None": None}[texts.get("return", "None")]
+    return tuple(found), returned
+
+
+def _of(text: Any, scope: dict[str, Any], is_complex: bool) -> Any:
+    """What an annotation declares."""
+    if not isinstance(text, str):
+        text = getattr(text, "__forward_arg__", getattr(text, "__name__", ""))
+    if text in ("int", "float"):
+        return int if text == "int" else float
+    kind, ndim = text[:-1], text[-1:]
+    if kind == "Number":
+        kind = "Complex" if is_complex else "Float"
+    if kind in _TYPES and ndim.isdigit():
+        return Array(_TYPES[kind], int(ndim))
+    made = scope[text]
+    if hasattr(made, "__metadata__"):  # Annotated[System, COMPLEX]
+        return struct(made.__origin__, COMPLEX in made.__metadata__)
+    return struct(made, is_complex)
