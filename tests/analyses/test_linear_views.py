@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion import compiling as motion
-from flyball.cli import compiling
+from flyball.cli.notices import show_notices
 from flyball.compiler import notice
+from flyball.equations.engine import engine
 from flyball.view.frequencies import frequencies, phase
 from flyball.view.linear import _ratio
 from tests.analyses.classical import bicycle, stand
@@ -257,44 +257,25 @@ def test_what_falls_for_ever_has_no_equilibrium(here: Path) -> None:
     assert "stone.y" in said.err
 
 
-def test_each_kernel_has_its_notice(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
-    """Whatever stderr is; a person who waits must know what for."""
-    monkeypatch.setattr(compiling, "_derivatives_will", lambda: True)
+def test_what_is_compiled_is_said_before(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+    """On a command line as a plain line; nothing is said of what takes no time."""
+    monkeypatch.setattr(notice, "_scale", [1.0])
+    monkeypatch.setitem(notice.COSTS, "engine", ("the equations of motion", 18.0))
+    with (
+        pytest.warns(fb.PerformanceNotice, match=r"once: the equations of motion, about 20 s"),
+        notice.announce(engine),
+    ):
+        pass
     with warnings.catch_warnings():
-        compiling.announce_compiling(True, "motion_kernel", "residual_kernel")
-        assert "derivatives" in capsys.readouterr().err
-        compiling.announce_compiling(False, "residual_kernel")
+        show_notices(True)
+        monkeypatch.setattr(notice, "_scale", [3.0])
+        with notice.announce(engine):
+            pass
+        assert capsys.readouterr().err.strip().endswith("the equations of motion, about 55 s")
+        show_notices(False)
+        with notice.announce(engine):
+            pass
     assert capsys.readouterr().err == ""
-
-
-class Cold:
-    """Code that was never compiled."""
-
-    cold = True
-
-
-def test_a_first_motion_says_what_it_compiles(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
-    """Each once; what looks for events only where there are some; on a command line as plain lines."""
-    m = fb.Mechanism("p", planar=True)
-    m.add(fb.Body("b", mass=1, inertia=1))
-    for name in ("ENGINE", "EVENTS"):
-        monkeypatch.setattr(motion, name, getattr(motion, name)._replace(code=(Cold(),)))
-    monkeypatch.setattr(notice, "_said", set())
-    monkeypatch.setattr(notice, "_there", set())
-    with pytest.warns(fb.PerformanceNotice, match=r"^compiling for this machine, once: the equations of motion, about"):
-        m.simulate(0.1, outputs=2)
-    m.add(fb.Event("half", "t - 0.05"))
-    with pytest.warns(fb.PerformanceNotice, match=r"once: what finds events and decides what happens there, about"):
-        m.simulate(0.1, outputs=2)
-    notice.forget()
-    with warnings.catch_warnings():
-        compiling.announce_compiling(True)
-        m.simulate(0.1, outputs=2)
-    said = capsys.readouterr().err.splitlines()
-    assert [line.split(", about")[0].split("once: ")[1] for line in said] == [
-        "the equations of motion",
-        "what finds events and decides what happens there",
-    ]
 
 
 def test_a_linear_model_has_a_plot(tmp_path) -> None:

@@ -7,7 +7,6 @@ import numpy as np
 from flyball.numerics.cone.problem import COULOMB, ENDED, ENOUGH, ISLAND, MOST
 from flyball.numerics.cone.registry import ready
 from flyball.numerics.cone.rooms import rooms, unfilled
-from flyball.numerics.cone.solve import solve_kernel
 
 H, G = 5e-3, 9.81
 CORNERS = np.array([(a, b, -0.5) for a in (-0.5, 0.5) for b in (-0.5, 0.5)])
@@ -63,7 +62,7 @@ class Stack:
         P.mu[:], P.bias[:, 0], X.v[:, :6], X.p[:] = mu, bias, v, p
         O.count[:], O.real[:] = 0, 0
         O.count[MOST], O.count[ISLAND], O.count[COULOMB], O.real[ENOUGH] = self.most, -1, 1, 1e-9
-        solve_kernel(self.door.address, P, X, self.W, O, self.door.F)
+        self.door.kernel(P, X, self.W, O, self.door.F, 0)
         return X.v[:, :6].copy(), X.p.copy(), O.count[ENDED]
 
     def step(self):

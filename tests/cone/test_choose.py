@@ -20,7 +20,6 @@ from flyball.numerics.cone.islands import islands_of
 from flyball.numerics.cone.problem import CONVERGED, ENDED, ENOUGH, MOST, RESIDUAL, Factor
 from flyball.numerics.cone.registry import names, ready
 from flyball.numerics.cone.rooms import rooms, unfilled
-from flyball.numerics.cone.solve import solve_kernel
 from tests.cone.problems import KINDS, dense, impulses, random_problem
 from tests.cone.test_gauss_seidel import cone_lack
 
@@ -40,8 +39,8 @@ def test_islands_one_by_one(limit, kind, seed):
     O.count[MOST], O.real[ENOUGH] = 200_000, 1e-12
     made = ready("auto", P, X, W, O)
     made.F.limit[:] = limit, 100, limit, 100, 1000
-    made.F.doors[THE_REST] = gauss_seidel.address(P, X, W, O, Factor(made.F.numbers, made.F.places))
-    solve_kernel(made.address, P, X, W, O, made.F)
+    made.F.doors[THE_REST] = gauss_seidel.address
+    made.kernel(P, X, W, O, made.F, 0)
     p = impulses(P, X)
     assert O.count[ENDED] == CONVERGED and O.real[RESIDUAL] < 1e-9
     assert cone_lack(P, p, N @ p + b) < 1e-9 * (1 + abs(p).max())
@@ -61,7 +60,7 @@ def test_every_name_solves(name):
     _, _, N, b = dense(P, X)
     O.count[MOST], O.real[ENOUGH] = 100_000, 1e-10
     made = ready(name, P, X, W, O)
-    solve_kernel(made.address, P, X, W, O, made.F)
+    made.kernel(P, X, W, O, made.F, 0)
     p = impulses(P, X)
     assert O.count[ENDED] == CONVERGED
     assert cone_lack(P, p, N @ p + b) < 1e-8
@@ -73,7 +72,7 @@ def test_what_does_not_fit_is_handed_on():
     O.count[MOST], O.real[ENOUGH] = 100_000, 1e-10
     made = ready("newton", P, X, W, O)
     tight = made.F._replace(numbers=np.zeros(8), places=np.zeros(40, np.int64))
-    solve_kernel(made.address, P, X, W, O, tight)
+    made.kernel(P, X, W, O, tight, 0)
     p = impulses(P, X)
     assert made.told[HANDED_ON] == 1 and O.count[ENDED] == CONVERGED
     assert cone_lack(P, p, N @ p + b) < 1e-8
@@ -83,7 +82,7 @@ def test_few_bodies_need_no_sweeps():
     P, X, W, O, _ = random_problem(4)
     made = ready("auto", P, X, W, O)
     assert made.F.doors[THE_REST] == 0
-    solve_kernel(made.address, P, X, W, O, made.F)
+    made.kernel(P, X, W, O, made.F, 0)
     assert O.count[ENDED] == CONVERGED and made.told[BY_OTHER] == 0
 
 
@@ -91,7 +90,7 @@ def test_nothing_to_do():
     P, X, W, O, F = random_problem(4, nc=0, nn=2)
     made = ready("auto", P, X, W, O)
     before = X.v.copy()
-    solve_kernel(made.address, P, X, W, O, made.F)
+    made.kernel(P, X, W, O, made.F, 0)
     assert O.count[ENDED] == CONVERGED and isinstance(F, Factor)
     np.testing.assert_array_equal(X.v, before)
 
@@ -109,7 +108,7 @@ def test_uneven_masses_go_to_newton_in_larger_islands(ratio, to_newton):
     X.v[:, 2] = -1.0
     O.count[MOST], O.real[ENOUGH] = 100_000, 1e-9
     made = ready("auto", P, X, W, O)
-    solve_kernel(made.address, P, X, W, O, made.F)
+    made.kernel(P, X, W, O, made.F, 0)
     assert made.told[BY_ONE] == to_newton and made.told[BY_OTHER] == 1 - to_newton
     assert O.count[ENDED] == CONVERGED
     assert X.p[:, 0] == pytest.approx((1 / P.node[::-1, 0]).cumsum()[::-1], rel=1e-4)

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from flyball.compiler.held import held
-from flyball.compiler.jit import kernel
 from flyball.contact.narrow.collide import collide
 from flyball.contact.narrow.room import ROOM
 from flyball.contact.tables import AXES, FACE_COUNT, FACE_FIRST, PAR, RADIUS, Geometry, Movers
+from tests.compiled import compiled
 
 
 def _collide(G, M, i, j, reach, room):
-    return collide(held(G), held(M), i, j, reach, room)
+    return collide(G, M, i, j, reach, room)
 
 
-meet = kernel(_collide)
+meet = compiled(_collide)
 
 
 def geometry(*shapes):

@@ -7,14 +7,13 @@ import itertools
 import numpy as np
 import pytest
 
-from flyball.compiler.held import held
-from flyball.compiler.jit import kernel
 from flyball.contact.kinds import HULL
 from flyball.contact.narrow.room import CORNERS
 from flyball.contact.narrow.shapes.hull import face, support
 from flyball.contact.solids.hull import CLIMB, hull
 from flyball.contact.tables import COUNT, FACE_COUNT, KIND, PAR, Geometry
 from flyball.errors import ModelError
+from tests.compiled import compiled
 
 CUBE = np.array(list(itertools.product((-1, 1), repeat=3)), dtype=float)
 
@@ -28,8 +27,8 @@ def table(h, radius=0.0):
 
 
 def _ask(G, d, out, room):
-    g = held(G)
-    for k in range(len(d)):
+    g = G
+    for k in range(d.shape[0]):
         x = support(g, 0, (d[k, 0], d[k, 1], d[k, 2]))
         n, _ = face(g, 0, (d[k, 0], d[k, 1], d[k, 2]), room, 0)
         out[k, 0] = n
@@ -45,7 +44,7 @@ def _ask(G, d, out, room):
     return 0
 
 
-ask = kernel(_ask)
+ask = compiled(_ask)
 
 
 def asked(h, d):

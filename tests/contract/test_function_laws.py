@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.compiler.jit import kernel
 from flyball.errors import ExpressionError, PerformanceNotice
 from flyball.laws.call import STACK_RESERVE
 from flyball.laws.evaluation import evaluate
@@ -23,6 +22,7 @@ from flyball.laws.native import native
 from flyball.laws.program import compile_law
 from flyball.model.expressions import Expression, law_expression
 from flyball.model.function import Call
+from tests.compiled import compiled
 
 PARAMETERS = {"k": 3.0}
 INPUTS = ("t", "length", "rate")
@@ -34,12 +34,12 @@ GAIN = 2.0
 LIST = [1.0]
 
 
-@kernel
+@compiled
 def compiled_value(code, const, at, stack, x, sensed):
     return evaluate(code, const, at, stack, x, sensed)
 
 
-@kernel
+@compiled
 def compiled_sum(code, const, at, stack, x, sensed, n):
     s = 0.0
     for i in range(n):

@@ -8,24 +8,24 @@ import sympy
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from flyball.compiler.jit import kernel
 from flyball.laws.evaluation import evaluate, evaluate_jet
 from flyball.laws.manner import entire
 from flyball.laws.opcodes import BY_MOTION
 from flyball.laws.program import compile_law
 from flyball.model.expressions import FUNCTIONS, Expression
+from tests.compiled import compiled
 
 PARAMETERS = {"a": 0.7, "b": 1.3, "zero": 0.0, "n": 3.0}
 H = 1e-30
 NOTHING = np.zeros((3, 0))  # no sensors
 
 
-@kernel
+@compiled
 def compiled_value(code, const, at, stack, x, sensed):
     return evaluate(code, const, at, stack, x, sensed)
 
 
-@kernel
+@compiled
 def compiled_jet(code, const, at, stack, t, sensed, seed):
     return evaluate_jet(code, const, at, stack, t, sensed, seed)
 

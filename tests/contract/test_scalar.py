@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import sympy
 
-from flyball.compiler.jit import kernel
 from flyball.math import scalar
 from flyball.math.scalar import (
     absolute,
@@ -34,6 +33,7 @@ from flyball.math.scalar import (
     tan,
     tanh,
 )
+from tests.compiled import compiled
 
 ONE = [
     "sqrt",
@@ -72,7 +72,7 @@ BROKEN = [
 H = 1e-30
 
 
-@kernel
+@compiled
 def every_one(x, out):
     out[0] = sqrt(x)
     out[1] = sin(x)
@@ -93,7 +93,7 @@ def every_one(x, out):
     out[16] = quintic_rise(x)
 
 
-@kernel
+@compiled
 def every_two(a, b, out):
     out[0] = atan2(a, b)
     out[1] = minimum(a, b)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from flyball.compiler.jit import kernel
 from flyball.errors import ExpressionError
 from flyball.laws.call import STACK_RESERVE
 from flyball.laws.evaluation import evaluate, evaluate_jet
@@ -12,6 +11,7 @@ from flyball.laws.program import compile_law
 from flyball.math import scalar
 from flyball.model.expressions import Expression, law_expression
 from flyball.model.table import Table
+from tests.compiled import compiled
 
 PARAMETERS = {"a": 0.7, "b": 1.3}
 SENSORS = {"speed": 2, "height": 0}  # column 1 is another law's
@@ -42,12 +42,12 @@ LAWS = [
 AT = (0.9, (1.1, 0.61))  # time, (speed, height)
 
 
-@kernel
+@compiled
 def compiled_value(code, const, at, stack, x, sensed):
     return evaluate(code, const, at, stack, x, sensed)
 
 
-@kernel
+@compiled
 def compiled_jet(code, const, at, stack, t, sensed, seed):
     return evaluate_jet(code, const, at, stack, t, sensed, seed)
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from flyball.compiler.jit import kernel
 from flyball.math.spline import spline
 from flyball.model.table import Table
+from tests.compiled import compiled
 
 KINDS = ["cubic", "monotone", "linear"]
 BEYOND = ["refuse", "line", "hold", "repeat"]
@@ -20,7 +20,7 @@ Y = (0.4, 1.0, 0.8, -0.7, -0.7, 0.4)
 H = 1e-30
 
 
-@kernel
+@compiled
 def compiled_spline(data, at, x):
     return spline(data, at, x)
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from flyball.compiler.jit import kernel
 from flyball.numerics.lu import analyse, constrained_order, lu_factor, lu_solve, times
+from tests.compiled import compiled
 
 
-@kernel
+@compiled
 def factor_and_solve(P, A, L, U, D, Y, x, product):
     status = lu_factor(P, A, L, U, D, Y)
     times(P, A, x, product)

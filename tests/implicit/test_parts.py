@@ -10,8 +10,8 @@ from flyball.analysis.linear.loads import STEP
 from flyball.analysis.motion.implicit.layout import layout
 from flyball.analysis.motion.start import begin
 from flyball.analysis.motion.touches import with_places
-from flyball.equations.residual import Bench, address, through_stepped
-from flyball.equations.tasks import PARTS, PUSHES
+from flyball.equations.residual import address, through_stepped
+from flyball.equations.tasks import PARTS, PUSHES, Bench
 from flyball.tables.system import FORCE_ALONG, FORCE_SWITCH, HELD, MODE, OFF, SLIDING, SWITCH_OTHER
 from tests.contract.test_everything import everything
 from tests.contract.zoo import joined

@@ -15,17 +15,14 @@ import flyball
 PACKAGE = Path(flyball.__file__).parent
 
 COUNT = """
-import json, sys, warnings
-from numba.core.errors import NumbaWarning
-warnings.simplefilter("error", NumbaWarning)
+import json, sys
 
 def cache_counts():
-    from flyball.compiler.jit import KERNELS
+    from flyball.compiler.formulas import KERNELS
     used = [k for k in KERNELS if k.used]
-    counts = [k.from_cache for k in used]
     return {
-        "hits": sum(hits for hits, _ in counts),
-        "misses": sum(misses for _, misses in counts),
+        "hits": sum(k.origin == "cache" for k in used),
+        "misses": sum(k.origin == "compiled" for k in used),
         "kernels": [k.__qualname__ for k in used],
     }
 """
@@ -78,10 +75,10 @@ class Copy:
         return b.exists() and a.read_bytes() == b.read_bytes()
 
     def run(self, script: str) -> dict:
-        """What a fresh process that imports the copy prints last, as JSON; warnings of Numba are errors."""
+        """What a fresh process that imports the copy prints last, as JSON."""
         env = os.environ | {
             "PYTHONPATH": str(self.root),
-            "NUMBA_CACHE_DIR": str(self.cache),
+            "FLYBALL_CACHE": str(self.cache),
         }
         env.pop("PYTHONDONTWRITEBYTECODE", None)  # a process that finds bytecode of the copy is a second quicker
         ended = subprocess.run(

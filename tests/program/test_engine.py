@@ -1,18 +1,18 @@
-"""The engine behind its door: loops of others go through it, and never contain it."""
+"""The engine by its address: loops of others call it, and never contain it."""
 
 import numpy as np
 import pytest
 
 import flyball as fb
 from flyball.analysis.motion.start import begin
-from flyball.compiler.bound import Bound, Written
-from flyball.compiler.door import enter
-from flyball.compiler.held import held
-from flyball.compiler.jit import formula, kernel
-from flyball.equations.engine import ARRIVE, MOTION, REPORT, RESIDUAL, Sheet, engine, motion_kernel
+from flyball.compiler.buffers import StructBuffer
+from flyball.compiler.formulas import call, formula
+from flyball.compiler.kernels import BoundKernel, kernel
+from flyball.equations.engine import ARRIVE, MOTION, REPORT, RESIDUAL, engine, motion_kernel
+from flyball.equations.tasks import Sheet
 from flyball.numerics.integrators.clock import Clock, T
-from flyball.numerics.integrators.tableaux import tableau
-from flyball.tables.system import LAM
+from flyball.numerics.integrators.tableaux import Tableau, tableau
+from flyball.tables.system import LAM, System, Work
 from tests.layers import LAYERS
 
 
@@ -25,7 +25,7 @@ def classical(address, S, W, R, clock, sheet, h, steps):
         for i in range(n):
             y[1, i] = y[2, i] = y[0, i]
         for stage in range(4):
-            enter(address, S, W, R, clock, sheet, MOTION)
+            call(address, S, W, R, clock, sheet, MOTION)
             w = h / 6.0 if stage == 0 or stage == 3 else h / 3.0
             part = h if stage == 2 else 0.5 * h
             clock.real[T] = t + (0.0 if stage == 3 else part)
@@ -35,12 +35,14 @@ def classical(address, S, W, R, clock, sheet, h, steps):
         for i in range(n):
             y[0, i] = y[2, i]
         clock.real[T] = t + h
-    return enter(address, S, W, R, clock, sheet, ARRIVE)
+    return call(address, S, W, R, clock, sheet, ARRIVE)
 
 
 @kernel
-def classical_kernel(address, S, W, R, clock, sheet, h, steps):
-    return classical(address, held(S), held(W), held(R), held(clock), held(sheet), h, steps)
+def classical_kernel(
+    address: int, S: System, W: Work, R: Tableau, clock: Clock, sheet: Sheet, h: float, steps: int
+) -> int:
+    return classical(address, S, W, R, clock, sheet, h, steps)
 
 
 def desk(model, coordinates):
@@ -50,19 +52,19 @@ def desk(model, coordinates):
     s, S = c.structure, c.values.system
     n = len(start.y)
     clock = Clock(
-        np.zeros(10), np.zeros(9, np.int64), np.zeros(0), np.zeros((3, n)), np.zeros((1, n)), np.zeros(0, np.int64)
-    )
+        np.zeros(10), np.zeros(9, np.int64), np.zeros(0), np.zeros((3, n)), np.zeros((1, n)), np.zeros(0, np.int64),
+        np.zeros((6, 0)),
+    )  # fmt: skip
     clock.y[0] = start.y
     width = 1 + n + s.nv + 3 * len(S.row_i) + 3 * len(s.measured) + len(s.prescribed)
     return s, S, c.work, tableau("rk45"), clock, Sheet(np.zeros((3, width)))
 
 
 @pytest.mark.parametrize("coordinates", LAYERS)
-def test_a_loop_of_ones_own_goes_through_the_door(coordinates):
+def test_a_loop_of_ones_own_calls_the_engine(coordinates):
     model = fb.load("examples/andrews.toml")
     s, S, W, R, clock, sheet = desk(model, coordinates)
-    address = engine.address(S, W, R, clock, sheet)
-    assert classical_kernel(address, S, W, R, clock, sheet, 1e-5, 100) == 0
+    assert classical_kernel(engine.address, S, W, R, clock, sheet, 1e-5, 100) == 0
     r = model.simulate(1e-3, coordinates=coordinates, rtol=1e-12, atol=1e-13)
     assert clock.y[0, : s.nq] == pytest.approx(r.final[1][: s.nq], abs=1e-9)
 
@@ -96,15 +98,15 @@ def test_other_tables_than_those_it_was_made_for_are_refused():
     """Complex tables would be read as if they were real."""
     _, S, W, R, clock, sheet = desk(fb.load("examples/slider_crank.toml"), "absolute")
     complex_tables = S._replace(body_x=S.body_x.astype(complex))
-    with pytest.raises(Exception, match="no door was made for"):
+    with pytest.raises(Exception, match="System.frame_x: an array of complex128"):
         motion_kernel(complex_tables, W, R, clock, sheet.rows, MOTION)
 
 
-def test_a_door_with_its_tuples_bound_to_it():
+def test_a_kernel_with_its_structures_bound_to_it():
     """Called from Python by its address it writes what the kernel writes, also after the arrays have changed."""
     model = fb.load("examples/slider_crank.toml")
     s, S, W, R, clock, sheet = desk(model, "absolute")
-    bound = Bound(engine, *map(Written, (S, W, R, clock, sheet)))
+    bound = BoundKernel(engine, *map(StructBuffer, (S, W, R, clock, sheet)))
     for t in (0.0, 0.3):
         clock.real[T] = t
         clock.y[0, s.nq : s.nq + s.nv] *= 1.0 - t
@@ -115,8 +117,8 @@ def test_a_door_with_its_tuples_bound_to_it():
         assert (expected == clock.K).all() and (W.row[LAM] == lam).all()
 
 
-def test_a_door_is_bound_to_its_kind_of_tuples_only():
+def test_a_kernel_is_bound_to_structures_of_its_layout_only():
     _, S, W, R, clock, sheet = desk(fb.load("examples/slider_crank.toml"), "absolute")
     for other in (sheet._replace(rows=sheet.rows.astype(complex)), sheet._replace(rows=np.asfortranarray(sheet.rows))):
-        with pytest.raises(TypeError, match="not made for such"):
-            Bound(engine, *map(Written, (S, W, R, clock, other)))
+        with pytest.raises(TypeError, match=r"Sheet\.rows: an array of float64 with 2 dimensions"):
+            BoundKernel(engine, *map(StructBuffer, (S, W, R, clock, other)))

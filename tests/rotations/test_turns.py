@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import sympy
 
-from flyball.compiler.jit import kernel
 from flyball.math import turns
 from flyball.math.vec import mm
+from tests.compiled import compiled
 
 SEQUENCES = [(i, j, k) for i in range(3) for j in range(3) for k in range(3) if i != j != k]
 
 
-@kernel
+@compiled
 def every_formula(i, j, k, angles, rates, out):
     a, b, c = angles[0], angles[1], angles[2]
     speed = (rates[0], rates[1], rates[2])

@@ -8,7 +8,7 @@ from flyball.contact.tables import GAP, NORMAL, POINT, Contacts, Movers
 from flyball.equations.engine import engine
 from flyball.numerics.cone.rooms import rooms, unfilled
 from flyball.stepping.joined import ANYHOW, BEGIN, FINISH, FREE, KEEP, MEAN, ROWS, START, STEP, VELOCITIES
-from flyball.stepping.joints import joined, joined_kernel
+from flyball.stepping.joints import joined
 
 
 class Stepped:
@@ -30,12 +30,11 @@ class Stepped:
         self.P = unfilled(contacts, 0, len(A.group) - 1, lines, (6 * contacts + lines) * nv)
         self.P.group[:] = A.group
         self.X, self.Y = rooms(self.P)[0], rooms(self.P)[0]
-        A.door[0] = engine.address(A.S, A.W, A.R, A.clock, A.sheet)
-        self.address = joined.address(self.A, self.M, self.C, self.P, self.X)
+        A.door[0] = engine.address
         self.ask(START)
 
     def ask(self, task, X=None):
-        status = joined_kernel(self.address, self.A, self.M, self.C, self.P, self.X if X is None else X, task)
+        status = joined(self.A, self.M, self.C, self.P, self.X if X is None else X, task)
         assert status == 0, status
 
     @property

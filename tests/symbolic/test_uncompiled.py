@@ -5,12 +5,10 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from types import SimpleNamespace
 
 import pytest
 
 import flyball as fb
-from flyball.symbolic import coordinates
 from tests.mechanisms import EXAMPLES
 from tests.symbolic.small import cart
 
@@ -19,7 +17,7 @@ import sys
 import flyball as fb
 from tests.mechanisms import example
 from tests.symbolic import small, test_uncompiled
-from flyball.compiler.jit import KERNELS
+from flyball.compiler.formulas import KERNELS
 
 m = {made}
 eq = m.symbolic()
@@ -54,7 +52,7 @@ def rubbing() -> fb.Mechanism:
     ],
 )
 def test_nothing_compiles(made, more, which, tmp_path):
-    where = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    where = os.environ | {"FLYBALL_CACHE": str(tmp_path)}
     code = READ.format(made=made, more=more)
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=EXAMPLES.parent, env=where, capture_output=True, text=True, timeout=120
@@ -62,12 +60,6 @@ def test_nothing_compiles(made, more, which, tmp_path):
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith(which)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_start_that_compiles_says_so(monkeypatch):
-    monkeypatch.setattr(coordinates, "engine", SimpleNamespace(cold=True))
-    with pytest.warns(fb.PerformanceNotice, match=r"compiling the engine for this machine, once"):
-        assert cart().symbolic().start["pin.angle"] == 0.0
 
 
 def test_massless_coordinates_are_refused():

@@ -12,9 +12,10 @@ import numpy as np
 from ..compiler.buffers import PooledBuffer, StructBuffer
 from ..compiler.kernels import BoundKernel
 from ..constraints.registry import KINDS
-from ..equations.engine import POSITION, Sheet, engine, evaluate
+from ..equations.engine import POSITION, engine, evaluate
 from ..equations.projection import NONE
 from ..equations.scratch import scratch, tables, work
+from ..equations.tasks import Sheet
 from ..equations.velocities import turned_angles, velocities
 from ..model.body import Body, Frame, Initial
 from ..model.model import Model

@@ -6,21 +6,23 @@ import gc
 import time
 from typing import Any
 
-from .kernels import FAILED, LOCK, Kernel, start_compiler
+from .formulas import LOCK, register_all
 from .layout import Array, Struct
 from .machine import emitted, llvm, target_machine, triple
 
+FAILED = -(2**63)  # what a kernel returns whose formulas ended in an error
 ENTRY = "flyball_kernel"  # the name of a kernel's entry point in its object
+_started: list[bool] = []
 LEVEL = 3
 """Of optimisation: 1 and 2 take a second less of twenty, and run 5 to 15 % longer."""
 
 
-def object_code(kernel: Kernel, cpus: tuple[str, ...], system: str = "") -> list[bytes]:
+def object_code(kernel: Any, cpus: tuple[str, ...], system: str = "") -> list[bytes]:
     """Object code of a kernel for some processors.
 
     Parameters
     ----------
-    kernel : Kernel
+    kernel : kernels.Kernel
     cpus : tuple of str
         In the words of LLVM: see `machine.BASELINES`.
     system : str
@@ -37,7 +39,18 @@ def object_code(kernel: Kernel, cpus: tuple[str, ...], system: str = "") -> list
         return [emitted(module, target_machine(cpu, system or triple()), LEVEL) for cpu, module in pairs]
 
 
-def _linked(kernel: Kernel) -> bytes:
+def start_compiler() -> None:
+    """Import Numba, and tell it of flyball's types and of every formula."""
+    with LOCK:
+        if not _started:
+            from . import references, target
+
+            _started.append(True)
+            references.register()
+            register_all(target.overload)
+
+
+def _linked(kernel: Any) -> bytes:
     """Bitcode of a kernel with all that it calls, behind an entry point in C's calling convention."""
     from .target import translated
 
@@ -61,7 +74,7 @@ def _linked(kernel: Kernel) -> bytes:
     return bytes(module.as_bitcode())
 
 
-def _types(kernel: Kernel) -> tuple[Any, ...]:
+def _types(kernel: Any) -> tuple[Any, ...]:
     from numba import types
 
     from .references import reference
@@ -96,7 +109,7 @@ def _entry(context: Any, description: Any) -> str:
     return str(module)
 
 
-def timed(kernel: Kernel, cpus: tuple[str, ...]) -> tuple[list[bytes], float]:
+def timed(kernel: Any, cpus: tuple[str, ...]) -> tuple[list[bytes], float]:
     """Its object code, and the seconds of processor time that it took."""
     began = time.process_time()
     return object_code(kernel, cpus), time.process_time() - began

@@ -1,65 +1,21 @@
-"""Formulas and kernels: what is compiled, and how compiled code is called.
+"""Kernels: entry points of compiled code, called by Python or, by their addresses, by other kernels.
 
-``@formula`` marks plain Python code that compiled code may call. The function itself stays plain Python, so the same
-source runs on floats, complex numbers, arrays over time and symbols. ``@kernel`` marks an entry point: its parameters
-are structures of arrays, arrays and numbers (`layout`), it is compiled as a whole with all formulas that it calls, and
-the code is kept in a file (`store`). Numba is imported only where something is compiled.
+The parameters of a kernel are structures of arrays, arrays and numbers (`layout`). It is compiled as a whole with all
+formulas that it calls, and its code is kept in a file (`store`). Numba is imported only where something is compiled.
 """
 
 from __future__ import annotations
 
 import ctypes
-import threading
 from collections.abc import Callable
 from functools import cached_property, update_wrapper
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from .buffers import StructBuffer, described
+from .formulas import KERNELS, LOCK
 from .layout import Array, Struct, parameters
-
-F = TypeVar("F", bound=Callable[..., Any])
-
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}  # division as in C; nothing is allocated
-KERNELS: list[Kernel] = []
-LOCK = threading.RLock()
-FAILED = -(2**63)  # what a kernel returns whose formulas ended in an error
-_pending: list[Callable[[], None]] = []
-_started = False
-
-
-def when_compiling(callback: Callable[[], None]) -> Callable[[], None]:
-    """Run ``callback`` once before anything is compiled (at once if something was)."""
-    if _started:
-        callback()
-    else:
-        _pending.append(callback)
-    return callback
-
-
-def start_compiler() -> None:
-    """Import Numba, and register every formula defined so far."""
-    global _started
-    with LOCK:
-        if not _started:
-            from . import target  # noqa: F401
-
-            _started = True
-            while _pending:
-                _pending.pop(0)()
-
-
-def formula(function: F) -> F:
-    """Let compiled code call ``function``; the function itself stays plain Python and can be run on any numbers."""
-
-    def register() -> None:
-        from .target import overload
-
-        overload(function, strict=False)(lambda *args, **more: function)
-
-    when_compiling(register)
-    return function
 
 
 def kernel(function: Callable[..., Any]) -> Kernel:
@@ -110,6 +66,11 @@ class Kernel:
     def used(self) -> bool:
         """Whether this process has its code."""
         return self._loaded is not None
+
+    @property
+    def origin(self) -> str:
+        """Where its code is from: "shipped", "cache", "compiled"; empty if this process has not needed it."""
+        return self._loaded.origin if self._loaded is not None else ""
 
     @property
     def address(self) -> int:
@@ -193,65 +154,8 @@ class BoundKernel:
             check(kernel, of, x)
         self.address = kernel.address
         self._addresses = [x.address for x in buffers]
-        self.words = np.array([self.address, *self._addresses], np.int64)  # for `call_bound`
+        self.words = np.array([self.address, *self._addresses], np.int64)  # for `formulas.call_bound`
 
     def __call__(self, task: int) -> int:
         """Have a task done."""
         return int(self.kernel.call(*self._addresses, task))
-
-
-def by_address(fields):  # type: ignore[no-untyped-def]
-    """The named tuple by its address, in compiled code; the tuple itself in plain Python."""
-    return fields
-
-
-def call(address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
-    """Call the kernel at ``address`` with five structures and a task; in compiled code only."""
-    raise NotImplementedError("kernels are called by address from compiled code only")
-
-
-def call_bound(words, task):  # type: ignore[no-untyped-def]
-    """Call a kernel with structures bound to it (`BoundKernel.words`); in compiled code only."""
-    raise NotImplementedError("kernels are called by address from compiled code only")
-
-
-@when_compiling
-def _register() -> None:
-    from llvmlite import ir
-    from numba import types
-    from numba.core.errors import TypingError
-    from numba.extending import intrinsic
-
-    from . import references  # noqa: F401
-    from .target import overload
-
-    integer = ir.IntType(64)
-
-    @intrinsic
-    def jump(typing, address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
-        given = A, B, C, D, E
-        layouts = tuple(getattr(x, "layout", None) for x in given)
-        if not any(k.parameters[:-1] == layouts for k in KERNELS):
-            raise TypingError(f"no kernel takes {given}")
-
-        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            of = ir.FunctionType(integer, [x.type for x in args[1:]])
-            return builder.call(builder.inttoptr(args[0], of.as_pointer()), list(args[1:]))
-
-        return types.int64(types.int64, *given, types.int64), generate
-
-    @intrinsic
-    def leap(typing, address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
-        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            of = ir.FunctionType(integer, [integer] * 6)
-            return builder.call(builder.inttoptr(args[0], of.as_pointer()), list(args[1:]))
-
-        return types.int64(*[types.int64] * 7), generate
-
-    @overload(call)
-    def choose(address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
-        return lambda address, A, B, C, D, E, task: jump(address, A, B, C, D, E, task)
-
-    @overload(call_bound)
-    def choose_bound(words, task):  # type: ignore[no-untyped-def]
-        return lambda words, task: leap(words[0], words[1], words[2], words[3], words[4], words[5], types.int64(task))

@@ -11,12 +11,20 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-Float1 = Float2 = Float3 = Complex1 = Complex2 = Int1 = Int2 = Int3 = Short2 = np.ndarray
-Number1 = Number2 = np.ndarray  # of floats, or of complex numbers where a structure is annotated as COMPLEX
+Float1 = Annotated[np.ndarray, "Float1"]
+Float2 = Annotated[np.ndarray, "Float2"]
+Float3 = Annotated[np.ndarray, "Float3"]
+Complex1 = Annotated[np.ndarray, "Complex1"]
+Complex2 = Annotated[np.ndarray, "Complex2"]
+Int1 = Annotated[np.ndarray, "Int1"]
+Int2 = Annotated[np.ndarray, "Int2"]
+Short2 = Annotated[np.ndarray, "Short2"]
+Number1 = Annotated[np.ndarray, "Number1"]  # of floats; of complex numbers where a structure is annotated as COMPLEX
+Number2 = Annotated[np.ndarray, "Number2"]
 COMPLEX = "complex"
 """``ComplexSystem = Annotated[System, COMPLEX]``: the structure whose numbers are complex."""
 
@@ -100,14 +108,20 @@ def parameters(function: Callable[..., Any]) -> tuple[tuple[Any, ...], type | No
                 f"kernel {function.__qualname__}: parameter {name!r} needs the annotation of a structure of arrays, of "
                 f"an array ({', '.join(_TYPES)}, and the number of dimensions), int or float: {error}"
             ) from None
-    returned = {"int": int, "float": float, "None": None}[texts.get("return", "None")]
-    return tuple(found), returned
+    return tuple(found), {"int": int, "float": float}.get(_text(texts.get("return")))
+
+
+def _text(annotation: Any) -> str:
+    """An annotation as it is written, also where it was evaluated."""
+    if isinstance(annotation, str):
+        return annotation
+    array = getattr(annotation, "__metadata__", ("",))[0]
+    return getattr(annotation, "__forward_arg__", "") or array or getattr(annotation, "__name__", "")
 
 
 def _of(text: Any, scope: dict[str, Any], is_complex: bool) -> Any:
     """What an annotation declares."""
-    if not isinstance(text, str):
-        text = getattr(text, "__forward_arg__", getattr(text, "__name__", ""))
+    text = _text(text)
     if text in ("int", "float"):
         return int if text == "int" else float
     kind, ndim = text[:-1], text[-1:]

@@ -27,7 +27,7 @@ def announce(kernel: Any) -> Iterator[None]:
     """Say that a kernel is compiled, and for about how long, by what this machine has taken so far; keep the time."""
     began = time.perf_counter()
     if not _scale:
-        from .kernels import start_compiler
+        from .emit import start_compiler
 
         start_compiler()
         _scale.append((time.perf_counter() - began) / IMPORT)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import operator
 from typing import Any
 
-from .kernels import by_address, when_compiling
+from .formulas import KERNELS, by_address, call, call_bound
 from .layout import DATA, HEAD, Array, Struct, struct
 
 _MADE: dict[str, Any] = {}
@@ -266,9 +266,50 @@ def _arrays(types: Any) -> None:
         return _Place(context, builder, of, value).whole()
 
 
-@when_compiling
-def _register() -> None:
+def _calls(types: Any) -> None:
+    """Calls by address."""
+    from llvmlite import ir
+    from numba.core.errors import TypingError
+    from numba.extending import intrinsic
+
+    from .target import overload
+
+    integer = ir.IntType(64)
+
+    @intrinsic
+    def jump(typing, address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
+        given = A, B, C, D, E
+        layouts = tuple(getattr(x, "layout", None) for x in given)
+        if not any(k.parameters[:-1] == layouts for k in KERNELS):
+            raise TypingError(f"no kernel takes {given}")
+
+        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+            of = ir.FunctionType(integer, [x.type for x in args[1:]])
+            return builder.call(builder.inttoptr(args[0], of.as_pointer()), list(args[1:]))
+
+        return types.int64(types.int64, *given, types.int64), generate
+
+    @intrinsic
+    def leap(typing, address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
+        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+            of = ir.FunctionType(integer, [integer] * 6)
+            return builder.call(builder.inttoptr(args[0], of.as_pointer()), list(args[1:]))
+
+        return types.int64(*[types.int64] * 7), generate
+
+    @overload(call)
+    def choose(address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
+        return lambda address, A, B, C, D, E, task: jump(address, A, B, C, D, E, task)
+
+    @overload(call_bound)
+    def choose_bound(words, task):  # type: ignore[no-untyped-def]
+        return lambda words, task: leap(words[0], words[1], words[2], words[3], words[4], words[5], types.int64(task))
+
+
+def register() -> None:
+    """Tell Numba of these types, and of calls."""
     from numba.core import types
 
     _structures(types)
     _arrays(types)
+    _calls(types)

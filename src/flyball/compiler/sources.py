@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from .kernels import formula
+from .formulas import formula
 
 PACKAGE = Path(__file__).parent.parent
 COMPILED = (

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import PerformanceNotice, warn
-from .kernels import Kernel
 from .machine import LoadedCode, baseline, triple
 from .notice import announce, note_compiled
 from .sources import PACKAGE, source_hash
@@ -35,7 +34,7 @@ class Loaded(NamedTuple):
     origin: str  # "shipped", "cache" or "compiled"
 
 
-def code_of(kernel: Kernel) -> Loaded:
+def code_of(kernel: Any) -> Loaded:
     """The code of a kernel: found, or compiled now and kept."""
     for origin, folder in folders():
         if (code := read(folder / file_name(kernel, baseline()))) is not None:
@@ -50,7 +49,7 @@ def code_of(kernel: Kernel) -> Loaded:
     return _loaded(code, "compiled")
 
 
-def is_known(kernel: Kernel) -> bool:
+def is_known(kernel: Any) -> bool:
     """Whether its code is in a file."""
     return any((folder / file_name(kernel, baseline())).is_file() for _, folder in folders())
 
@@ -93,12 +92,12 @@ def cache_folder() -> Path | None:
         return None
 
 
-def file_name(kernel: Kernel, cpu: str) -> str:
+def file_name(kernel: Any, cpu: str) -> str:
     """Name of the file of a kernel's code."""
     return f"{kernel.function.__qualname__}-{content_key(kernel, cpu)}.o"
 
 
-def content_key(kernel: Kernel, cpu: str) -> str:
+def content_key(kernel: Any, cpu: str) -> str:
     """A hash of all that a kernel's code depends on."""
     layouts = ", ".join(str(x) for x in kernel.parameters)
     text = f"{kernel.name} {kernel.first_order} ({layouts}) {triple()} {cpu} {source_hash(kernel.function)}"
@@ -133,7 +132,7 @@ def write(path: Path, code: bytes) -> None:
         raise
 
 
-def keep(kernel: Kernel, code: bytes) -> None:
+def keep(kernel: Any, code: bytes) -> None:
     """Leave code for other processes; where that cannot be, say so."""
     folder = cache_folder()
     if folder is None:

@@ -27,10 +27,9 @@ from numba.core.target_extension import (
     target_override,
     target_registry,
 )
-from numba.core.targetconfig import ConfigStack
 from numba.extending import overload as numba_overload
 
-from .kernels import OPTIONS
+from .formulas import OPTIONS
 
 NAME = "flyball"
 PASSES = (
@@ -98,6 +97,16 @@ class Context(cpu.CPUContext):
         self.is32bit = False
         self._internal_codegen = Codegen(NAME)
 
+    def load_additional_registries(self) -> None:
+        """What formulas use of Numba: numbers, loops, tuples, arrays, mathematics; no runtime."""
+        from numba.core import optional  # noqa: F401
+        from numba.cpython import builtins, cmathimpl, iterators, mathimpl, numbers, rangeobj, slicing, tupleobj
+        from numba.np import arraymath, arrayobj, npyimpl
+
+        assert builtins and iterators and numbers and rangeobj and slicing and tupleobj and arraymath and arrayobj
+        for of in (cmathimpl, mathimpl, npyimpl):
+            self.install_registry(of.registry)
+
     def post_lowering(self, mod: Any, library: Any) -> None:
         """Nothing is added to what was translated."""
 
@@ -149,7 +158,7 @@ class TypingContext(typing.Context):
             return super().resolve_function_type(func, args, kws)
         if isinstance(args[0], types.Number | types.Boolean):
             args = tuple(types.unliteral(x) for x in args)
-        key = func, tuple(args), ConfigStack.top_or_none()
+        key = func, tuple(args)
         found = self._signatures.get(key)
         if found is None:
             found = super().resolve_function_type(func, args, kws)

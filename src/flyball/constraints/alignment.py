@@ -7,7 +7,7 @@ which is all that a Newton iteration wants; they are never used for motion.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import atan2, sqrt
 from ..math.vec import col, cross, dot, mm, mtv, mv, neg, scale, transpose
 

@@ -5,7 +5,7 @@ With n across the axis it is half of a straight-line follower (Hahn's BB3); with
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import cross, dot, mv, sub
 
 KIND = 1

@@ -6,7 +6,7 @@ the whole turns are those that bring it next to ``hint``.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import atan2, divide, rounded
 from ..math.vec import add, col, cross, dot, neg, scale, sub
 

@@ -5,7 +5,7 @@ The row has no value; as a measured quantity its rate is a velocity along an axi
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import cross, dot, mv, sub
 
 KIND = 10

@@ -5,7 +5,7 @@ Three of them hold a point; their multipliers are the world components of the fo
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import dot, sub
 
 KIND = 0

@@ -7,7 +7,7 @@ where the corner comes to the end of a face: ``hint`` is its number, and stays d
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import absolute, cos, sin
 from ..math.vec import cross, dot, mtv, mv, sub
 from .along import row as along

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import choose, maximum, minimum, sqrt
 from ..math.spline import GRACE, spline
 from ..math.vec import cross, dot, mtv, mv, scale, sub

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import divide
 from ..math.vec import dot, norm, scale, sub
 

@@ -6,7 +6,7 @@ satisfy it and its gradient vanishes at 90 degrees, so assembly starts from ``al
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import cross, dot, mv, neg
 
 KIND = 2

@@ -11,7 +11,7 @@ a velocity: no slip along that direction, a non-holonomic constraint.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import sqrt
 from ..math.vec import add, col, cross, dot, mv, neg, scale, sub
 

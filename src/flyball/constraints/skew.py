@@ -7,7 +7,7 @@ are skew and offset (Hahn, *Rigid Body Dynamics of Mechanisms 1*, appendix A.4).
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import add, cross, dot, neg, scale, sub
 
 KIND = 7

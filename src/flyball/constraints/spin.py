@@ -5,7 +5,7 @@ The row has no value: angular velocities about axes in space are no derivatives 
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import cross, dot, mv, neg, sub
 
 KIND = 11

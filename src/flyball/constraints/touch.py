@@ -13,7 +13,7 @@ the one in the plane, z x n. Else they are the par[4]-th of the two axes across 
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import sqrt
 from ..math.vec import add, cross, dot, mtv, mv, neg, scale, sub
 

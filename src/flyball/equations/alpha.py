@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..compiler.kernels import formula, kernel
+from ..compiler.formulas import formula
+from ..compiler.kernels import kernel
 from ..math.scalar import atan, sqrt
 from ..numerics.integrators.implicit.desk import AlphaDesk
 from ..numerics.integrators.implicit.even import refuse
@@ -14,7 +15,7 @@ from ..tables.system import ComplexSystem, ComplexWork, System, Work
 from .asking import inspect
 from .callbacks import Going, Own
 from .implicit import PLAN, TURNS, Plan, arrive, compose, land, linearise, missed, perform, powers
-from .residual import Bench
+from .tasks import Bench
 
 
 class AlphaWorkshop(NamedTuple):

@@ -18,7 +18,7 @@ velocity d, U, D and 1 / D.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import positive
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, put3, put9, scale, sub, symmetric
 from ..tables.system import BODY_LAW, NV, PARENT, V0

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import call, call_bound, formula
+from ..compiler.formulas import call, call_bound, formula
 from ..numerics.integrators.clock import GROW, NEXT, SPAN, H, T
 from .tasks import ARRIVE, INSPECT, REPORT, TANGENT
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..compiler.layout import Int1
 from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watching import Watch
 from ..tables.system import G_SHARED, GUARD_KIND, LAM
 from .asking import GROUP, OWN, S_, SHEET, W_
-from .engine import Sheet
 from .sharing import Sharing, guard_of_group
+from .tasks import Sheet
 
 
 class Own(NamedTuple):

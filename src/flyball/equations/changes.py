@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.kernels import call, formula
+from ..compiler.formulas import call, formula
 from ..compiler.layout import Float1, Float2, Int1
 from ..math.scalar import absolute
 from ..tables.system import (

@@ -7,7 +7,7 @@ They are the first of the states z. What is measured is known once rows are, so 
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..laws.evaluation import evaluate
 from ..tables.system import CONTROL_RATE, RATE, VALUE
 

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..compiler.kernels import call, formula, kernel
+from ..compiler.formulas import call, formula
+from ..compiler.kernels import kernel
 from ..compiler.layout import Float1, Float2, Float3
 from ..numerics.integrators.clock import COUNTS, REALS, Clock, T
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.ldl import ldl_factor
 from ..numerics.weakest import strongest, weakest
 from ..tables.system import DIAGONAL, V1, System, Work
-from .engine import POSITION, Sheet, engine
+from .engine import POSITION, engine
+from .tasks import Sheet
 
 ADDED = 1e-13  # to the diagonal, where rows of unit length have 1
 

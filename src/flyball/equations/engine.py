@@ -6,12 +6,10 @@ the state in ``y[0]``. It never contains the right-hand side, so that it compile
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from ..compiler.kernels import formula, kernel
-from ..compiler.layout import Float2
+from ..compiler.formulas import formula
+from ..compiler.kernels import kernel
 from ..numerics.integrators.clock import COUNTS, GROW, NEXT, REALS, SPAN, STATES, Clock, H, T
 from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import advance, nothing, whole
@@ -39,6 +37,7 @@ from .tasks import (
     SOLVE,
     TANGENT,
     WATCH,
+    Sheet,
 )
 from .within import ROWS, inspect
 
@@ -105,12 +104,6 @@ def perform(S, W, R, clock, out, task):
         callbacks = (answer, (derivative, arrive, tangent, inspect), report, nothing, whole)
         return advance(callbacks, S, W, R, clock, out)
     return 0
-
-
-class Sheet(NamedTuple):
-    """Where the engine writes."""
-
-    rows: Float2
 
 
 @kernel

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiler.buffers import StructBuffer
-from ..compiler.kernels import BoundKernel, formula, kernel
+from ..compiler.formulas import formula
+from ..compiler.kernels import BoundKernel, kernel
 from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import TRY
 from ..numerics.integrators.tableaux import Tableau

@@ -7,7 +7,7 @@ branch. Rows are written for all times that were stepped on, with the powers of 
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..laws.evaluation import evaluate_jet
 from ..laws.manner import entire
 from ..math.scalar import atan2, cos, magnitude, sin

@@ -8,7 +8,7 @@ before that there is none: friction outweighs what causes it and the joint jams.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..constraints.modes import STATIC
 from ..forces.joint_friction import load as pressed
 from ..math.scalar import sign

@@ -17,7 +17,7 @@ A guard that means nothing in the present mode is nan. Modes and ways stand in `
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..constraints.modes import BY_RATE, FROZEN, RATCHET, STATIC, TURN
 from ..laws.evaluation import evaluate, evaluate_jet
 from ..laws.opcodes import BY_TIME, SENSOR

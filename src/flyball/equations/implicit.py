@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.kernels import call, formula, kernel
+from ..compiler.formulas import call, formula
+from ..compiler.kernels import kernel
 from ..compiler.layout import Float1, Int1, Int2
 from ..math.cayley import rate
 from ..numerics.integrators.clock import ASIDE, NOW, STARTED, TRIED, T
@@ -40,9 +41,8 @@ from .asking import OWN, S_, SHEET, W_, inspect, through
 from .asking import arrive as arrive_there
 from .callbacks import Going, Own, meet
 from .dispatch import progress
-from .residual import Bench
 from .rows import way_of
-from .tasks import PARTS, POSITION, PUSHES, RESIDUAL, STEPS, WATCH
+from .tasks import PARTS, POSITION, PUSHES, RESIDUAL, STEPS, WATCH, Bench
 from .tree import retract
 
 STEP = 1e-40

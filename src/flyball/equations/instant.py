@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.kernels import call, formula, kernel
+from ..compiler.formulas import call, formula
+from ..compiler.kernels import kernel
 from ..compiler.layout import Float1, Float2, Int1
 from ..math.scalar import magnitude, sqrt
 from ..numerics.cone.dense.problem import ENDED, FOUND, NONE_FOUND, Dense
@@ -37,10 +38,9 @@ from ..tables.system import (
     Work,
 )
 from .dispatch import effort
-from .engine import Sheet
 from .friction import reaction_loads
 from .loads import law, wide
-from .tasks import MOTION, SOLVE
+from .tasks import MOTION, SOLVE, Sheet
 
 IMPULSES, TRIED = range(2)  # entries of Bench.asks: what x is; how often it was solved
 FORCES, BLOWS, OF_A_STEP = range(3)  # what x is: forces, impulses in no time, or those of a short step of time

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import load3, load9
 from ..tables.system import FRAMES, GROUND_FRAMES
 from .records import at_rest, carried, load, store_motion, store_pose

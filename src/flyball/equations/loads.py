@@ -6,7 +6,7 @@ Gravity and gyroscopic terms are the inertial wrench of the bias accelerations.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..constraints.modes import BY_RATE
 from ..laws.evaluation import evaluate
 from ..math.scalar import magnitude, sign

@@ -22,7 +22,7 @@ d), four arrays among them, and returns a float:
 
 from __future__ import annotations
 
-from ..compiler.kernels import by_address, formula, when_compiling
+from ..compiler.formulas import formula, when_compiling
 from ..tables.system import FLAT, MADE, SCRATCH, STABILIZE
 from .tasks import COMPLETE, FOLLOW, INTEGRATE
 
@@ -75,6 +75,4 @@ def _register() -> None:
     def choose(address, S, W, t, a, b, c, d):  # type: ignore[no-untyped-def]
         if isinstance(a.dtype, types.Complex):
             return lambda address, S, W, t, a, b, c, d: 0.0
-        if isinstance(S, types.BaseTuple):  # a loop that does not hand them over by address
-            return lambda address, S, W, t, a, b, c, d: jump(address, by_address(S), by_address(W), t, a, b, c, d)  # type: ignore[call-arg]
         return lambda address, S, W, t, a, b, c, d: jump(address, S, W, t, a, b, c, d)  # type: ignore[call-arg]

@@ -7,7 +7,8 @@ out. What that is nobody needs to know here: bits are copied.
 
 from __future__ import annotations
 
-from ..compiler.kernels import call_bound, kernel, when_compiling
+from ..compiler.formulas import call_bound, when_compiling
+from ..compiler.kernels import kernel
 from ..compiler.layout import Int1, Int2
 
 

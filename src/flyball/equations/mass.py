@@ -8,7 +8,7 @@ diagonal and none of this runs.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import add, cross, dot, load3, load9, put3, scale, sub, symmetric
 from ..tables.system import INERTIA, MASS, NV, PARENT, POINT, REVOLUTE, TREE, V0
 from .tree import column

@@ -6,7 +6,7 @@ projection P, along M^-1 G^T or along dependent coordinates; the integrator sees
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..laws.call import STACK_RESERVE
 from ..laws.evaluation import evaluate_jet
 from ..math.scalar import atan2, cos, magnitude, sin

@@ -7,7 +7,7 @@ independent ones stay as the integrator has them.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import magnitude
 from ..tables.system import EXCHANGES, F_APPLIED, PARTITION, R2, RESIDUAL, V3
 from .solve import REFINEMENTS, factor, solve

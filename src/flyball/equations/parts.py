@@ -7,7 +7,7 @@ Jacobian takes as many evaluations as the widest part has velocities.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import load3
 from ..tables.system import (
     ALONG,

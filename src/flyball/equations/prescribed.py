@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..laws.evaluation import evaluate_jet
 from ..tables.system import BODY_LAW, GIVEN, MADE, OFFSET, PREPARE, Q0, V0
 from .made import run

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import larger, magnitude
 from ..tables.system import (
     BODY_LAW,

@@ -5,7 +5,7 @@ Behind the loads of joints; which columns there are, and what they are made of, 
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import sqrt
 from ..tables.system import EFFORT, LAM, VALUE
 from .control import column_of

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import add, cross, load3, load9, mm, mv, put3, put9
 
 WIDTH = 24

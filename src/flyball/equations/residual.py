@@ -9,13 +9,13 @@ Newton-Euler: Luh, Walker and Paul 1980; Featherstone 2008, section 5.3), so no 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..compiler.buffers import StructBuffer
-from ..compiler.kernels import first_order_kernel, formula
-from ..compiler.layout import Complex1, Complex2
+from ..compiler.formulas import formula
+from ..compiler.kernels import first_order_kernel
 from ..math.vec import add, cross, load3, load9, mv, put3, scale, sub
 from ..tables.system import (
     BIAS,
@@ -48,20 +48,8 @@ from .loads import efforts, forces, gather, inertial
 from .parts import parts, pushes
 from .prescribed import prepare
 from .rows import measured, row_times
-from .tasks import ALONG, GAPS, PARTS, PUSHES, STEPS
+from .tasks import ALONG, GAPS, PARTS, PUSHES, STEPS, Bench
 from .tree import column, motion, pose, retract
-
-
-class Bench(NamedTuple):
-    """A state, steps from it, and what the residuals are there; all complex."""
-
-    t: Complex1  # (1,) [s]
-    state: Complex1  # (nq + nv + nz,)
-    vdot: Complex1  # (nv,)
-    lam: Complex1  # (nr,)
-    steps: Complex2  # (n, 3 nv + 1): of positions (along the velocities), velocities, accelerations, and of time;
-    # behind these, if there are more, of states of controllers
-    out: Complex2  # (n, nv + 3 nr + 3 nm), or more: what x' = f misses of these where they do not change
 
 
 @formula

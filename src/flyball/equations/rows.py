@@ -9,7 +9,7 @@ value_k - f(t, s): the sensors' gradients times df/ds are taken from the row.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..laws.evaluation import evaluate_jet
 from ..math.scalar import atan2, cos, sin
 from ..math.vec import add, cross, load3, neg, put3, scale, sub

@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.kernels import call, formula, kernel
+from ..compiler.formulas import call, formula
+from ..compiler.kernels import kernel
 from ..compiler.layout import Float1, Float2, Int1, Int2
 from ..laws.evaluation import evaluate
 from ..numerics.integrators.clock import (
@@ -43,8 +44,8 @@ from ..numerics.integrators.clock import (
 from ..numerics.integrators.tableaux import Tableau
 from ..tables.system import COORDINATES, VALUE, System, Work
 from .control import column_of
-from .engine import Sheet, engine
-from .tasks import INTEGRATE, MOTION
+from .engine import engine
+from .tasks import INTEGRATE, MOTION, Sheet
 
 PERIOD, OFFSET = range(2)  # columns of Samples.clock
 SAMPLED, STATE, LAW, LATER = range(4)  # columns of Samples.row: clock, state, law, whether it waits for all others

@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.kernels import call, formula, kernel
+from ..compiler.formulas import call, formula
+from ..compiler.kernels import kernel
 from ..compiler.layout import Float1, Float2, Int1
 from ..constraints.modes import FRICTION, SLIP
 from ..math.scalar import magnitude, sqrt
@@ -37,10 +38,9 @@ from ..tables.system import (
     System,
     Work,
 )
-from .engine import Sheet
 from .guards import most
 from .rows import way_of
-from .tasks import SOLVE
+from .tasks import SOLVE, Sheet
 
 BALANCED = 1e-12  # of its terms: what the forces of a null vector leave
 GRAIN = 1e-10  # of the largest force: rounding of the guard

@@ -6,7 +6,7 @@ slides is pushed by -mu N d, N being the multiplier of the gap and d the directi
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import exp, sqrt
 from ..tables.system import (
     FORCE_F,

@@ -7,7 +7,7 @@ otherwise shifts and turns of M along F's axes.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import add, col, cross, dot, norm, scale, sub
 from ..tables.system import FORCE_ALONG, FORCE_F, FORCE_KIND, FORCE_LOAD, FORCE_M, LENGTH, LOAD, RATE, VALUE
 from .dispatch import effort, inputs, wrench

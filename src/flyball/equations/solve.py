@@ -12,7 +12,7 @@ few passes, while what is left undetermined grows by no more than passes * s / d
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import choose, larger, magnitude, minimum
 from ..math.vec import load9, mv
 from ..numerics.ldl import ldl_factor, ldl_solve

@@ -11,7 +11,7 @@ do; they bear in proportion to what they can.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..constraints.modes import BRANCH
 from ..laws.evaluation import evaluate_jet
 from ..tables.system import (

@@ -11,7 +11,7 @@ A tree joint must say: its ``pose`` and ``motion``, its world twist columns (``c
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.cayley import quaternion
 from ..math.scalar import cos, divide, sin, sqrt
 from ..math.vec import (

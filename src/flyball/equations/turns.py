@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..constraints.angle import row as angle
 from ..math.vec import dot, sub
 from ..tables.system import TERM_F, TERM_HINT, TERM_M

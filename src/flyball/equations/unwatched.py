@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..compiler.buffers import JoinedBuffer, StructBuffer, StructPool
-from ..compiler.kernels import BoundKernel, formula, kernel
+from ..compiler.formulas import formula
+from ..compiler.kernels import BoundKernel, kernel
 from ..compiler.layout import Float2, Int1
 from ..numerics.integrators.clock import COUNTS, REALS, Clock
 from ..numerics.integrators.loop import advance, nothing, whole
@@ -19,9 +20,10 @@ from ..tables.specs import Structure
 from ..tables.system import System, Work
 from .asking import report, steps
 from .callbacks import Going, Own
-from .engine import Sheet, engine
+from .engine import engine
 from .scratch import tables
 from .sharing import sharing
+from .tasks import Sheet
 from .watched import idle_tableau, idle_watch
 
 MOST = 4  # layouts of a structure that are known

@@ -12,7 +12,8 @@ engine and of the residuals.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula, kernel
+from ..compiler.formulas import formula
+from ..compiler.kernels import kernel
 from ..compiler.layout import Float2
 from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.explicit import answer
@@ -21,9 +22,7 @@ from ..numerics.integrators.tableaux import Tableau
 from ..tables.system import BODY_LAW, ComplexSystem, ComplexWork, System, Work
 from .asking import OWN, S_, SHEET, W_, inspect, through
 from .changes import COUNT, NQ, NZ, POWERS, Plan, change, closed, press, settle_at
-from .engine import Sheet
-from .residual import Bench
-from .tasks import ARRIVE, MOTION, REPORT, TANGENT
+from .tasks import ARRIVE, MOTION, REPORT, TANGENT, Bench, Sheet
 
 
 @formula

@@ -5,7 +5,8 @@ In absolute coordinates: masses are constant, bodies are coupled by rows and for
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula, kernel
+from ..compiler.formulas import formula
+from ..compiler.kernels import kernel
 from ..math.cayley import bent
 from ..math.scalar import sqrt, tan
 from ..math.vec import add, cross, dot, load9, mv, scale, sub

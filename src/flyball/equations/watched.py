@@ -13,7 +13,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..compiler.buffers import PooledBuffer, StructBuffer
-from ..compiler.kernels import BoundKernel, formula, kernel
+from ..compiler.formulas import formula
+from ..compiler.kernels import BoundKernel, kernel
 from ..compiler.layout import Float2, Int1
 from ..numerics.cone.shares import OPEN
 from ..numerics.integrators.clock import Clock, T
@@ -43,7 +44,7 @@ from ..tables.system import (
 )
 from .asking import ENGINE, GROUP, OWN, R_, S_, SHEET, W_, put, report, steps, through
 from .callbacks import Going, Own, levels
-from .engine import Sheet, engine
+from .engine import engine
 from .guards import FIRM, KEPT, astray, grains
 from .guards import watch as guards
 from .pace import quickest
@@ -52,7 +53,7 @@ from .sampled import Samples, Sampling
 from .sampled import advance as from_instant_to_instant
 from .scratch import tables
 from .sharing import GRAIN, Sharing, guard_of_group, renewed, shares
-from .tasks import MOTION
+from .tasks import MOTION, Sheet
 
 EXPECTED = 7
 LEFT = 1e-10  # of `Watch.tied`, of the fastest rate: what rows that hold leave of others

@@ -13,7 +13,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..forces import BRANCHES
 from ..laws.evaluation import evaluate, evaluate_jet
 from ..laws.manner import brief

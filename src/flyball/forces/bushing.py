@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..errors import ModelError
 from ..math.rotation import log_gradient, rotation_vector
 from ..math.scalar import choose

@@ -8,7 +8,7 @@ from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..constraints.modes import FRICTION
 from ..errors import ModelError
 from ..math.scalar import choose

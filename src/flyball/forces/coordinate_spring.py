@@ -6,7 +6,7 @@ from dataclasses import field
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..errors import ModelError
 from ..model.element import Law, LawOf, Number, Unit, element, nonnegative
 from ..model.force import CoordinateForce

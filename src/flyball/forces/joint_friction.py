@@ -7,7 +7,7 @@ from dataclasses import field, replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..constraints.modes import FRICTION
 from ..errors import ModelError
 from ..math.scalar import absolute, choose, exp, sqrt, tanh

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..constraints.modes import ELASTIC, FROZEN, STOP
 from ..errors import ModelError
 from ..math.scalar import choose, maximum

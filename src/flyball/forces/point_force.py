@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Annotated, ClassVar, Literal
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..errors import ModelError
 from ..math.vec import mv
 from ..model.element import Element, Law, LawOf, Laws, Point, element

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Annotated, ClassVar, Literal
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..errors import ModelError
 from ..model.element import Law, LawOf, Laws, element
 from ..model.force import BodyForce

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BeforeValidator
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..constraints.blocks import DISTANCE, Row
 from ..constraints.modes import ELASTIC, FROZEN, STOP
 from ..errors import ModelError

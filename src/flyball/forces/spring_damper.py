@@ -6,7 +6,7 @@ import math
 from types import SimpleNamespace
 from typing import Annotated, ClassVar
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import absolute, choose, divide, unless_zero
 from ..math.vec import add, dot, neg, norm, scale, sub
 from ..model.element import Damping, Law, LawOf, Length, Stiffness, element, nonnegative

@@ -11,7 +11,7 @@ import math
 from typing import Any
 from weakref import WeakValueDictionary
 
-from ..compiler.kernels import formula, when_compiling
+from ..compiler.formulas import formula, when_compiling
 from .opcodes import ADDRESS, COUNT, INDEX
 
 STACK_RESERVE = 3

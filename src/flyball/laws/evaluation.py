@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import (
     absolute,
     acos,

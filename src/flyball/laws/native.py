@@ -18,7 +18,7 @@ from weakref import WeakKeyDictionary, WeakValueDictionary, ref
 
 import numpy as np
 
-from ..compiler.kernels import LOCK, start_compiler
+from ..compiler.formulas import LOCK
 from ..errors import PerformanceNotice, warn
 from ..model.function import MOST, Call, function_name
 from .call import NATIVE
@@ -95,7 +95,6 @@ def native(asked: Call) -> Native:
 
 def _compiled(function: FunctionType, count: int) -> Any:
     """The function compiled by Numba, behind the calling convention of `call`; a failure leaves nan."""
-    start_compiler()
     from numba import carray, cfunc, config, types
     from numba.core.errors import NumbaWarning
 

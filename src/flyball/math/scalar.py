@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.kernels import formula, when_compiling
+from ..compiler.formulas import formula, when_compiling
 
 Function = Callable[..., Any]
 

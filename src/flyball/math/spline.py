@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.kernels import formula, when_compiling
+from ..compiler.formulas import formula, when_compiling
 
 GRACE = 1e-9  # part of a table's width by which rounding may go beyond its ends
 BREAKS = 2  # place of the first break

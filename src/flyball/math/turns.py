@@ -7,7 +7,7 @@ these axes are the columns of the kinematic matrix H in w = H (adot, bdot, cdot)
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from .scalar import cos, divide, sin
 from .vec import add, cross, dot, mtv, mv, quaternion_product, scale
 

@@ -6,7 +6,7 @@ numbers, on arrays over time and on symbols.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from .scalar import sqrt
 
 

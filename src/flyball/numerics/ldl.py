@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.kernels import formula, kernel
+from ..compiler.formulas import formula
+from ..compiler.kernels import kernel
 from ..compiler.layout import Float1, Int1
 from ..math.scalar import nonzero
 from .dissection import minimum_degree, nested_dissection

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.kernels import formula, kernel
+from ..compiler.formulas import formula
+from ..compiler.kernels import kernel
 from ..compiler.layout import Int1
 from ..math.scalar import nonzero
 

@@ -8,7 +8,7 @@ would blur (Golub and Van Loan 2013, sections 7.3 and 8.2).
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from .ldl import ldl_solve
 
 MOST, LEAST = 50, 2  # iterations

@@ -14,7 +14,7 @@ What is hit may reach something else within the same step: impacts go in rounds 
 
 from __future__ import annotations
 
-from ..compiler.kernels import call, formula
+from ..compiler.formulas import call, formula
 from ..contact.surfaces import RESTITUTION
 from ..contact.tables import FOUND, GAP, MATERIAL, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt

@@ -6,7 +6,7 @@ one solve with the factor of the joints; groups know nothing of each other, so t
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.vec import add, load3
 from ..numerics.cone.problem import NONE
 from .implicit import climb, respond, stiffened

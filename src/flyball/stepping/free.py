@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..equations.mass import turned as turned_inertia
 from ..math.scalar import cos, sin, sqrt
 from ..math.turns import reciprocal

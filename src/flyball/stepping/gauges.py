@@ -7,7 +7,7 @@ themselves resist.
 
 from __future__ import annotations
 
-from ..compiler.kernels import call, formula
+from ..compiler.formulas import call, formula
 from ..equations.records import load
 from ..equations.tasks import POSITION
 from ..equations.tree import retract

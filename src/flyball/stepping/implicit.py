@@ -15,7 +15,7 @@ M + J' A J, with A = h^2 k b' + h c (1 + b) / 2, is inverted by Sherman, Morriso
 
 from __future__ import annotations
 
-from ..compiler.kernels import call, formula
+from ..compiler.formulas import call, formula
 from ..equations.records import load
 from ..equations.slopes import DAMPING, DIRECTIONS, STIFFNESS, direction
 from ..equations.solve import inverse_mass

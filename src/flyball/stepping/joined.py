@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..compiler.layout import Float1, Float2, Int1, Int2
-from ..equations.engine import Sheet
+from ..equations.tasks import Sheet
 from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.ldl import Pattern

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import call, formula, kernel
+from ..compiler.formulas import call, formula
+from ..compiler.kernels import kernel
 from ..contact.tables import Contacts, Movers
 from ..equations.rows import row_times
 from ..equations.tasks import ARRIVE, MOTION, POSITION, SOLVE

@@ -8,7 +8,7 @@ themselves take nothing at joints, so that it is the method's.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..equations.rows import row_times
 from ..math.vec import dot, load3, load9, mtv, mv
 from ..tables.system import INERTIA, MASS, NU

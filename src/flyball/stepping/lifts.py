@@ -6,7 +6,7 @@ and with them their contacts. The lifts are found again with the gaps that this 
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..contact.tables import FOUND, MOVER, SHAPE_1, SHAPE_2
 from ..math.vec import add, cross, dot, load3, load9, mm, sub, transpose
 from ..numerics.cone.operator import seen

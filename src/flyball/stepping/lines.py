@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..equations.friction import dry, held_at_rest, reaction_loads
 from ..numerics.cone.problem import BIAS, HIGH, LOW, SOFT
 from ..tables.system import BIAS as BEND_OF

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import by_address, call, formula, kernel
+from ..compiler.formulas import call, formula
+from ..compiler.kernels import kernel
 from ..contact.broad.desk import Search
 from ..contact.broad.search import FASTER, MIDWAY
 from ..contact.broad.search import STEP as STEP_ON
@@ -440,7 +441,4 @@ def march_kernel(
     U: Tracks,
 ) -> int:
     """Take ``pace.count[LEFT]`` steps. Returns what the search said last, NO_ROOM, NO_WAY, or TOO_LONG."""
-    return march(
-        by_address(G), by_address(A), by_address(M), by_address(C), by_address(D), by_address(H), by_address(B), by_address(P), by_address(Q), by_address(R), by_address(X), by_address(Y),
-        by_address(Z), by_address(E), by_address(W), by_address(O), by_address(F), by_address(N), by_address(L), by_address(pace), by_address(T), by_address(U),
-    )  # fmt: skip
+    return march(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import sqrt
 from ..math.vec import add, dot, load3, load9, mtv, mv, put3, put9, quaternion_matrix, symmetric
 from ..numerics.cone.operator import block_at

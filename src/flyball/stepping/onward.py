@@ -14,7 +14,7 @@ of the step but for what its rows change by. The same holds along the tangents o
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..contact.tables import BEFORE, FEATURE, FOUND, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ..math.scalar import cos, sin
 from ..math.vec import add, cross, dot, load3, load9, mm, norm, put3, put9, quaternion_matrix, scale, sub

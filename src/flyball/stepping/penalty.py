@@ -14,7 +14,7 @@ u + bias + soft p >= 0. Displacements end at the overlaps b.
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..contact.kinds import SPHERE
 from ..contact.surfaces import DAMPING, DISSIPATION, EXPONENT, MODULUS, STIFFNESS
 from ..contact.tables import BEFORE, FOUND, GAP, KIND, MATERIAL, PAR, SHAPE_1, SHAPE_2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..math.scalar import sqrt
 from ..math.vec import dot, load3, put3
 from ..numerics.cone.operator import across, seen_turning

@@ -7,7 +7,7 @@ impact in two parts, each inelastic along the tangents).
 
 from __future__ import annotations
 
-from ..compiler.kernels import formula
+from ..compiler.formulas import formula
 from ..contact.tables import FOUND, GAP
 from ..math.scalar import sqrt
 from ..numerics.cone.diagonal import diagonal

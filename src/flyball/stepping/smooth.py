@@ -8,7 +8,7 @@ linearly on itself is as good as GMRES; springs and dampers that are stiff are s
 
 from __future__ import annotations
 
-from ..compiler.kernels import call, formula
+from ..compiler.formulas import call, formula
 from ..equations.tasks import MOTION
 from ..equations.tree import retract
 from ..math.scalar import sqrt

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from ..numerics.cone.choose import SMALL_ISLANDS, Auto
 from ..numerics.cone.problem import Choices, Problem, Scratch, State
 from ..numerics.cone.registry import ready
 from .tables import BOUNCE, POSITIONS, VELOCITIES, Pace
 
 
 class Solvers(NamedTuple):
-    """What each problem's solver wants in place of ``Factor``."""
+    """The rooms of each problem's solver."""
 
-    velocities: Any
-    positions: Any
-    impacts: Any
+    velocities: Auto
+    positions: Auto
+    impacts: Auto
 
 
 def solvers(
@@ -25,10 +26,10 @@ def solvers(
     """A solver for velocities, positions and impacts; its addresses go to ``pace.door``."""
     found = [ready(name, P, X, W, O) for P in problems]
     for place, one in zip((VELOCITIES, POSITIONS, BOUNCE), found, strict=True):
-        pace.door[place] = one.address
+        pace.door[place] = one.kernel.address
     return Solvers(*(one.F for one in found))
 
 
 def told(F: Solvers) -> np.ndarray:
     """What the solver of velocities picked, added up: see ``choose.py``; empty where there was nothing to pick."""
-    return getattr(F.velocities, "told", np.zeros(0, np.int64))
+    return F.velocities.told if F.velocities.doors[SMALL_ISLANDS] else np.zeros(0, np.int64)

@@ -15,8 +15,9 @@ import numpy as np
 
 from ...equations import residual
 from ...equations.changes import POWERS, Plan
-from ...equations.engine import FOLLOW, Sheet, engine
+from ...equations.engine import FOLLOW, engine
 from ...equations.scratch import work
+from ...equations.tasks import Sheet
 from ...equations.variation import variation_kernel
 from ...errors import SimulationError
 from ...laws.functions import forget

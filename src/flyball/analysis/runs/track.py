@@ -10,9 +10,10 @@ import numpy as np
 
 from ...compiler.buffers import StructBuffer, StructPool
 from ...compiler.kernels import BoundKernel
-from ...equations.engine import Sheet, engine
+from ...compiler.layout import Number1, Number2
+from ...equations.engine import engine
 from ...equations.many import one_after_another
-from ...equations.tasks import COMPLETE
+from ...equations.tasks import COMPLETE, Sheet
 from ...numerics.integrators.clock import Clock
 from ...numerics.integrators.tableaux import Tableau
 from ...tables.system import LATER, Work
@@ -24,13 +25,13 @@ from .spread import TABLES, Place
 class Numbers(NamedTuple):
     """Tables of numbers in `System`: see there."""
 
-    force_x: np.ndarray
-    const: np.ndarray
-    body_x: np.ndarray
-    glob: np.ndarray
-    frame_x: np.ndarray
-    term_x: np.ndarray
-    switch_x: np.ndarray
+    force_x: Number2
+    const: Number1
+    body_x: Number2
+    glob: Number1
+    frame_x: Number2
+    term_x: Number2
+    switch_x: Number2
 
 
 class Memory(NamedTuple):
@@ -150,7 +151,7 @@ class Track:
         self, own: tuple[np.ndarray, np.ndarray], ends: np.ndarray, told: np.ndarray, out: np.ndarray
     ) -> int:  # fmt: skip
         """Runs one after the other; see `one_after_another`."""
-        return int(one_after_another(self._bound.asked, self.task, self._then, self._made, self._cells, self._new,
+        return int(one_after_another(self._bound.words, self.task, self._then, self._made, self._cells, self._new,
                                      own[0], own[1], ends, told, out))  # fmt: skip
 
     def completes(self) -> None:
@@ -158,7 +159,7 @@ class Track:
         S, W, method, _, sheet = self._given
         self._complete = BoundKernel(engine, S, W, method, StructBuffer(standing(self.clock.y.shape[1])), sheet)
         cell = self.cells(self.arrays["option"])[LATER]
-        self._then = np.array([*self._complete.asked, cell, COMPLETE], np.int64)
+        self._then = np.array([*self._complete.words, cell, COMPLETE], np.int64)
 
     def complete(self) -> bool:
         """Do so for the run in memory; whether there are such."""

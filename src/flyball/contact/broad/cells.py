@@ -7,7 +7,7 @@ shapes, whatever their sizes (after Eitz and Gu 2007, "Hierarchical spatial hash
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .desk import (
     BASE,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .desk import ANY, BALL_FLAT, BALLS, HALF, LISTED, SHAPE
 from .others import others
 from .rounds import balls, flat_ball

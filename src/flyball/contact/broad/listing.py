@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .cells import cell, crowded, level_for, link, name, place, unlink, window
 from .desk import (
     ANY,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ..tables import MASK, MEMBER
 from .desk import MIDDLE, MOVES, ROUND, SHAPE, SIZE, TOLD, WHOLE
 from .envelopes import bodies_meet

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.vec import add, dot, load3, norm, scale, sub
 from ..tables import AHEAD, MARGIN
 from .carried import velocity

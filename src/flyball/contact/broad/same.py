@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ..tables import FEATURE, FOUND, POINT, SHAPE_1, SHAPE_2
 from .desk import KEPT
 

@@ -13,7 +13,8 @@ others; they are put back.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula, kernel
+from ...compiler.formulas import formula
+from ...compiler.kernels import kernel
 from ..tables import (
     AHEAD,
     DONE,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ..kinds import SPHERE
 from ..tables import AHEAD, KIND, MOVER
 from .cells import cell, cell_of, lay_out, place, size_of

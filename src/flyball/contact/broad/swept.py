@@ -8,7 +8,7 @@ along the normals found there.
 
 from __future__ import annotations
 
-from ...compiler.kernels import call, formula
+from ...compiler.formulas import call, formula
 from ...math.scalar import cos, sin
 from ...math.vec import add, load3, load9, mm, norm, put3, put9, quaternion_matrix, scale
 from ..tables import AHEAD, MARGIN

@@ -5,7 +5,7 @@ What is no plane lies below one: its top.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ...math.vec import add, load3, put3, scale
 from ..tables import AHEAD, AXES, MARGIN, PLACE, SKIN

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ..tables import AHEAD, SKIN
 from .desk import AT, BALL, BOUNDED, DRIFT, DRIFTS, FORM, LAG, MOVED, MOVES, SHAPE, STRIDE, USUAL, WIDE
 from .envelopes import STEPS, axes_now, locate, within

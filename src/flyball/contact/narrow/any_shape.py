@@ -5,7 +5,7 @@ A shape of an unknown kind has its surface nowhere (nan).
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...compiler.sources import ladder
 from ...math.vec import put3
 from .shapes.registry import SHAPES

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import inf
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...compiler.sources import generated
 from ...math.vec import add, dot, load3, load9, mm, mv, sub
 from ..kinds import FIELD, PLANAR

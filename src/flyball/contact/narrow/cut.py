@@ -6,7 +6,7 @@ those of the other face follow from `CORNERS` on. The two edges that meet in a p
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .room import CORNERS, CUT_1, CUT_2
 

@@ -7,7 +7,7 @@ whatever rounding does: faces that see the new corner go, their edges without co
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import absolute, sqrt
 from ...math.vec import cross, dot, load3, neg, put3, scale, sub
 from .gjk import reach

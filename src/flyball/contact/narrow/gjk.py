@@ -8,7 +8,7 @@ when these meet, when a step brings nothing (rounding), or after `MOST` steps: n
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ...math.vec import add, dot, load3, mtv, mv, neg, put3, scale, sub
 from .cores import farthest

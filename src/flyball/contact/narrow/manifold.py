@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from math import inf
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.vec import add, axes_across, dot, mtv, neg, put3, scale
 from ..tables import KIND, RADIUS
 from .any_shape import face, radius

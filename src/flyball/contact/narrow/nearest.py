@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.vec import add, dot, mm, mtv, mv, scale, sub, transpose
 from ..tables import KIND
 from .any_shape import radius

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.vec import cross, dot, load3, put3, sub
 from .room import LIMIT, PIECE
 from .shapes.field import grid, knot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ...math.vec import add, load3, mm, mtv, mv, neg, scale, sub, transpose
 from ..tables import COUNT, FIRST

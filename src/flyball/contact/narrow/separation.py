@@ -9,7 +9,7 @@ curved shapes too; how deep ones overlap least of all is asked of the polytope f
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.vec import add, dot, load3, norm, put3, scale, sub
 from .epa import ROWS as POLYTOPE
 from .epa import deepest

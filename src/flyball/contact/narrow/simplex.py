@@ -7,7 +7,7 @@ normal, which keeps its direction where it is close to the origin.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.vec import add, cross, dot, load3, scale, sub
 
 FLAT = 1e-26  # square of a sine below which three points are on a line, four in a plane

@@ -8,7 +8,7 @@ iteration takes one product. What is kept of all iterates is the one whose step 
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .passes import act, backward, forward
 from .problem import CONVERGED, COULOMB, CUT, ENDED, ENOUGH, HISTORY, MOST

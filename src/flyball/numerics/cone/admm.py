@@ -9,7 +9,8 @@ the convex problem that they make is nearly solved.
 
 from __future__ import annotations
 
-from ...compiler.kernels import by_address, formula, kernel
+from ...compiler.formulas import by_address, formula
+from ...compiler.kernels import kernel
 from .blocks import factor, solve
 from .fill import fill_rows, hand_back, make_safe, residual, set_own, set_slips, span_of
 from .gather import BLOCKS, ROWS

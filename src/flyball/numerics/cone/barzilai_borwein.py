@@ -8,7 +8,8 @@ velocity.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula, kernel
+from ...compiler.formulas import formula
+from ...compiler.kernels import kernel
 from ...math.scalar import sqrt
 from .passes import backward, forward
 from .problem import (

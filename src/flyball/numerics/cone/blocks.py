@@ -8,7 +8,7 @@ is no pivoting: matrices here are 1 and something positive semidefinite, or not 
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 
 SIX, BLOCK = 6, 36
 

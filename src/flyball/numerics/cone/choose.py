@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...compiler.kernels import by_address, call, formula, kernel
+from ...compiler.formulas import by_address, call, formula
+from ...compiler.kernels import kernel
 from ...compiler.layout import Float1, Int1
 from .islands import Islands, find_islands
 from .problem import (

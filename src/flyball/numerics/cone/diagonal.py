@@ -5,7 +5,7 @@ A symmetric block is six numbers: nn, ns, nt, ss, st, tt.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.vec import cross, dot, load3
 from .operator import turned
 from .problem import NONE

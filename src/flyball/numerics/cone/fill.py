@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .gather import BEFORE_TURNING, BLOCKS, CONTACTS, ROWS, what
 from .operator import push, push_line, push_turning, seen, seen_line, seen_turning

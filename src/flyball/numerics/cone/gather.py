@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...compiler.layout import Float1, Int1
 from ...math.scalar import sqrt
 from .problem import NONE

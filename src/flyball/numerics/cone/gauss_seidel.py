@@ -7,7 +7,8 @@ where that would be worse than no impulse at all: p' N p / 2 + b' p is never abo
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula, kernel
+from ...compiler.formulas import formula
+from ...compiler.kernels import kernel
 from .ending import finish
 from .operator import push_line
 from .pack import (

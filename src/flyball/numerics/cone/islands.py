@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiler.kernels import formula, kernel
+from ...compiler.formulas import formula
+from ...compiler.kernels import kernel
 from ...compiler.layout import Int1, Int2
 from ..forest import root, unite
 from .problem import NONE

@@ -7,7 +7,8 @@ one here that needs no order of contacts.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula, kernel
+from ...compiler.formulas import formula
+from ...compiler.kernels import kernel
 from ...math.scalar import sqrt
 from .pack import B_IN, B_IT, BALL, IN, SLIDE
 from .passes import backward, forward

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import by_address, formula
+from ...compiler.formulas import by_address, formula
 from .blocks import columns, eliminate, entry_of, join
 from .gather import (
     BEFORE_TURNING,

@@ -11,7 +11,8 @@ get closer. Coulomb's law: De Saxce's addition mu |u_t| to the normal velocity i
 
 from __future__ import annotations
 
-from ...compiler.kernels import by_address, formula, kernel
+from ...compiler.formulas import by_address, formula
+from ...compiler.kernels import kernel
 from ...math.scalar import sqrt
 from .blocks import factor, solve
 from .fill import fill_rows, hand_back, make_safe, residual, set_own, set_slips, span_of

@@ -6,7 +6,7 @@ normal, about the two tangential axes. ``v`` (nn, 6 or more) and ``wide`` are an
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.vec import add, cross, load3, load9, mtv, mv, neg, put3, scale, sub, symmetric
 from .problem import BLOCK, NONE, SOFT
 

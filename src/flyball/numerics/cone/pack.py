@@ -7,7 +7,7 @@ once.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from ...math.vec import cross, dot
 from .diagonal import axis, diagonal

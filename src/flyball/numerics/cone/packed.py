@@ -6,7 +6,7 @@ and to p' N p.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .pack import (
     B_BIAS,

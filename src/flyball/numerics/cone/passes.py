@@ -5,7 +5,7 @@ See `steps` for the vectors. Velocities of products stand in W.own and X.wide.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .operator import push, push_line, push_turning, seen, seen_line, seen_turning
 from .pack import (
     ARM1,

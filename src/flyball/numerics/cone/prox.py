@@ -7,7 +7,7 @@ The derivative of a projection is symmetric with eigenvalues in [0, 1] (Hiriart-
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .gather import ROWS
 from .projection import projected_above

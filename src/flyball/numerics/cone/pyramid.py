@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 
-from ...compiler.kernels import formula, kernel
+from ...compiler.formulas import formula
+from ...compiler.kernels import kernel
 from ...math.scalar import atan2, cos, sin
 from .ending import finish
 from .gauss_seidel import sweep_lines

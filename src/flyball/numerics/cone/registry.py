@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from .islands import room_for_islands
 from .jacobi import jacobi
 from .lean import lean
 from .newton import newton
-from .problem import Choices, Factor, Problem, Scratch, State
+from .problem import Choices, Problem, Scratch, State
 from .rooms import rooms, unfilled
 
 SOLVERS: dict[str, Kernel] = {
@@ -38,10 +38,10 @@ PLACES, NUMBERS = 60, 250  # of `Factor`, for each contact and node of the large
 
 
 class Ready(NamedTuple):
-    """A solver to be called by its address, with its rooms."""
+    """A solver with its rooms."""
 
-    address: int
-    F: Any  # what stands in place of `Factor`
+    kernel: Kernel
+    F: Auto
     told: np.ndarray  # see `choose`; empty for a solver that does all at once
 
 
@@ -71,8 +71,9 @@ def ready(name: str, P: Problem, X: State, W: Scratch, O: Choices) -> Ready:
         For another name.
     """
     if name != "auto" and name not in FACTORED:
-        F = Factor(np.zeros(0), np.zeros(0, np.int64))
-        return Ready(SOLVERS[name].address, F, np.zeros(0, np.int64))
+        made = room_for_all(P, False)
+        made.doors[THE_REST] = SOLVERS[name].address
+        return Ready(auto, made, np.zeros(0, np.int64))
     whole = name != "auto"
     made = room_for_all(P, whole)
     first = SOLVERS["newton" if name == "auto" else name]
@@ -81,7 +82,7 @@ def ready(name: str, P: Problem, X: State, W: Scratch, O: Choices) -> Ready:
         made.limit[:] = room_for_any(P)  # few bodies: nothing is left for sweeps, which have no door
     else:
         made.doors[THE_REST] = gauss_seidel.address
-    return Ready(auto.address, made, made.told)
+    return Ready(auto, made, made.told)
 
 
 def is_small(nodes: int, groups: int, turning: bool) -> bool:

@@ -9,7 +9,7 @@ contacts and lines; on stacks of large mass ratios a harmless one may hide impul
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .diagonal import diagonal, diagonal_turning
 from .operator import diagonal_of_line, seen, seen_line, seen_turning

@@ -7,7 +7,7 @@ the solution without any compliance (Rockafellar 1976).
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .gather import BLOCKS, ROWS
 from .prox import DY, HELD, METRIC, ROOT_N, ROOT_T, WIDE, Q, U, Y, nearest, slipped, slope
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .diagonal import diagonal_turning
 from .ending import finish
 from .operator import diagonal_of_line, push, push_line, push_turning, seen, seen_line, seen_turning

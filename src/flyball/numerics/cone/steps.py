@@ -8,7 +8,7 @@ Impulses of balls are vectors in the world; of all others along the frame.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .pack import B_IN, B_IT, B_LEAST, B_MU, B_RATIO, IN, LEAST, MU, RATIO, SLIDE
 from .problem import HIGH, LOW

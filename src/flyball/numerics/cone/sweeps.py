@@ -7,7 +7,7 @@ cone nearest to a step, in the metric of the diagonal block.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .pack import (
     ARM1,

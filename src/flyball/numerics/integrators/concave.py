@@ -11,7 +11,7 @@ f, g being its values there, u in (0, 1), D = h^2 |terms''| / 2: it is concave, 
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .watching import CHECKS, LEAST, MISS, MOST, NODE, NODES, TERMS
 

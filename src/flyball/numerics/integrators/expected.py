@@ -6,7 +6,7 @@ has no known rate (multipliers, loads) is the polynomial through the ends and wh
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 
 
 @formula

@@ -7,7 +7,7 @@ where in a step laws do what its stages have not seen.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .clock import (
     ACCEPTED,
     AT_END,

@@ -6,7 +6,7 @@ hardly bends, of which a distance or a force does, the equations are evaluated a
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .clock import BETWEEN, PART, T
 from .concave import BLURRED, FAR, ODD, borne_out
 from .grains import blur

@@ -9,7 +9,7 @@ beyond, as in swings that come ever faster and end on the corner.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .clock import ACCEPTED, LARGEST, ULP, T
 from .concave import NOISE

@@ -10,7 +10,7 @@ calls again with the same ``Clock``. Progress, interrupt and restart are this.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .clock import (
     ACCEPTED,
     BETWEEN,

@@ -7,7 +7,7 @@ whether that is so, else the panel is halved. `glance.glance` writes the guards 
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .clock import LARGEST, T
 from .concave import BLURRED, NOISE, ODD, bent
 from .glance import glance

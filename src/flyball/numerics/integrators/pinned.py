@@ -6,7 +6,7 @@ its width, until it ends on the event: what is found is as good as the integrati
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .clock import LARGEST, TRIED, ULP, T
 from .glance import true_guard
 from .grains import blur, hush

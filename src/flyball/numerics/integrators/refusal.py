@@ -6,7 +6,7 @@ There the step is taken back and begun anew so that it ends elsewhere, or the pl
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .clock import (
     ACCEPTED,
     ASIDE,

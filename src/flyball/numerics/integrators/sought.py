@@ -7,7 +7,7 @@ it first does not is found by halves.
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .clock import EXTENDED, NEW, SPAN, T_END, TRIED, ULP, T
 from .glance import compare, exactly, glance, true_guard
 from .grains import hush, rounding, side_at_start

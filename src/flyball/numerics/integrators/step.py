@@ -5,7 +5,7 @@ Step control after Hairer, Norsett and Wanner, *Solving Ordinary Differential Eq
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .clock import (
     ATOL,

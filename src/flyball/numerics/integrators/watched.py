@@ -9,7 +9,7 @@ W is a `Watch`. It returns besides when a step ends on events; whoever calls cha
 
 from __future__ import annotations
 
-from ...compiler.kernels import formula
+from ...compiler.formulas import formula
 from .clock import NEXT, NOW, STATUS, TRIED, ULP, WIDE, H, T
 from .concave import NOISE
 from .grains import hush, rounding, side_at_start, strayed

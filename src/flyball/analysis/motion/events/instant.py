@@ -10,10 +10,10 @@ import numpy as np
 from ....compiler.buffers import StructBuffer
 from ....compiler.kernels import BoundKernel
 from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
-from ....equations.engine import Sheet, engine
+from ....equations.engine import engine
 from ....equations.instant import AGAIN, BALANCE, BARE, IMPULSES, LOOK, Bench, Desk, bench, instant
 from ....equations.sharing import margin_kernel
-from ....equations.tasks import ARRIVE, SOLVE, WATCH
+from ....equations.tasks import ARRIVE, SOLVE, WATCH, Sheet
 from ....numerics.cone.dense.problem import FREE, Dense, dense
 from ....numerics.integrators.clock import COUNTS, REALS, SPAN, STATES, Clock, T
 from ....numerics.integrators.tableaux import tableau

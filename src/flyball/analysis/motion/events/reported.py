@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....equations.engine import MOTION, Sheet, engine
+from ....equations.engine import MOTION, engine
 from ....equations.sharing import renewed_kernel, shared_kernel
+from ....equations.tasks import Sheet
 from ....equations.within import ROWS
 from ....numerics.cone.shares import OPEN
 from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock

@@ -8,8 +8,8 @@ from ....compiler.buffers import JoinedBuffer, PooledBuffer, StructBuffer, Struc
 from ....compiler.kernels import BoundKernel
 from ....equations import residual
 from ....equations.implicit import SIZES, Means, Plan, Workshop, radau_steps
-from ....equations.residual import Bench
 from ....equations.scratch import blank, fill
+from ....equations.tasks import Bench
 from ....errors import SimulationError
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ....equations.engine import Sheet
 from ....equations.projection import STEPS
 from ....equations.slopes import DIRECTIONS, SLOPE_WIDTH
+from ....equations.tasks import Sheet
 from ....model.force import CoordinateForce, TwoPointForce
 from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock
 from ....numerics.integrators.tableaux import tableau

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from math import inf
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ....math.vec import add, col, dot, load3, mtv, mv, scale, sub
 from ...kinds import BOX

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import inf
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ....math.vec import cross, dot, load3, mm, mtv, mv, neg, scale, transpose
 from ...kinds import BOX

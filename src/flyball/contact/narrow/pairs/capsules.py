@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.vec import add, col, cross, dot, neg, scale, sub
 from ...kinds import CAPSULE, SPHERE
 from ...tables import KIND, PAR

@@ -12,7 +12,7 @@ an edge between triangles that continue each other:
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ....math.vec import add, dot, load3, mm, mtv, mv, neg, put3, scale, sub, transpose
 from ...kinds import FIELD, POLYGON

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.vec import add, col, dot, mtv, mv, neg, put3
 from ...kinds import PLANE
 from ...tables import KIND, RADIUS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.vec import add, mtv, mv, neg, scale, sub
 from ...kinds import POLYGON
 from ...tables import PAR, RADIUS

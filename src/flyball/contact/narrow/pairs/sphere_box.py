@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.vec import load3, mtv, mv, neg, scale
 from ...kinds import BOX, SPHERE
 from ...tables import PAR

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.vec import col, dot, neg, scale
 from ...kinds import PLANE, SPHERE
 from ...tables import PAR

@@ -9,7 +9,7 @@ What touches it meets one triangle at a time, which stands in the scratch at `PI
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.vec import dot, load3, put3
 from ...kinds import FIELD
 from ...tables import FIRST, PAR

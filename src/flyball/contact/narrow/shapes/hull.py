@@ -9,7 +9,7 @@ each list closed by -1.
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.scalar import absolute
 from ....math.vec import dot, load3, put3, sub
 from ...kinds import HULL

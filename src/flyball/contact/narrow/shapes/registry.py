@@ -21,7 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 
 
 @dataclass(frozen=True)

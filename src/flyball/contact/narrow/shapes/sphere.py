@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ...kinds import SPHERE
 from ...tables import PAR
 

@@ -7,7 +7,7 @@ and Stone 1992, section 4.9).
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from .problem import (
     BIAS,

@@ -7,7 +7,7 @@ answer; values are refined until the softening is out of them (the proximal poin
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from .problem import (
     BIAS,

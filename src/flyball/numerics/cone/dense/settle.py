@@ -6,7 +6,8 @@ where everything else has its own rules: Josephy 1979).
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula, kernel
+from ....compiler.formulas import formula
+from ....compiler.kernels import kernel
 from ....math.scalar import exp, log, sqrt
 from .pivots import pivoted
 from .problem import (

@@ -10,7 +10,7 @@ A method is ``attempt(callbacks, S, K, c, h)`` (the step to c.y[NEW] and c.K[1]:
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ..clock import (
     ASIDE,
     AT_END,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ..clock import ACCEPTED, GROW, NEW, NOW, STEP, H, T
 
 GROWN = 6.0  # what tells that the last step was not refused

@@ -17,7 +17,7 @@ step.
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ...lu import lu_factor
 from ..clock import ASIDE, ASIDE_RATE, NEW, NOW, STEP, T

@@ -9,7 +9,7 @@ So steady turns are exact, whole ones too.
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.cayley import bent, quaternion, rate, step
 from ....math.scalar import cos, sin, sqrt
 from ....math.vec import add, dot, quaternion_product, scale, sub

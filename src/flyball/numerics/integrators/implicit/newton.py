@@ -7,7 +7,7 @@ Newton iteration takes that out again, with or without refinement of each solve.
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ...lu import lu_factor, lu_solve, times
 from .coefficients import ALPHA, BETA, GAMMA, T_INVERSE, T

@@ -6,7 +6,7 @@ Gustafsson's predictive control.
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ..clock import (
     ACCEPTED,
     BACK,

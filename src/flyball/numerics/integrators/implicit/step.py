@@ -5,7 +5,7 @@ Given ``residual(t, h, k, S, K, c)``, which fills row k of what the equations mi
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ..clock import LEDGER, NOW, SCALE, T
 from .coefficients import BEND, BENT, BENT_MOST, ERROR, GAMMA, INVERSE, THROUGH_STAGES, THROUGH_START, A, C

@@ -21,7 +21,7 @@ depend on velocities are iterated. Knows nothing of bodies: given compose, arriv
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ..clock import AT_END, ERROR, EXTENDED, NEW, NOW, SPAN, TRIED, T
 from ..clock import BEFORE as STEP_BEFORE
 from ..loop import BEGIN, ENDED, ENTER, OVERLOOKED, REFUSE, TRY, WITHIN, ending

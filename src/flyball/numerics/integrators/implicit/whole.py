@@ -6,7 +6,7 @@ stage to the next; with the Jacobian of the begin of the step the iteration then
 
 from __future__ import annotations
 
-from ....compiler.kernels import formula
+from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ...lu import lu_factor, lu_solve, times
 from ..clock import T

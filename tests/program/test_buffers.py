@@ -1,22 +1,25 @@
 """Tuples of arrays that are laid out once and copied for each run: as new, of one's own, and as compiled code has them."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np
 
-from flyball.compiler.bound import Joined, Mould, Written
+from flyball.compiler.buffers import JoinedBuffer, StructBuffer, StructPool
+from flyball.compiler.layout import Complex1, Float1, Float2, Int1
 
 
 class Inner(NamedTuple):
-    n: np.ndarray
-    x: np.ndarray
+    n: Int1
+    x: Complex1
 
 
 class Outer(NamedTuple):
-    a: np.ndarray
+    a: Float2
     inner: Inner
-    none: np.ndarray
-    table: np.ndarray
+    none: Float2
+    table: Float1
 
 
 def outer() -> Outer:
@@ -31,8 +34,8 @@ def leaves(fields):
 
 def test_each_is_as_new_and_its_own():
     new = outer()
-    mould = Mould(new, [new.table])
-    first = mould.new()
+    pool = StructPool(new, [new.table])
+    first = pool.new()
     for mine, at_first in zip(leaves(first.fields), leaves(outer()), strict=True):
         assert mine.dtype == at_first.dtype
         assert mine.shape == at_first.shape
@@ -42,7 +45,7 @@ def test_each_is_as_new_and_its_own():
     for x in leaves(first.fields)[:-1]:
         x[...] = 7
     new.a[...] = 9  # what it was made of has no say any more
-    second = mould.new()
+    second = pool.new()
     for mine, at_first in zip(leaves(second.fields), leaves(outer()), strict=True):
         assert np.array_equal(mine, at_first)
     assert first.fields.table is second.fields.table is new.table
@@ -54,11 +57,10 @@ def test_each_is_as_new_and_its_own():
 def test_compiled_code_is_told_where_they_are():
     """The same numbers as of the arrays themselves, looked at one by one."""
     new = outer()
-    made = Mould(new, [new.table]).new()
-    seen = Written(made.fields)
-    assert np.array_equal(made.numbers, seen.numbers)
-    assert made.kinds == seen.kinds
-    assert made.kind == seen.kind
+    made = StructPool(new, [new.table]).new()
+    seen = StructBuffer(made.fields)
+    assert np.array_equal(made.words, seen.words)
+    assert made.layout == seen.layout
 
 
 class Both(NamedTuple):
@@ -67,9 +69,9 @@ class Both(NamedTuple):
 
 
 def test_joined_are_as_if_written_together():
-    left, right = Mould(outer().inner).new(), Mould(outer()).new()
-    both = Joined(Both, left, right)
-    seen = Written(Both(left.fields, right.fields), left)
-    assert np.array_equal(both.numbers, seen.numbers)
-    assert both.kinds == seen.kinds
+    left, right = StructPool(outer().inner).new(), StructPool(outer()).new()
+    both = JoinedBuffer(Both, left, right)
+    seen = StructBuffer(Both(left.fields, right.fields), left)
+    assert np.array_equal(both.words, seen.words)
+    assert both.layout == seen.layout
     assert both.fields.right is right.fields
