@@ -206,7 +206,7 @@ def test_torques_of_the_table_are_those_of_steps(seed):
         for b in (x for x in m.bodies if not one or x.name == "b0"):
             turning = b.inertia * np.diff(r[b.name].angular_velocity.ravel()) / h
             missed = np.abs(torques(r, b, 1)[1:] - turning).max() / np.abs(turning).max()
-            assert missed < (1e-9 if one else 5e-3)
+            assert missed < (1e-9 if one else 0.02)  # of two: 3 m/s in half a step, over 0.1 m
 
 
 def alone(m: fb.Mechanism) -> fb.Mechanism:
