@@ -397,7 +397,8 @@ def derivatives(x: Motion) -> Iterator[Finding]:
     """Velocities are the rates of positions, accelerations those of velocities, as far as outputs lie close."""
     if x.n < 9 or x.run.events or any(c.period is not None for c in x.m.controllers):
         return
-    pull = float(np.linalg.norm(x.m.gravity))
+    moved = max((np.abs(x.of(b.name, "acceleration")).max() for b in x.m.bodies), default=0.0)
+    pull = max(float(np.linalg.norm(x.m.gravity)), moved)
     for b in x.m.bodies:
         for what, rate in (
             ("position", "velocity"),
@@ -412,7 +413,7 @@ def derivatives(x: Motion) -> Iterator[Finding]:
             bad = np.abs(np.diff(y, axis=0) - fine).max(axis=1)
             allowed = 2.0 * np.maximum(np.r_[doubt[0], doubt], np.r_[doubt, doubt[-1]])
             allowed += 1e-7 * (np.abs(y).max() + np.abs(fine).max()) + 1e-10
-            if what != "position":  # of what weight would give were nothing held: what a dead centre makes of rounding
+            if what != "position":  # of what weight gives, or the rest has: what a dead centre makes of rounding
                 allowed += IDLE * h[:, 0].mean() * pull / (gyration(x, b.name) if what == "angular_velocity" else 1.0)
             if np.mean(bad > allowed) > SPIKES:
                 k = int((bad / allowed).argmax())
@@ -426,7 +427,7 @@ def gyration(x: Motion, body: str) -> float:
     return float(np.sqrt(about[about > 0.0].min() / mass)) if mass > 0.0 and about.max() > 0.0 else x_size(x)
 
 
-IDLE = 1e-6  # of an acceleration by weight, that a structure may be said to have which stands still at a dead centre
+IDLE = 1e-6  # of weight's acceleration or the largest: what a body may be said to have that stands still
 SPIKES = 0.1  # part of the intervals between outputs in which something quick may happen
 
 
