@@ -248,6 +248,7 @@ def energies(x: Motion) -> Iterator[Finding]:
             yield Finding("energy by formula", name, bad, allowed)
     if not every or x.m.events or run.events:
         return
+    size += sum(np.abs(stored).max() for stored in elastic.values())
     total = kinetic + weight + sum(elastic.values(), np.zeros(x.n))
     works = sum(run.energy.work.values(), np.zeros(x.n))
     moved = np.ptp(kinetic) + np.ptp(weight) + sum(np.ptp(w) for w in run.energy.work.values())
@@ -396,6 +397,8 @@ def derivatives(x: Motion) -> Iterator[Finding]:
     """Velocities are the rates of positions, accelerations those of velocities, as far as outputs lie close."""
     if x.n < 9 or x.run.events or any(c.period is not None for c in x.m.controllers):
         return
+    moved = max((np.abs(x.of(b.name, "acceleration")).max() for b in x.m.bodies), default=0.0)
+    pull = max(float(np.linalg.norm(x.m.gravity)), moved)
     for b in x.m.bodies:
         for what, rate in (
             ("position", "velocity"),
@@ -410,11 +413,21 @@ def derivatives(x: Motion) -> Iterator[Finding]:
             bad = np.abs(np.diff(y, axis=0) - fine).max(axis=1)
             allowed = 2.0 * np.maximum(np.r_[doubt[0], doubt], np.r_[doubt, doubt[-1]])
             allowed += 1e-7 * (np.abs(y).max() + np.abs(fine).max()) + 1e-10
+            if what != "position":  # of what weight gives, or the rest has: what a dead centre makes of rounding
+                allowed += IDLE * h[:, 0].mean() * pull / (gyration(x, b.name) if what == "angular_velocity" else 1.0)
             if np.mean(bad > allowed) > SPIKES:
                 k = int((bad / allowed).argmax())
                 yield Finding("derivative", f"{rate} of {b.name}", float(bad[k]), float(allowed[k]))
 
 
+def gyration(x: Motion, body: str) -> float:
+    """Least radius of gyration of a body, the mechanism's reach where it is not known or none [m]."""
+    mass, inertia = x.masses.get(body, (0.0, np.zeros((3, 3))))
+    about = np.linalg.eigvalsh(inertia)
+    return float(np.sqrt(about[about > 0.0].min() / mass)) if mass > 0.0 and about.max() > 0.0 else x_size(x)
+
+
+IDLE = 1e-6  # of weight's acceleration or the largest: what a body may be said to have that stands still
 SPIKES = 0.1  # part of the intervals between outputs in which something quick may happen
 
 

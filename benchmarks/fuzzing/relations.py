@@ -318,18 +318,31 @@ def compared(b: Base, chosen: list[str], seed: int) -> Iterator[tuple[str, str, 
 
 
 SAME_EVENTS = ("coordinates", "dop853", "rk45", "radau", "axes", "order", "parameters", "file")
+HOLDS = ("close", "stick", "lock", "latch", "taut", "touch", "rest")
+SWITCHED = (*HOLDS, "open", "slip", "overrun", "unlatch", "slack", "part", "impact")
 NOTED = 1e-4  # of the whole time: instants may differ by
 
 
 def _happened(b: Base, run: Any, h: int) -> str:
-    """What happened in one of the runs and not in the other, well before the end of what is compared."""
+    """What happened in one of the runs and not in the other, well before the end of what is compared.
+
+    Each element counts alone, whichever others a record names with it. How often one goes back and forth within the
+    time by which instants may differ, as under a load that grows from zero, says nothing: how it is left does. What
+    holds nothing there may as well have held since the start.
+    """
     if isinstance(b.options.get("method"), fb.Stepping):
         return ""
     near = NOTED * b.t_end
-    lists = [[(sorted(re.split(r"[-,\s]+", x.name)), x.kind, x.t) for x in r.events] for r in (b.run, run)]
+    lists = [
+        [(sorted(re.split(r"[-\s]+", one)), x.kind, x.t) for x in r.events for one in x.name.split(", ")]
+        for r in (b.run, run)
+    ]
     for one, two, which in ((*lists, "only at first"), (*lists[::-1], "only then")):
         for name, kind, t in one:
             alike = any((name, kind) == (n, k) and abs(t - s) <= near for n, k, s in two)
+            left = [[k in HOLDS for n, k, s in every if n == name and abs(t - s) <= near] for every in (one, two)]
+            alike = alike or (all(left) and left[0][-1] == left[1][-1] and kind in SWITCHED)
+            alike = alike or (kind in HOLDS and t <= near)
             if t < b.run.t[h - 1] - 10 * near and not alike:
                 return f"{' '.join(name)} {kind} at {t:.6g} s {which}"
     return ""

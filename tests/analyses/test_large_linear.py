@@ -13,6 +13,7 @@ import scipy.sparse as sp
 import flyball as fb
 from flyball.analysis.linear import large
 from flyball.numerics.pencil import Pencil
+from flyball.numerics.saddle import saddle
 from tests.analyses.made import G, chain, parallelogram, rod
 from tests.layers import LAYERS
 
@@ -229,3 +230,16 @@ def test_the_same_is_refused(name, monkeypatch):
                 getattr(REFUSED[name](), ask)(coordinates="absolute")
             texts.append((type(said.value), re.sub(r"-?\d+\.?\d*", "#", str(said.value))))
     assert texts == [texts[0]] * 4
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e6])
+def test_sparse_equations_with_constraints_are_those_of_a_dense_solver(size):
+    """P x - G^T l = f, H x = g, of a stiffness of any size, with rows of two kinds."""
+    rng = np.random.default_rng(2)
+    P, G, H = size * (rng.normal(size=(7, 7)) + 7 * np.eye(7)), rng.normal(size=(3, 7)), rng.normal(size=(3, 7))
+    f, g = size * rng.normal(size=7), rng.normal(size=3)
+    for of, rows in ((None, G), (H, H)):
+        x, force = saddle(sp.csc_array(P), sp.csc_array(G), None if of is None else sp.csc_array(of))(f, g)
+        wanted = np.linalg.solve(np.block([[P, -G.T], [rows, np.zeros((3, 3))]]), np.r_[f, g])
+        assert x == pytest.approx(wanted[:7], rel=1e-9)
+        assert force == pytest.approx(wanted[7:], rel=1e-9)

@@ -295,3 +295,25 @@ def test_velocities_change_as_little_as_they_can():
     assert free.shape[1] == 1
     assert np.abs(a.v).max() > 0.1
     assert free.T @ M @ (a.v - before) == pytest.approx([0.0], abs=1e-10)
+
+
+@pytest.mark.parametrize("target", [1.0, 2.0, 3.0])
+def test_large_turns_do_not_depend_on_the_axes_of_the_world(target):
+    """A is driven to its target, B is free and follows by the nearest steps: the same however the world is turned."""
+    angles = []
+    for turn in ((0.0, 0.0, 0.0), (0.3, -1.2, 0.7), (1.0, 1.0, 1.0), (0.0, 0.0, 2.0)):
+        R = Rotation.from_euler("xyz", turn)
+        m = fb.Mechanism("axes")
+        own = {"orientation": tuple(map(tuple, R.as_matrix().tolist()))}
+        m.add(
+            fb.Body("b1", mass=2.85, inertia=(0.109, 0.0885, 0.179), **own),
+            fb.Body(
+                "b2", mass=0.32, inertia=(0.01, 0.01, 0.01), position=tuple(R.apply((0.3, 0.4, 0))),
+                com=(-0.19, 0.127, -0.1), **own,
+            ),
+            fb.Revolute("A", "ground", "b1", at=tuple(R.apply((0, 0, 0.1))), axis=tuple(R.apply((0, 0.22, -0.975)))),
+            fb.Revolute("B", "b1", "b2", at=tuple(R.apply((0.3, 0.3, 0.1))), axis=tuple(R.apply((0.7, 0.31, 0.63)))),
+            fb.Driver("D", "A.angle", str(target)),
+        )  # fmt: skip
+        angles.append(m.simulate(1e-9, outputs=2)["B"].angle[0])
+    np.testing.assert_allclose(angles, angles[0], atol=1e-8)

@@ -8,6 +8,7 @@ import pytest
 import flyball as fb
 from flyball.analysis.assembly import velocities
 from flyball.model.io import dumps, loads
+from flyball.results.departure import Departure
 from tests.layers import LAYERS, started, take
 
 
@@ -48,6 +49,14 @@ def test_an_angular_velocity_alone_is_kept_and_the_rest_follows():
     assert r["w"].velocity[0] == pytest.approx([3, 0, 0], abs=1e-14)
     r = disk(velocity=(3, 0, 0)).simulate(0.01, outputs=2)
     assert r["w"].angular_velocity[0] == pytest.approx([0, 6, 0], abs=1e-13)
+
+
+def test_what_is_nothing_beside_a_given_velocity_is_written_as_0():
+    """An angle has one number, and a direction all of whose numbers are rounding none that is larger: both are 0."""
+    d = Departure("b", "angular_velocity", (2.4392,), (-3.98711e-321,), "rad/s")
+    assert d.text == "angular velocity of 'b': given 2.4392, got 0 rad/s"
+    d = Departure("b", "velocity", (5.0, 0.0), (1e-16, -3e-17), "m/s")
+    assert d.text == "velocity of 'b': given (5, 0), got (0, 0) m/s"
 
 
 def test_what_cannot_be_kept_is_said(capsys):

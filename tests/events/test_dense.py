@@ -226,3 +226,19 @@ def test_what_is_all_rounding_is_solved():
     P.b[:], P.grain[:] = [2.6303011932863456e-13, -2.2006461027982152e-12], 2.1047211629579372e-13
     assert solve(P) == FOUND
     assert P.x[1] == pytest.approx(-P.b[1] / P.A[1, 1], rel=1e-12) and P.x[0] == 0.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_friction_holds_nothing_where_its_line_is_below_zero(seed):
+    """Loads made linear elsewhere can be negative; what they hold cannot: these rows slide freely, or as if there."""
+    rng = np.random.default_rng(200 + seed)
+    n = int(rng.integers(2, 9))
+    J = rng.normal(size=(n, n + 1))
+    P = problem(J @ J.T, rng.normal(size=n), [GRIPS] * n)
+    P.const[:] = rng.uniform(-1.0, 1.0, n)
+    assert solve(P) == FOUND
+    none = P.const < 0.0
+    assert not P.x[none].any()
+    P.const[none] = 0.0
+    assert fulfilled(P, P.x, P.u, 1e-9)
+    assert all(s == (LOW if u > 0.0 else HIGH) for s, u in zip(P.state[none], P.u[none], strict=True))

@@ -175,3 +175,16 @@ def test_a_guard_that_jumps_with_a_law_of_time_is_seen_behind_the_jump():
     """At 1.25 s, where it jumps over zero: no step has a zero in it."""
     m = ball(note("where(t < 1.25, 1, -1)*(3 + sin(S.rate))", "falling"))
     assert times(m.simulate(2.0, outputs=2)) == pytest.approx([1.25], abs=1e-12)
+
+
+def test_what_rises_and_what_falls_at_one_instant_happen_together():
+    """What one condition's action undoes for the other has happened all the same: both were met at that instant."""
+    m = fb.Mechanism("two", planar=True, gravity=(0, 0))
+    for name, v in (("a", 1.0), ("b", -1.0)):
+        m.add(fb.Body(name, mass=1, inertia=1, velocity=(v, 0)))
+    m.add(fb.Event("rises", "a.x > 0.5", do=[fb.Impulse("b", (2.0, 0.0))]))
+    m.add(fb.Event("falls", "b.x < -0.5", do=[fb.Impulse("a", (-2.0, 0.0))]))
+    run = m.simulate(1.0)
+    assert [(e.name, e.t) for e in run.events] == [("rises", pytest.approx(0.5)), ("falls", pytest.approx(0.5))]
+    assert run["a"].velocity[-1][0] == pytest.approx(-1.0)
+    assert run["b"].velocity[-1][0] == pytest.approx(1.0)

@@ -248,6 +248,21 @@ def test_a_plate_without_inertia_on_links_is_not_put_into_a_forest():
     assert none["plate"].position[-1] == pytest.approx(hardly["plate"].position[-1], abs=1e-6)
 
 
+def test_masses_of_which_several_coordinates_together_move_none_are_not_put_into_a_forest():
+    """A point mass away from its body's frame turns about itself and the other keeps its place: M is singular.
+
+    Each joint's own coordinates move inertia. In joint coordinates every thirtieth acceleration was not a number.
+    """
+    m = fb.Mechanism("two masses", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=0.26, inertia=0, position=(0.72, 0.33), com=(0.11, 0.12), angular_velocity=-2.2))
+    m.add(fb.Body("b", mass=15.8, inertia=0, position=(0.48, 0.91)))
+    m.add(fb.Distance("rod", "ground", "a", at=((0.1, 0.1), (0.71, 0.32))))
+    m.add(fb.PointOnLine("slot", "a", "b", at=(0.48, 0.69), axis=(0, 1)))
+    joint, absolute = (m.simulate(0.01, outputs=1001, coordinates=c) for c in ("joint", "absolute"))
+    assert "no joint that has inertia along its coordinates" in joint.health.coordinates
+    assert joint["a"].acceleration == pytest.approx(absolute["a"].acceleration, rel=1e-6, abs=1e-6)
+
+
 def ball_net(n):
     """Rods on balls where they meet."""
     m = fb.Mechanism("net", gravity=(0, 0, -9.81))

@@ -1,9 +1,16 @@
 """Values between the ends of steps that turn a body far: as good as those at the ends."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import flyball as fb
+from flyball.math import cayley
+from flyball.numerics.integrators.implicit import hermite
+from flyball.numerics.integrators.implicit.desk import START
+from flyball.numerics.integrators.implicit.hermite import END
 from tests.mechanisms import free_body
 
 METHODS = pytest.mark.parametrize(("method", "turn"), [("variational", 1.8), ("variational", 3.0), ("variational", 7.0),
@@ -46,3 +53,37 @@ def test_an_event_within_a_step_is_where_the_body_is(step):
     m.add(fb.Frame("tip", "b", position=(1, 0, 0)), fb.Sensor("high", "tip.y"), fb.Event("top", "high > 0.6", times=1))
     (e,) = m.simulate(0.1, method="variational", step=step).events
     assert e.t == pytest.approx(np.arcsin(0.6) / 100.0, rel=1e-9)
+
+
+def test_what_is_between_steps_has_their_values_and_rates():
+    """Cubics within a step: places and turns begin and end where the step does, with its velocities there."""
+    h, near = 0.1, 1e-6
+    v, d, rate, z = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 1)), np.zeros((4, 1))
+    v[[START, END]] = (1.0, -2.0, 0.5, 0.3), (1.5, -1.0, 0.9, -0.4)
+    d[END] = *cayley.step(cayley.quaternion((0.14, -0.13, 0.08))), 0.02
+    rate[[START, END]], z[[START, END]] = ((0.7,), (-0.2,)), ((2.0,), (2.1,))
+    K = SimpleNamespace(v=v, d=d, rate=rate, z=z, ends=np.zeros((2, 4)), turns=np.array([0]))
+
+    def at(x):
+        out = np.zeros(4), np.zeros(4), np.zeros(1)
+        hermite.between(K, x, h, *out)
+        turn = Rotation.from_quat(np.roll(cayley.quaternion(tuple(out[0][:3])), -1))
+        return turn, np.r_[out[0][3], out[2]]
+
+    for x, k in ((0.0, START), (1.0, END)):
+        (here, f), (before, a), (after, b) = at(x), at(x - near), at(x + near)
+        there = Rotation.from_quat(np.roll(cayley.quaternion(tuple(d[k, :3])), -1))
+        assert (there.inv() * here).magnitude() < 1e-14
+        assert f == pytest.approx([d[k, 3], z[k, 0]], abs=1e-14)
+        assert (before.inv() * after).as_rotvec() / (2 * near * h) == pytest.approx(v[k, :3], abs=1e-6)
+        assert (b - a) / (2 * near * h) == pytest.approx([v[k, 3], rate[k, 0]], abs=1e-6)
+
+
+def test_angles_between_bodies_that_both_turn_far_count_their_turns():
+    """Two discs on one axle at 50 and 51 rad/s, which a step turns by more than once: the angle grows by 1 rad/s."""
+    m = fb.Mechanism("discs", gravity=(0, 0, 0))
+    for name, w in (("a", 50.0), ("b", 51.0)):
+        m.add(fb.Body(name, mass=1.0, inertia=(1, 1, 1.5), angular_velocity=(0, 0, w)))
+    m.add(fb.Revolute("axle", "a", "b", at=(0, 0, 0), axis=(0, 0, 1)))
+    r = m.simulate(10.0, outputs=2, method="variational", step=0.14)
+    assert r["axle"].angle[-1] == pytest.approx(10.0, abs=1e-9)

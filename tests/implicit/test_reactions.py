@@ -94,3 +94,13 @@ def test_a_door_on_two_rough_hinges_at_narrow_tolerances(rtol):
     e = m.simulate(0.3, rtol=1e-11, outputs=4, method="dop853")
     r = m.simulate(0.3, rtol=rtol, outputs=4, method="radau")
     assert np.abs(r["upper"].rate - e["upper"].rate).max() < 1e-5
+
+
+@pytest.mark.parametrize("options", [{"method": "radau"}, {"method": "radau", "step": 0.1}])
+def test_a_driver_does_the_work_that_its_mass_takes_up(options):
+    """Beside another freedom a driver's row does work as the motion goes: m (v1^2 - v0^2) / 2."""
+    m = fb.Mechanism("driven", planar=True, gravity=(0, 0))
+    m.add(fb.Body("b", mass=2.0, inertia=1), fb.Prismatic("p", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Body("free", mass=1.0, inertia=1), fb.Driver("drive", "p.displacement", "t**2/2 + t"))
+    r = m.simulate(1.0, outputs=2, coordinates="absolute", progress=False, **options)
+    assert r["drive"].work[-1] == pytest.approx(3.0, rel=1e-9)

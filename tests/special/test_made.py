@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import runpy
 from functools import lru_cache
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 import flyball as fb
 from flyball import special
 from flyball.analysis.motion.start import begin
+from flyball.compiler.bound import Written
 from flyball.equations.engine import motion_kernel
 from flyball.equations.projection import NONE, STAGES
 from flyball.equations.scratch import work
@@ -20,7 +22,7 @@ from flyball.equations.within import ROWS
 from flyball.numerics.integrators import clock as ex
 from flyball.numerics.integrators.tableaux import tableau
 from flyball.special import keeping
-from flyball.special.recorder import Recorder
+from flyball.special.recorder import TERMS, Recorder
 from flyball.tables.system import (
     EFFORT,
     F_APPLIED,
@@ -102,6 +104,9 @@ def equal(x, tables, ours):
         size = max(np.abs(theirs[name]).max(initial=0.0), least.get(name, 0.0))
         near = REDUNDANT * (1.0 + size) if name == "lam" else EQUAL * size
         assert np.abs(theirs[name] - b).max(initial=0.0) <= near, name
+    S, v = x.system, ours[1][0, here][x.structure.nq :]
+    terms = ours[2].G[: S.row_p[len(S.row_i)]] * v[S.col_i[: S.row_p[len(S.row_i)]]]  # of G v, by whose size it drifts
+    assert ours[2].flat[TERMS] == pytest.approx(np.abs(terms).max(initial=0.0), rel=1e-12)
 
 
 def same(model, coordinates, parameters=None, of=None):
@@ -169,6 +174,26 @@ def test_what_is_taken_for_granted_is_checked():
     assert [(nodes, what) for nodes, what, _ in p.checks] == [([y], "nonzero") for y in pivots]
     assert all(number > 0.0 for *_, number in p.checks)
     assert not r.add("LOADS", {}, []).checks
+
+
+def test_sampled_laws_of_drivers_are_their_second_derivatives():
+    """Which is what asks for force, within a step too: of a bell a exp(-(t / w)^2) it is (4 t^2 / w^2 - 2) / w^2 of it.
+
+    On a coordinate and on a row alike.
+    """
+    m = fb.Mechanism("driven", planar=True)
+    m.add(fb.Body("b", mass=1.0, inertia=1.0), fb.Prismatic("P", "ground", "b", axis=(1, 0), at=(0, 0)))
+    m.add(fb.Driver("drive", "P.displacement", "0.2*exp(-(t/0.3)**2)"))
+    for coordinates in ("joint", "absolute"):
+        x, _ = values_of(m, coordinates)
+        made, _ = special.code(special.plan(x), x)
+        (name,) = filter(None, made.laws)
+        S = Written(made.system(x.system))
+        of = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_void_p] * 2, ctypes.c_double, *[ctypes.c_void_p] * 4)
+        sensors, W = np.zeros(16), Written(work(x.structure, x.system))
+        for t in (0.1, 0.5):
+            found = of(made.loaded.addresses[name])(S.place, W.place, t, *[sensors.ctypes.data] * 4)
+            assert found == pytest.approx(0.2 * np.exp(-((t / 0.3) ** 2)) * (4 * t**2 / 0.09 - 2) / 0.09, rel=1e-12)
 
 
 def test_other_values_run_the_same_code():

@@ -65,7 +65,10 @@ def test_a_slide_bounces_off_its_stop(e, side):
 @pytest.mark.parametrize("z", [0.1, 2.0, 100.0])
 @pytest.mark.parametrize("coordinates", LAYERS)
 def test_what_stops_a_damped_cart(coordinates, z):
-    """Impulse of a stop: m v less what the damper takes, h c (1 - b) v / 2, z = h c / m, b = (z/4)^2 / (1 + (z/4)^2)."""
+    """Impulse of a stop: m v less what the damper takes, h c (1 - b) v / 2, z = h c / m, b = (z/4)^2 / (1 + (z/4)^2).
+
+    It stays there then, in whatever coordinates.
+    """
     h, mass, v = 0.01, 2.0, 1.5
     m = fb.Mechanism("slide", planar=True, gravity=(0, 0))
     m.add(fb.Body("cart", mass=mass, inertia=1.0, velocity=(v, 0)))
@@ -75,6 +78,7 @@ def test_what_stops_a_damped_cart(coordinates, z):
     s.step()
     b = (z / 4) ** 2 / (1 + (z / 4) ** 2)
     assert s.X.line.sum() == pytest.approx(mass * v * (1 - (1 - b) * z / 2), rel=1e-7)
+    assert s.v[0] == pytest.approx(0.0, abs=1e-7)  # the damper has had its say
 
 
 @pytest.mark.parametrize("share", [0.5, 1.5])

@@ -183,6 +183,19 @@ def test_a_rattleback_rocks_up_from_its_spin():
     assert any("numerical_loss" in text for text in rough.health.doubtful) and "doubtful" in rough.health.status
 
 
+def test_a_rattleback_converges_to_its_equations():
+    """With half the step half of the error of its spin is left, and half of the energy that stepping takes."""
+    tilt = np.radians(3.0)
+    off, lost = [], []
+    for step in (2e-4, 1e-4, 5e-5):
+        run = stepped(celt(-5.0, tilt), 2.0, step, outputs=5)
+        off.append(np.abs(run["stone.omega_z"] - celt_exact(-5.0, tilt, run.t)).max())
+        lost.append(run.energy.numerical_loss[-1] / run.energy.kinetic[0])
+    assert off[2] < 3e-3
+    for x in (off, lost):
+        assert x[0] > 1.5 * x[1] > 1.5**2 * x[2]
+
+
 def test_a_ball_rolls_down_a_sphere():
     """As 7/10 v^2 = g (R + r) (cos a - cos b) has it, to the second order in the step: its normal turns."""
     from scipy.integrate import quad

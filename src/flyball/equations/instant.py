@@ -44,8 +44,10 @@ from .tasks import MOTION, SOLVE, Sheet
 
 IMPULSES, TRIED = range(2)  # entries of Bench.asks: what x is; how often it was solved
 FORCES, BLOWS, OF_A_STEP = range(3)  # what x is: forces, impulses in no time, or those of a short step of time
-TRIES = 60
+NEWTON = 20  # steps of Newton's method at a time
+RELAXED, MOST = 10, 1000  # relaxed steps where these fail: at first, and at most; each time twice as many
 SETTLED = 1e-13  # of the largest impulse, or of that which would stop what moves
+RELAXATION = 0.2  # of the way
 NUDGE = 1e-6  # part of an impulse that tells how loads follow it
 GRAIN = 1e-13  # of the terms of a quantity's acceleration: their rounding
 BEYOND = 1e30  # more than anything carries
@@ -226,7 +228,11 @@ def reaches(S, W, t, B, P):
 
 @formula
 def balanced(S, W, t, B, P):
-    """The problem solved, with what friction holds by what it carries. How it ended stands in ``P.info``."""
+    """The problem solved, with what friction holds by what it carries. How it ended stands in ``P.info``.
+
+    Newton's method, which from no loads leads to the smallest of several solutions. Where a step of it has no solution,
+    or it runs in circles, relaxed fixed-point iterations lead on, and it is tried again from there.
+    """
     n, loads = B.which.shape[0], False
     for i in range(n):
         P.x[i] = 0.0
@@ -236,12 +242,19 @@ def balanced(S, W, t, B, P):
             if B.way[i] != 0.0:
                 P.const[i] = BEYOND
         settle(P)
-    for _ in range(TRIES):
+    steps, many = 0, RELAXED
+    while many <= MOST:
         B.asks[TRIED] += 1
         follows = reaches(S, W, t, B, P)
         for i in range(n):
             B.seen[i] = P.x[i]
         settle(P)
+        steps += 1
+        if follows and (P.info[ENDED] == NONE_FOUND or steps > NEWTON):
+            for _ in range(many):
+                relaxed(S, W, t, B, P)
+            steps, many = 0, 2 * many
+            continue
         if not follows or P.info[ENDED] != FOUND:
             return
         change, size, least = 0.0, 0.0, 0.0
@@ -253,6 +266,24 @@ def balanced(S, W, t, B, P):
         if change <= SETTLED * size + least:
             return
     P.info[ENDED] = NONE_FOUND
+
+
+@formula
+def relaxed(S, W, t, B, P):
+    """A part of the way to the impulses that go with the present reaches (Krasnoselskii's iteration, 1955).
+
+    With given reaches the problem has a solution, whatever the friction.
+    """
+    carry(S, W, B, P, -1, 0.0)
+    for i in range(B.which.shape[0]):
+        B.seen[i] = P.x[i]
+        if B.way[i] != 0.0:
+            P.const[i] = held_by(S, W, t, B, i, load_of(S, W, i, B))
+            for j in range(B.which.shape[0]):
+                P.gain[i, j] = 0.0
+    settle(P)
+    for i in range(B.which.shape[0]):
+        P.x[i] = B.seen[i] + RELAXATION * (P.x[i] - B.seen[i])
 
 
 @formula

@@ -36,7 +36,9 @@ class Contacts:
     ``run.contacts.at(0.5)``, ``run.contacts.between("ball", "ground")``, ``run.contacts.on("ball")``. In steps by
     impulses the rows of a time are the contacts of the step that ends there. Such a step finds its contacts with the
     poses of its start: ``point`` and ``gap`` belong to these, a step before the poses of the result at that time. With
-    every other method they belong to the output time.
+    every other method they belong to the output time. With arms from the mass centres at that time the torques are
+    those that turn the bodies: to rounding, but for contacts of two moving bodies in steps by impulses, where half a
+    step's motion is between the arms of the one and the other.
 
     Attributes
     ----------
@@ -47,7 +49,7 @@ class Contacts:
     pair : ndarray (k, 2) of int
         The two sides, as `Sides` counts them.
     point : ndarray (k, 3) [m]
-        Midway between the surfaces, world axes; in steps by impulses where the step began.
+        Where the force acts, midway between the surfaces, world axes; in steps by impulses where the step began.
     normal : ndarray (k, 3)
         From the first side to the second; in steps by impulses the one along which the impulse was found, of the start
         of the step or of its middle.

@@ -52,8 +52,9 @@ class Departure:
     def text(self) -> str:
         """In words."""
         field = self.what.replace("_", " ")
-        given = f"given {_numbers(self.given)}" if self.given else "not given"
-        return f"{field} of {self.element!r}: {given}, got {_numbers(self.got)} {self.unit}"
+        size = max(map(abs, (*self.given, *self.got)), default=0.0)
+        given = f"given {_numbers(self.given, size)}" if self.given else "not given"
+        return f"{field} of {self.element!r}: {given}, got {_numbers(self.got, size)} {self.unit}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -71,9 +72,9 @@ class Departure:
         return cls(**{**data, "given": tuple(data["given"]), "got": tuple(data["got"])})
 
 
-def _numbers(values: Sequence[float]) -> str:
-    """Components in brackets, one number bare; rounding beside the others is 0."""
-    return number(values[0]) if len(values) == 1 else tuple_of(values, 6)
+def _numbers(values: Sequence[float], size: float) -> str:
+    """Components in brackets, one number bare; what is rounding beside ``size`` is 0."""
+    return number(values[0], size) if len(values) == 1 else tuple_of(values, 6, size)
 
 
 def changed_velocities(departures: Sequence[Departure]) -> list[Departure]:

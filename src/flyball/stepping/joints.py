@@ -46,6 +46,7 @@ from .joined import (
     POSES,
     ROWS,
     SMOOTH,
+    SPRING_C,
     SPRING_OF,
     SPRINGS,
     START,
@@ -259,6 +260,10 @@ def turn_on(A, h):
         for d in range(A.wide.shape[1]):
             vdot = A.clock.K[0, A.S.kinds[COORDINATES] + d]
             A.wide[V_AFTER, d] += 0.5 * (h * vdot - A.wide[SMOOTH, d])
+        for i in range(A.count[SPRINGS]):  # their dampers are taken at the velocities after impacts already
+            s = 0.5 * h * A.spring_x[i, SPRING_C] * dot_rows(A.spring_J[i], A.wide[STRUCK])
+            for d in range(A.wide.shape[1]):
+                A.wide[V_AFTER, d] += s * A.spring_Y[i, d]
     for i in range(z, y.shape[1]):
         A.clock.K[0, i] = y[2, i]
 

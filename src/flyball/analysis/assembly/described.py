@@ -81,7 +81,7 @@ def described(x: Values, q: np.ndarray) -> np.ndarray:
 
 def _own(x: Values, g: Given, q: np.ndarray) -> list[Any]:
     """Velocities of one body as described: the mass centre of one that is told its turn only rests."""
-    d, R = x.bodies[g.name], _rotation(x, g.name, q)
+    d, R = x.bodies[g.name], rotation(x, g.name, q)
     if not g.turns:
         return list(_origin(d)[: g.shifts])
     w = d.w if g.turning else R @ _blow(x, g, R.T @ _origin(d))
@@ -111,7 +111,7 @@ def _origin(d: Any) -> np.ndarray:
     return d.v - _cross(d.w, d.R @ d.com)
 
 
-def _rotation(x: Values, name: str, q: np.ndarray) -> np.ndarray:
+def rotation(x: Values, name: str, q: np.ndarray) -> np.ndarray:
     """Rotation of a body at q; to the bit as it is drawn where it was not turned."""
     row = x.system.body_i[x.structure.place[name]]
     if row[TREE] == POINT:
@@ -129,7 +129,7 @@ def deviation(x: Values, g: Given, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
     Else of its reference frame's origin along world axes, or of the turn (of a spatial body along its own axes).
     """
-    d, R = x.bodies[g.name], _rotation(x, g.name, q)
+    d, R = x.bodies[g.name], rotation(x, g.name, q)
     own = v[g.at : g.at + g.n]
     if g.whole:
         return own - np.array(_own(x, g, q))
@@ -146,7 +146,7 @@ def gradient(x: Values, g: Given, q: np.ndarray) -> np.ndarray:
         return np.eye(g.n)
     if g.turning:
         return np.eye(g.n)[g.shifts :]
-    d, R = x.bodies[g.name], _rotation(x, g.name, q)
+    d, R = x.bodies[g.name], rotation(x, g.name, q)
     a = R @ d.com
     if g.planar:
         return np.array([[1.0, 0.0, a[1]], [0.0, 1.0, -a[0]]])
@@ -155,7 +155,7 @@ def gradient(x: Values, g: Given, q: np.ndarray) -> np.ndarray:
 
 def _motion(x: Values, g: Given, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Velocity of the origin of a body's reference frame, and its angular velocity, along world axes; of three each."""
-    d, R = x.bodies[g.name], _rotation(x, g.name, q)
+    d, R = x.bodies[g.name], rotation(x, g.name, q)
     own = v[g.at : g.at + g.n]
     w = np.zeros(3) if not g.turns else np.array([0.0, 0.0, own[2]]) if g.planar else R @ own[3:]
     return (np.r_[own[:2], 0.0] if g.planar else own[:3]) - _cross(w, R @ d.com), w

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ...numerics.rank import svd
 from ...tables.system import G_VALUE, NV, V0
 from ..compiled import Compiled
+from .described import rotation
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
 
 CLOSED = 1e-10  # part of the mechanism's length, or radians, by which closed rows may be off
 OPEN = 1e-6  # the same, above which a position found on residuals that lead from far away is none
 RESTARTS = 12
 ITERATIONS = 200
+LONGEST = 0.7  # radians, or parts of the mechanism's length, by which a step turns or shifts a body at most
 WALK = 50  # steps of the usual length before longer ones
 DENSE = 300  # rows up to which a step of assembly goes through a singular value decomposition
 NO_PIVOT = 1e-14  # added for redundant rows of large mechanisms; iterations take it out again
@@ -66,6 +73,20 @@ def _shifts(c: Compiled) -> np.ndarray:
     return out
 
 
+def _vectors(c: Compiled) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Matrices (bodies, nv) that sum squared velocities: each body's translation, each one's turning.
+
+    A step is as long as its vectors are, which is the same in whatever axes the world is described.
+    """
+    import scipy.sparse as sp
+
+    body_i, shifts = c.structure.tables["body_i"], _shifts(c)
+    body = np.repeat(np.arange(len(body_i)), body_i[:, NV])
+    place = np.concatenate([np.arange(v0, v0 + n) for v0, n in zip(body_i[:, V0], body_i[:, NV], strict=True)])
+    both = sp.csr_matrix((np.ones(len(place)), (body, place)), (len(body_i), c.structure.nv))
+    return both @ sp.diags(shifts.astype(float)), both @ sp.diags((~shifts).astype(float))
+
+
 def row_scales(c: Compiled) -> np.ndarray:
     """Factors (nr,) that make rows dimensionless: lengths are counted in the mechanism's length, turns in radians.
 
@@ -112,9 +133,9 @@ def newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
     """Damped Gauss-Newton until closed or no better. Returns (q, iterations)."""
     import scipy.sparse as sp
 
-    w, shifts, scale = inverse_weights(c), _shifts(c), row_scales(c)
+    w, scale = inverse_weights(c), row_scales(c)
     R, rows = sp.diags(np.sqrt(w)).tocsr(), sp.diags(scale).tocsr()
-    limit = 0.7 * c.values.length * np.sqrt(np.where(w > 0.0, w, 1.0))  # 0.7 rad, or 0.7 of the mechanism's size
+    shifts, turns = _vectors(c)
     size = misfit(c, t, q, v)
     g = scale * c.work.row[G_VALUE]
     damping, wider, capped = 0.0, 1.0, 0
@@ -124,7 +145,8 @@ def newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
             return q, k
         c.at(t, q, v)
         d = _step(c, -g, rows, R, damping)
-        over = np.abs(d / np.where(shifts, wider * limit, limit)).max(initial=0.0)
+        longest, farthest = (float(np.sqrt(x @ d**2).max(initial=0.0)) for x in (shifts, turns))
+        over = max(longest / (wider * LONGEST * c.values.length), farthest / LONGEST)
         d = d / over if over > 1.0 else d
         new = _moved_by(c, q, d)
         new_size = misfit(c, t, new, v)
@@ -155,8 +177,9 @@ def close(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarr
     for k in range(RESTARTS):
         if least < 1e-9:
             break
-        shake = random.normal(size=len(w)) * np.sqrt(w) * c.values.length * 0.05 * 1.5**k
-        trial, more = newton(c, t, _moved_by(c, best if k % 2 == 0 else q, shake), v)
+        start = best if k % 2 == 0 else q
+        shake = _along_bodies(c, start, random.normal(size=len(w))) * np.sqrt(w) * c.values.length * 0.05 * 1.5**k
+        trial, more = newton(c, t, _moved_by(c, start, shake), v)
         count += more
         gap = misfit(c, t, trial, v)
         if gap < 1e-9:
@@ -165,6 +188,16 @@ def close(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarr
         if gap < least:
             best, least = trial, gap
     return best, count
+
+
+def _along_bodies(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """The same, translations turned from each body's own axes to the world's: what they do depends on no world axes."""
+    body_i, out = c.structure.tables["body_i"], d.copy()
+    for name, b in c.structure.place.items():
+        if b >= 0:
+            at, n = int(body_i[b, V0]), min(int(body_i[b, NV]), 2 if c.structure.model.planar else 3)
+            out[at : at + n] = rotation(c.values, name, q)[:n, :n] @ d[at : at + n]
+    return out
 
 
 def closed_near(c: Compiled, t: float, q: np.ndarray) -> np.ndarray | None:

@@ -17,8 +17,20 @@ class Overlap(ModelError):
     """A motion that begins with bodies in each other."""
 
 
-def jam(e: Any, t: float) -> str:
-    """What is said where friction in a joint, or where bodies touch, has no force that goes with its own load."""
+def jam(e: Any, t: float, alone: bool) -> str:
+    """What is said where no force of friction in a joint, or where bodies touch, was found that goes with its own load.
+
+    With one such load (``alone``) the search finds it if it exists; with several it may end short of them.
+    """
+    if not alone:
+        where = f"of {bodies(e)}" if isinstance(e, Touch) else f"in joint {e.joint!r}"
+        return (
+            f"{e.title} {where}: at t = {t:.6g} s no loads were found that go with the friction that they cause, here "
+            f"and elsewhere. Either friction grows with the load that it makes itself faster than that can hold it (a "
+            f"jam, or Painleve's paradox), or there are such loads and the search ended short of them. Less friction "
+            f"is easier (coefficients, radius, bending_length, twist_length); steps by impulses (method='impulse') "
+            f"need no such search"
+        )
     if isinstance(e, Touch):
         return (
             f"{e.title} of {bodies(e)} jams at t = {t:.6g} s: friction there grows with the load that it makes itself "

@@ -22,6 +22,7 @@ from ..mobility import mobility
 
 COORDINATES = ("auto", "absolute", "joint")
 THIN = 1e-7  # inertia of a coordinate, as part of that of the mechanism's mass at its length, that is none
+SINGULAR = 1e-13  # least eigenvalue of the mass matrix with a unit diagonal: below it lie rounding errors
 MOST = 8  # joints that are taken out of the forest, one after the other, before it is given up
 UNSOLVED = 1e-9  # what the solve may leave of the equations at the start
 
@@ -136,7 +137,11 @@ def _forest(a: Assembly, parameters: Mapping[str, float] | None, most: float = n
 
 
 def _unsound(c: Compiled, a: Assembly) -> str | None:
-    """A tree joint along whose coordinates hardly any inertia moves, or a body that hangs by none and has none."""
+    """A tree joint along whose coordinates hardly any inertia moves, or a body that hangs by none and has none.
+
+    Each may move inertia alone and several together none, as a body without inertia that turns about its mass centre
+    while its neighbour keeps its place. The factorisation then divides by rounding errors, or by zero.
+    """
     s, S = c.structure, c.values.system
     if S.glob[SEMIDEFINITE] == 0.0 or S.kinds[SOLVER] != COUPLED:
         return None
@@ -166,4 +171,8 @@ def _unsound(c: Compiled, a: Assembly) -> str | None:
             block[i - first, j - first] = block[j - first, i - first] = x
         if np.linalg.eigvalsh(block)[0] < THIN * size:
             return names[k]
-    return None
+    whole = np.zeros((s.nv, s.nv))
+    whole[row, column] = whole[column, row] = c.work.M
+    scale = 1.0 / np.sqrt(whole.diagonal())
+    least, moves = np.linalg.eigh(scale[:, None] * whole * scale)
+    return names[of[np.argmax(np.abs(moves[:, 0]))]] if least[0] < SINGULAR else None

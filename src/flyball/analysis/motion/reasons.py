@@ -348,7 +348,8 @@ def _jammed(a: Assembly, clock: ex.Clock) -> str:
     W = a.compiled.work
     if W.info[STATUS] != motion.JAMMED:
         return ""
-    return jam(a.compiled.structure.forces[int(W.info[GUILTY])], float(clock.real[ex.T]))
+    loads = int((a.compiled.system.force_i[:, FORCE_LOAD] >= 0).sum())
+    return jam(a.compiled.structure.forces[int(W.info[GUILTY])], float(clock.real[ex.T]), loads == 1)
 
 
 def _stuck(a: Assembly, clock: ex.Clock) -> str:

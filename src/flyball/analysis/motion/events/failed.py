@@ -127,14 +127,15 @@ def no_forces(n: Instant, found: Decided) -> Unresolved:
     sliding = [p for p in found.parts if p.rule in (DRIVEN, GRIPS)]
     jammed = [n.here.structure.switches[p.switch].element for p in sliding]
     if found.ended != NOT_HELD and len(jammed) == 1 and hasattr(jammed[0], "joint"):
-        return Unresolved(jam(jammed[0], n.here.t), t=n.here.t)
+        return Unresolved(jam(jammed[0], n.here.t, True), t=n.here.t)
     if found.ended == NOT_HELD or not sliding:
         why = "what they hold cannot be held together: one of them must give way"
     else:
         why = (
-            "friction grows with the load that it makes itself faster than that can hold it (a jam, or Painleve's "
-            f"paradox), at {' and '.join(elements(n, sliding))}: with less friction, or an elastic stop or joint, "
-            "there is a solution"
+            f"no loads were found that go with the friction of {' and '.join(elements(n, sliding))}. Either it grows "
+            "with the load that it makes itself faster than that can hold it (a jam, or Painleve's paradox): with less "
+            "friction, or an elastic stop or joint, there is a solution. Or there is one, and the search ended short "
+            "of it"
         )
     return Unresolved(
         f"at t = {n.here.t:.9g} s no forces fulfil all that is asked of them at once; it is asked by "

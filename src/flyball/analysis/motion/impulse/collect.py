@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ....contact.tables import FOUND, GAP, MOVER, POINT, SHAPE_1, SHAPE_2
+from ....contact.tables import FOUND, GAP, MOVER, SHAPE_1, SHAPE_2
 from ....math.vec import mtv, quaternion_matrix
 from ....model.model import Model
 from ....results.bulk import Bulk
@@ -90,16 +90,22 @@ class Collected:
         self.acceleration.append((s.rooms.X.v[:, :6] - s.free.before[:, :6]) / s.pace.real[STEP])
 
     def _touching(self) -> dict[str, np.ndarray]:
-        """Contacts with a force, and the normals along which these were found: those of the middle of the step."""
+        """Contacts with a force, and the normals along which these were found: those of the middle of the step.
+
+        Their points have the arms by which they were found, from where mass centres were when the step began; between
+        two that move the mean of both. So the torques of the table are those of the motion.
+        """
         s = self.stepper
         C, kept = s.last()
         n = int(C.count[FOUND])
         impulse = kept[:n, IMPULSE : IMPULSE + 3] + kept[:n, KICK : KICK + 3]
         k = np.flatnonzero((impulse != 0.0).any(axis=1))
         mover = s.geometry.shape_i[C.at[k][:, [SHAPE_1, SHAPE_2]], MOVER]
+        moving = (mover >= 0)[:, :, None]
+        points = np.where(moving, s.free.start[mover, :3] + s.rooms.P.arm[k].reshape(-1, 2, 3), 0.0)
         return {
             "pair": self.side_of[mover],
-            "point": C.x[k, POINT : POINT + 3],
+            "point": points.sum(axis=1) / np.maximum(moving.sum(axis=1), 1),
             "normal": s.rooms.P.frame[k, :3].copy(),
             "gap": C.x[k, GAP],
             "force": impulse[k] / s.pace.real[STEP],

@@ -1,8 +1,9 @@
 """Lemke's pivoting on the small problem, where exchanging states does not end.
 
-Rows that hold and those that are driven are taken out first. What pushes is one unknown, friction is three: its
-impulse up and down, and how fast it slides (Stewart and Trinkle 1996). Ties are broken lexicographically (Cottle, Pang
-and Stone 1992, section 4.9).
+Rows that hold and those that are driven are taken out first. What pushes is one unknown, friction is four: its
+impulse up and down, how fast it slides (Stewart and Trinkle 1996), and by how much the line of its reach is below zero.
+Ties are broken lexicographically (Cottle, Pang and Stone 1992, section 4.9), so that what is rounding has to be zero:
+along a chain of bodies constants fall by many powers of ten, and their rounding would decide which is the least.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from .sets import SOFT
 
 NO_PIVOT = 1e-11
 TIE = 1e-13
+ROUNDING = 1e-14  # of the largest constant at the start: what is left of a constant is none
 MANY = 50  # pivots for each unknown
 
 
@@ -57,7 +59,7 @@ def unknowns(P):
         if P.rule[i] == PUSHES:
             m += 1
         elif grips(P.rule[i]):
-            m += 3
+            m += 4
     return m
 
 
@@ -164,6 +166,9 @@ def tableau(P, m):
             T[a + 1, m + a + 2] -= 1.0
             T[a + 2, m + a] += 1.0  # reach - up - down
             T[a + 2, m + a + 1] += 1.0
+            impulses(P, m, a + 3, i, (0.0, 1.0))
+            T[a + 2, m + a + 3] -= 1.0  # + what it lacks, in reach and in what is not negative of it
+            T[a + 3, m + a + 3] -= 1.0
 
 
 @formula
@@ -191,7 +196,11 @@ def impulses(P, m, a, i, what):
 def lemke(P, m):
     """Pivot until z0 is out. Returns whether it came to that."""
     T = P.T
-    least = 0.0
+    least, most = 0.0, 0.0
+    for a in range(m):
+        most = max(most, abs(T[a, 2 * m + 1]))
+    nothing = ROUNDING * most
+    clear(P, m, nothing)
     for a in range(m):
         least = min(least, T[a, 2 * m + 1])
     if least >= 0.0:
@@ -202,6 +211,7 @@ def lemke(P, m):
         P.info[PIVOTS] += 1
         leave = P.basis[row]
         pivot(P, m, row, enter)
+        clear(P, m, nothing)
         P.basis[row] = enter
         if leave == 2 * m:
             return True
@@ -264,6 +274,14 @@ def pivot(P, m, row, enter):
 
 
 @formula
+def clear(P, m, nothing):
+    """Constants that are rounding become zero."""
+    for a in range(m):
+        if abs(P.T[a, 2 * m + 1]) <= nothing:
+            P.T[a, 2 * m + 1] = 0.0
+
+
+@formula
 def among(P, m, z):
     """Value of an unknown."""
     for a in range(m):
@@ -280,7 +298,9 @@ def read(P, m):
         if rule == PUSHES:
             P.state[i] = EVEN if among(P, m, a) > 0.0 else FREE
         elif grips(rule):
-            if among(P, m, a + 2) > 0.0:
+            if among(P, m, a + 3) > 0.0:
+                P.state[i] = FREE
+            elif among(P, m, a + 2) > 0.0:
                 P.state[i] = HIGH if among(P, m, a) > among(P, m, a + 1) else LOW
             else:
                 P.state[i] = EVEN

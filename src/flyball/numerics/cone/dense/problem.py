@@ -9,7 +9,8 @@ The same stands for accelerations and forces. Rules:
     DRIVEN   x = -lean reach: slides a known way
     TURNS    with the row behind it (its rule: WITH): |(x1, x2)| <= reach; u = 0 within, u against x at the end
 
-reach = const + gain x: what a row can hold may depend on what others carry. Rows are of any units; A's diagonal says
+reach = const + gain x, of friction never less than zero: what a row can hold may depend on what others carry, and where
+that is a load made linear elsewhere, the line passes below zero. Rows are of any units; A's diagonal says
 what is large. Where A is singular, rows that hold share as sum A_ii x_i^2 is least.
 """
 
@@ -60,7 +61,7 @@ class Dense(NamedTuple):
 
 def dense(n: int) -> Dense:
     """Room for n rows, all OUT."""
-    m = 3 * n
+    m = 4 * n
     z, i = np.zeros, np.int64
     return Dense(
         z((n, n)), z(n), z(n), z(n, i), z(n), z((n, n)), z(n), z(n, i), z(n), z(n), z(n), z(3, i),

@@ -12,6 +12,7 @@ from ....math.scalar import sqrt
 from .problem import (
     BIAS,
     CONST,
+    DRIVEN,
     EVEN,
     FIRST,
     FREE,
@@ -222,14 +223,21 @@ def better(P, x, i):
         return better_pair(P, x, i)
     if rule == WITH:
         return better_pair(P, x, i - 1)
+    if rule == DRIVEN:
+        reach, least = reaching(P, x, i), rounding(P, x, i)
+        return FREE if reach < -least else LED if reach > least else state
     if rule == GRIPS:
+        reach, least = reaching(P, x, i), rounding(P, x, i)
         if state == EVEN:
-            over = abs(x[i]) - reaching(P, x, i)
-            if over > rounding(P, x, i):
+            if abs(x[i]) > max(reach, 0.0) + least:
                 return HIGH if x[i] > 0.0 else LOW
             return EVEN
+        if reach < -least:
+            return FREE
+        if state == FREE:
+            return EVEN if reach > least else FREE
         way = 1.0 if state == HIGH else -1.0
-        return EVEN if way * velocity(P, x, i) > rounding(P, x, i) else state
+        return EVEN if way * velocity(P, x, i) > least else state
     return state
 
 

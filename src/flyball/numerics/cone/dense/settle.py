@@ -91,6 +91,11 @@ def found(P):
             idle += 1
     if idle > 0 and not solved(P):  # the others by themselves: where all is rounding its share is not less than theirs
         return NONE_FOUND
+    for i in range(n):  # friction that can hold nothing: as it slides
+        if P.rule[i] == GRIPS and P.state[i] == FREE:
+            P.state[i] = LOW if velocity(P, P.row[REST], i) > 0.0 else HIGH
+        elif P.rule[i] == DRIVEN:
+            P.state[i] = LED
     most = 0.0
     for i in range(n):
         most = max(most, driving(P, P.row[REST], i))
