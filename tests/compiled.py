@@ -67,7 +67,8 @@ def _kernel(function, args, result):
         lines += [f"    out[{i}] = r[{i}]" for i in range(len(result))]
     elif result is not None:
         lines.append("    out[0] = r")
-    name = f"{function.__module__}.{function.__qualname__}".replace(".", "_")
+    sizes = "_".join(str(len(x)) if _plain(x) else "" for x in args)
+    name = f"{function.__module__}.{function.__qualname__}_{sizes}".replace(".", "_").replace("<", "").replace(">", "")
     text = "\n".join([f"def {name}({', '.join(heads)}, out: Complex1) -> int:", *lines, "    return 0"])
     exec(compile(text, function.__code__.co_filename, "exec"), scope)
     return kernel(scope[name]), result

@@ -257,7 +257,7 @@ def test_what_is_no_field_is_refused(heights, d, told):
 
 LENS = '''"""Two caps of a sphere, base to base: what is within the radius of both of two centres on the z axis."""
 
-from ....compiler.jit import formula
+from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ...tables import PAR
 

@@ -10,7 +10,7 @@ from flyball.analysis.linear.loads import STEP
 from flyball.analysis.motion.implicit.layout import layout
 from flyball.analysis.motion.start import begin
 from flyball.analysis.motion.touches import with_places
-from flyball.equations.residual import address, through_stepped
+from flyball.equations.residual import stepped
 from flyball.equations.tasks import PARTS, PUSHES, Bench
 from flyball.tables.system import FORCE_ALONG, FORCE_SWITCH, HELD, MODE, OFF, SLIDING, SWITCH_OTHER
 from tests.contract.test_everything import everything
@@ -59,7 +59,7 @@ def test_jacobians_from_parts_are_those_of_the_whole(name, coordinates):
         out = np.zeros((len(steps), made.places), complex)
         t, y, vdot, lam = np.array([x.t + 0j]), x.y.astype(complex), x.vdot.astype(complex), x.lam.astype(complex)
         bench = Bench(t, y, vdot, lam, steps, out)
-        through_stepped(address(SC, WC, bench), SC, WC, bench, task)
+        stepped(SC, WC, bench, bench, bench, task)
         entry, step, place = terms.pick.T
         found = [out[step + n * terms.groups, place].imag / STEP for n in range(len(kinds))]
         size = nv + len(s.rows), nv

@@ -37,6 +37,11 @@ class Copy:
         self.cache = folder / "cache"
         shutil.copytree(PACKAGE, self.package, ignore=shutil.ignore_patterns("__pycache__"))
 
+    @staticmethod
+    def examples() -> Path:
+        """Where the example models are."""
+        return Path(__file__).resolve().parents[2] / "examples"
+
     def with_cache(self, folder: Path) -> Copy:
         """The same copy, with another cache of compiled code."""
         other = copy(self)

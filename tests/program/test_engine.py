@@ -98,7 +98,7 @@ def test_other_tables_than_those_it_was_made_for_are_refused():
     """Complex tables would be read as if they were real."""
     _, S, W, R, clock, sheet = desk(fb.load("examples/slider_crank.toml"), "absolute")
     complex_tables = S._replace(body_x=S.body_x.astype(complex))
-    with pytest.raises(Exception, match="System.frame_x: an array of complex128"):
+    with pytest.raises(Exception, match=r"System\.frame_x: an array of complex128"):
         motion_kernel(complex_tables, W, R, clock, sheet.rows, MOTION)
 
 

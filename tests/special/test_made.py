@@ -13,7 +13,7 @@ import pytest
 import flyball as fb
 from flyball import special
 from flyball.analysis.motion.start import begin
-from flyball.compiler.bound import Written
+from flyball.compiler.buffers import StructBuffer
 from flyball.equations.engine import motion_kernel
 from flyball.equations.projection import NONE, STAGES
 from flyball.equations.scratch import work
@@ -188,11 +188,11 @@ def test_sampled_laws_of_drivers_are_their_second_derivatives():
         x, _ = values_of(m, coordinates)
         made, _ = special.code(special.plan(x), x)
         (name,) = filter(None, made.laws)
-        S = Written(made.system(x.system))
+        S = StructBuffer(made.system(x.system))
         of = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_void_p] * 2, ctypes.c_double, *[ctypes.c_void_p] * 4)
-        sensors, W = np.zeros(16), Written(work(x.structure, x.system))
+        sensors, W = np.zeros(16), StructBuffer(work(x.structure, x.system))
         for t in (0.1, 0.5):
-            found = of(made.loaded.addresses[name])(S.place, W.place, t, *[sensors.ctypes.data] * 4)
+            found = of(made.loaded.addresses[name])(S.address, W.address, t, *[sensors.ctypes.data] * 4)
             assert found == pytest.approx(0.2 * np.exp(-((t / 0.3) ** 2)) * (4 * t**2 / 0.09 - 2) / 0.09, rel=1e-12)
 
 

@@ -10,6 +10,7 @@ import typer
 from . import (  # noqa: F401  (each adds its subcommand)
     check,
     compare,
+    compile,
     equations,
     equilibrium,
     export,

@@ -87,7 +87,8 @@ def compile_all(
             [sys.executable, "-P", "-c", code], stdin=PIPE, stdout=PIPE, stderr=PIPE, text=True, bufsize=1
         )
         give, answers = process.stdin, process.stdout
-        assert give is not None and answers is not None
+        assert give is not None
+        assert answers is not None
         give.write(f"{folder}\n{' '.join(cpus)}\n")
         while not failures:
             with lock:

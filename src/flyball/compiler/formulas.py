@@ -1,8 +1,8 @@
 """Formulas: plain Python code that compiled code may call.
 
-``@formula`` marks it. The function itself stays plain Python, so the same source runs on floats, complex numbers, arrays
-over time and symbols. What compiled code makes of a function is registered when something is compiled (`emit`), and
-never before: describing and checking a mechanism does not pay for a compiler.
+``@formula`` marks it. The function itself stays plain Python, so the same source runs on floats, complex numbers,
+arrays over time and symbols. What compiled code makes of a function is registered when something is compiled
+(`emit`), and never before: describing and checking a mechanism does not pay for a compiler.
 """
 
 from __future__ import annotations

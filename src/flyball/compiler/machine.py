@@ -47,6 +47,11 @@ def baseline() -> str:
     return next((name for name, needs in BASELINES.items() if all(has.get(x) for x in needs)), "x86-64")
 
 
+def baselines() -> tuple[str, ...]:
+    """The processors that object code is shipped for, of this machine's family."""
+    return tuple(BASELINES) if triple().startswith("x86_64") else (baseline(),)
+
+
 @lru_cache(maxsize=1)
 def triple() -> str:
     """Architecture, system and object format of this process."""

@@ -19,7 +19,6 @@ from .formulas import formula
 
 PACKAGE = Path(__file__).parent.parent
 COMPILED = (
-    "compiler",
     "constraints",
     "contact",
     "equations",
@@ -31,6 +30,8 @@ COMPILED = (
     "tables/system.py",
 )
 """Files and folders that hold formulas and kernels, and all constants that these take from elsewhere."""
+COMPILER = ("emit.py", "formulas.py", "layout.py", "machine.py", "references.py", "target.py")
+"""Files of the compiler that decide what code is made."""
 TEXTS: dict[str, str] = {}
 """Sources of formulas that were put together at import (`generated`): module and name -> text."""
 
@@ -49,7 +50,7 @@ def compiled_files() -> set[Path]:
 
 def sources_of(file: Path) -> list[Path]:
     """The source files that a kernel which stands in ``file`` is made of: all, where it is not one of ours."""
-    known, seen, todo = compiled_files(), set[Path](), [file, *Path(__file__).parent.glob("*.py")]
+    known, seen, todo = compiled_files(), set[Path](), [file, *(Path(__file__).parent / name for name in COMPILER)]
     if not file.is_relative_to(PACKAGE):
         todo += known
     while todo:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Iterator
 from functools import cached_property, partial
+from importlib import import_module
 from typing import Any
 
 from llvmlite import ir
@@ -38,6 +39,11 @@ PASSES = (
     (typed_passes, "NopythonTypeInference PreLowerStripPhis IRLegalization NativeLowering NoPythonBackend"),
 )
 """Of Numba's passes those that formulas need: no closures, generators, literal unrolling, array expressions."""
+IMPLEMENTATIONS = (
+    "core.optional cpython.builtins cpython.iterators cpython.numbers cpython.rangeobj cpython.slicing "
+    "cpython.tupleobj np.arraymath np.arrayobj"
+)
+REGISTRIES = "cpython.cmathimpl cpython.mathimpl np.npyimpl"
 
 
 class Flyball(CPU):
@@ -99,13 +105,10 @@ class Context(cpu.CPUContext):
 
     def load_additional_registries(self) -> None:
         """What formulas use of Numba: numbers, loops, tuples, arrays, mathematics; no runtime."""
-        from numba.core import optional  # noqa: F401
-        from numba.cpython import builtins, cmathimpl, iterators, mathimpl, numbers, rangeobj, slicing, tupleobj
-        from numba.np import arraymath, arrayobj, npyimpl
-
-        assert builtins and iterators and numbers and rangeobj and slicing and tupleobj and arraymath and arrayobj
-        for of in (cmathimpl, mathimpl, npyimpl):
-            self.install_registry(of.registry)
+        for name in IMPLEMENTATIONS.split():
+            import_module(f"numba.{name}")
+        for name in REGISTRIES.split():
+            self.install_registry(import_module(f"numba.{name}").registry)
 
     def post_lowering(self, mod: Any, library: Any) -> None:
         """Nothing is added to what was translated."""

@@ -159,7 +159,7 @@ def sampled_kernel(
 ) -> int:
     """Integrate from instant to instant, as `engine.INTEGRATE` does between them. Returns rows written."""
     A = (address, S, W, R, clock, sheet, P, lower)
-    return advance(by_engine, A, A, A[SHEET].rows, out)
+    return advance(by_engine, A, A, sheet.rows, out)
 
 
 @formula

@@ -1,6 +1,7 @@
 """A motion that goes on by steps of any method and in which nothing is watched: the loop of the integrators, by a door.
 
-All that it works with is laid out once and copied for each run (`bound.StructPool`); nothing of it is looked at in Python.
+All that it works with is laid out once and copied for each run (`buffers.StructPool`); nothing of it is looked at in
+Python.
 """
 
 from __future__ import annotations
