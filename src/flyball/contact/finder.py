@@ -149,10 +149,10 @@ class Finder:
         As large; of searches between two of these.
     search : Search
     address : int
-        Of the search. A compiled loop calls ``call(address, geometry, movers, before, now, search, STEP)``, in which the
-        third structure gets the contacts, and has these two change places after each call that returned DONE; at another
-        status it returns to Python, which calls `enlarge` and goes on with the tuples that are then in ``now``,
-        ``before`` and ``search``.
+        Of the search. A compiled loop calls ``call(address, geometry, movers, before, now, search, STEP)``, in which
+        the third structure gets the contacts, and has these two change places after each call that returned DONE; at
+        another status it returns to Python, which calls `enlarge` and goes on with the tuples that are then in
+        ``now``, ``before`` and ``search``.
     """
 
     def __init__(self, geometry: Geometry, *, margin: float = 0.0, ahead: float = 0.0, skin: float = THICK) -> None:
