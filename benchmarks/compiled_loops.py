@@ -5,14 +5,13 @@ The loops are compiled when first called and not cached, which takes about half 
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 
-from flyball.compiler.jit import start_numba
-from flyball.compiler.ways import optimise_once
+from flyball.compiler.kernels import kernel
+from flyball.compiler.layout import Float1
 from flyball.equations.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivative, prepare, remember, settle
 from flyball.equations.solve import REFINEMENTS, factor, solve
 from flyball.equations.tree import retract
@@ -28,12 +27,15 @@ from flyball.tables.system import (
     TOL_V,
     V3,
     X_SOLVED,
+    System,
+    Work,
 )
 
 RIGHT_HAND_SIDE, KINEMATICS, REACTIONS = range(3)
 
 
-def follow(S, W, times, y, dy, task):
+@kernel
+def follow(S: System, W: Work, times: Float1, y: Float1, dy: Float1, task: int) -> int:
     """Visit the times; ``y`` goes along from each to the next. Returns 0 or a status.
 
     KINEMATICS: positions by Newton's method from those before, carried on with velocities and accelerations; then
@@ -67,23 +69,6 @@ def follow(S, W, times, y, dy, task):
     return 0
 
 
-@lru_cache(maxsize=1)
-def compiled_follow() -> Any:
-    """The loop, compiled as flyball's kernels are."""
-    start_numba()
-    from numba import njit
-
-    made = njit(error_model="numpy", nogil=True, _nrt=False, no_cfunc_wrapper=True)(follow)
-
-    def call(*arguments: Any) -> int:
-        if made.signatures:
-            return made(*arguments)
-        with optimise_once(follow.__qualname__):
-            return made(*arguments)
-
-    return call
-
-
 def clock(c: Any, y: np.ndarray, times: np.ndarray, task: int) -> float:
     """CPU seconds of the loop over the times, from the state y of a compiled mechanism.
 
@@ -96,7 +81,7 @@ def clock(c: Any, y: np.ndarray, times: np.ndarray, task: int) -> float:
     W.option[STABILIZE], W.option[PASS] = STAGES, 1e-13
     W.option[TOL_G], W.option[TOL_V] = 1e-10, 1e-9  # those of a simulation at rtol 1e-8
     y, dy = y.copy(), np.zeros(len(y))
-    run = compiled_follow()
+    run = follow
     run(S, W, times[:1], y.copy(), dy, task)  # compiles, and brings the arrays into the cache
     status = []
     seconds = timing.cpu(lambda: status.append(run(S, W, times, y, dy, task)))

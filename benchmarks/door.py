@@ -1,9 +1,9 @@
-"""The engine called by address: what a loop of one's own costs to compile, and a right-hand side through the door.
+"""The engine called by address: what a loop of one's own costs to compile, and a right-hand side by its address.
 
     python benchmarks/door.py
 
 Prints CPU seconds to compile the engine and the loop in a cache of their own, then microseconds for a right-hand side
-of Andrews' mechanism through the door, and inside a kernel that contains it (which compiles for as long as the engine).
+of Andrews' mechanism by its address, and inside a kernel that contains it (which compiles for as long as the engine).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import tempfile
 import time
 from pathlib import Path
 
-os.environ.setdefault("NUMBA_CACHE_DIR", tempfile.mkdtemp())
+os.environ.setdefault("FLYBALL_CACHE", tempfile.mkdtemp())
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import timing  # noqa: F401  isort: skip  (before numpy: it fixes the thread counts)
@@ -22,11 +22,12 @@ import timing  # noqa: F401  isort: skip  (before numpy: it fixes the thread cou
 from tests.program.test_engine import classical_kernel, desk
 
 import flyball as fb
-from flyball.compiler.held import held
-from flyball.compiler.jit import formula, kernel
+from flyball.compiler.formulas import formula
+from flyball.compiler.kernels import kernel
 from flyball.equations.engine import MOTION, engine, motion_kernel
 from flyball.equations.motion import derivative
-from flyball.numerics.integrators.explicit import T
+from flyball.numerics.integrators.clock import Clock, T
+from flyball.tables.system import System, Work
 
 CALLS = 100_000
 
@@ -39,8 +40,8 @@ def again(S, W, clock, n):
 
 
 @kernel
-def contained_kernel(S, W, clock, n):
-    again(held(S), held(W), held(clock), n)
+def contained_kernel(S: System, W: Work, clock: Clock, n: int) -> None:
+    again(S, W, clock, n)
 
 
 def spent(work) -> float:
@@ -55,14 +56,14 @@ def main() -> None:
     _, S, W, R, clock, sheet = desk(fb.load("examples/andrews.toml"), "absolute")  # assembling asks the engine
     motion_kernel(S, W, R, clock, sheet.rows, MOTION)
     print(f"engine compiled and called   {time.process_time() - began:8.2f} s")
-    address = engine.address(S, W, R, clock, sheet)
+    address = engine.address
     loop = lambda n: classical_kernel(address, S, W, R, clock, sheet, 1e-9, n)  # noqa: E731
-    print(f"loop through the door        {spent(lambda: loop(1)):8.2f} s")
+    print(f"loop by its address        {spent(lambda: loop(1)):8.2f} s")
     print(f"loop that contains it        {spent(lambda: contained_kernel(S, W, clock, 1)):8.2f} s")
     for _ in range(3):
         through = spent(lambda: loop(CALLS // 4)) / CALLS * 1e6
         inside = spent(lambda: contained_kernel(S, W, clock, CALLS)) / CALLS * 1e6
-        print(f"a right-hand side            {through:8.2f} us through the door, {inside:8.2f} us contained")
+        print(f"a right-hand side            {through:8.2f} us by its address, {inside:8.2f} us contained")
 
 
 if __name__ == "__main__":

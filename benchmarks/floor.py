@@ -164,24 +164,15 @@ _loops: dict[str, Callable] = {}
 def compiled_loop(part: str) -> Callable:
     """A part again and again, compiled as the kernels are."""
     if part not in _loops:
-        import numba
+        from flyball.compiler.kernels import kernel
+        from flyball.tables.system import System, Work
 
-        from flyball.compiler.jit import start_numba
-        from flyball.compiler.ways import optimise_once
-
-        start_numba()
-        names = scope()
-        exec(f"def loop(n, S, W, y, q, v, z, dy):\n    for _ in range(n):\n        {PARTS[part]}\n", names)
-        made = numba.njit(error_model="numpy", nogil=True, _nrt=False, no_cfunc_wrapper=True)(names["loop"])
-
-        def call(*args: Any) -> None:
-            if made.signatures:
-                made(*args)
-            else:
-                with optimise_once("loop"):
-                    made(*args)
-
-        _loops[part] = call
+        names = scope() | {"System": System, "Work": Work}
+        arrays = ", ".join(f"{x}: Float1" for x in ("y", "q", "v", "z", "dy"))
+        name = "".join(x for x in part if x.isalnum())
+        head = f"def loop_{name}(n: int, S: System, W: Work, {arrays}) -> None:"
+        exec(f"{head}\n    for _ in range(n):\n        {PARTS[part]}\n", names)
+        _loops[part] = kernel(names[f"loop_{name}"])
     return _loops[part]
 
 

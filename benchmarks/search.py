@@ -9,14 +9,28 @@ import time
 
 import numpy as np
 
-from flyball.compiler.door import enter
-from flyball.compiler.held import held
-from flyball.compiler.jit import formula, kernel
-from flyball.contact.broad.desk import AFRESH_SO_FAR, REMADE
+from flyball.compiler.formulas import call, formula
+from flyball.compiler.kernels import kernel
+from flyball.contact.broad.desk import AFRESH_SO_FAR, REMADE, Search
 from flyball.contact.broad.search import AFRESH, STEP
 from flyball.contact.finder import Finder, no_movers
 from flyball.contact.kinds import PLANE, SPHERE
-from flyball.contact.tables import AXES, FOUND, GAP, KIND, MASK, MEMBER, MOVER, NORMAL, PAIRS, PAR, RADIUS, Geometry
+from flyball.contact.tables import (
+    AXES,
+    FOUND,
+    GAP,
+    KIND,
+    MASK,
+    MEMBER,
+    MOVER,
+    NORMAL,
+    PAIRS,
+    PAR,
+    RADIUS,
+    Contacts,
+    Geometry,
+    Movers,
+)  # fmt: skip
 
 R, H, MARGIN = 0.1, 5e-3, 2e-3
 
@@ -28,15 +42,17 @@ def go(address, G, M, C, O, B, h, steps, task):
         for m in range(M.pose.shape[0]):
             for c in range(3):
                 M.pose[m, c] += h * M.twist[m, c]
-        status = enter(address, G, M, C, O, B, task) if k % 2 == 0 else enter(address, G, M, O, C, B, task)
+        status = call(address, G, M, C, O, B, task) if k % 2 == 0 else call(address, G, M, O, C, B, task)
         if status != 0:
             return status
     return 0
 
 
 @kernel
-def go_kernel(address, G, M, C, O, B, h, steps, task):
-    return go(address, held(G), held(M), held(C), held(O), held(B), h, steps, task)
+def go_kernel(
+    address: int, G: Geometry, M: Movers, C: Contacts, O: Contacts, B: Search, h: float, steps: int, task: int
+) -> int:
+    return go(address, G, M, C, O, B, h, steps, task)
 
 
 def box_of_spheres(n):

@@ -26,7 +26,6 @@ from flyball.numerics.cone.pyramid import sliding_share
 from flyball.numerics.cone.registry import FACTORED, SOLVERS, room_for_all
 from flyball.numerics.cone.residual import residuals
 from flyball.numerics.cone.rooms import rooms
-from flyball.numerics.cone.solve import solve_kernel
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -51,8 +50,8 @@ def points(name: str, P, v: np.ndarray, wide: np.ndarray) -> list[tuple[float, f
     out = []
     room = room_for_all(P, O, True) if name in FACTORED else F
     F = Factor(room.numbers, room.places)
-    address = SOLVERS[name].address(P, X, W, O, F)
-    solve_kernel(address, P, X, W, O, F)
+    solver = SOLVERS[name]
+    solver(P, X, W, O, F, 0)
     if O.count[ENDED] == SMALL:
         F = Factor(np.zeros(O.count[NEEDED_NUMBERS]), np.zeros(O.count[NEEDED_PLACES], np.int64))
     for cut in CUTS:
@@ -61,7 +60,7 @@ def points(name: str, P, v: np.ndarray, wide: np.ndarray) -> list[tuple[float, f
             X.v[:], X.wide[:], X.p[:] = v, wide, 0.0
             O.count[MOST], O.real[ENOUGH] = cut, 0.0
             began = time.process_time()
-            used = solve_kernel(address, P, X, W, O, F)
+            used = solver(P, X, W, O, F, 0)
             spent = min(spent, time.process_time() - began)
         left = residuals(P, X, O, (X.v, X.wide, v, wide))
         out.append((used, 1e3 * spent, left[0], left[1]))

@@ -7,19 +7,18 @@ start of the motion, projection and refinement included; loops are those of ``si
 from __future__ import annotations
 
 import sys
-from functools import lru_cache
 from typing import Any
 
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 
 from flyball import special
-from flyball.compiler.held import held
-from flyball.compiler.jit import formula, start_numba
-from flyball.compiler.ways import optimise_once
+from flyball.compiler.formulas import formula
+from flyball.compiler.kernels import kernel
+from flyball.compiler.layout import Float1
 from flyball.equations.motion import STAGES, derivative
 from flyball.equations.scratch import work
-from flyball.tables.system import MADE, PASS, SAMPLED, STABILIZE, TOL_G, TOL_V
+from flyball.tables.system import MADE, PASS, SAMPLED, STABILIZE, TOL_G, TOL_V, System, Work
 from mechanisms import Kernel, example
 
 MECHANISMS = {
@@ -46,26 +45,10 @@ def again(S, W, y, dy, n):
     return status
 
 
-def right_hand_sides(S, W, y, dy, n):
-    """Tables handed over as the engine does."""
-    return again(held(S), held(W), y, dy, n)
-
-
-@lru_cache(maxsize=1)
-def compiled() -> Any:
-    """The loop, compiled as flyball's kernels are."""
-    start_numba()
-    from numba import njit
-
-    made = njit(error_model="numpy", nogil=True, _nrt=False, no_cfunc_wrapper=True)(right_hand_sides)
-
-    def call(*arguments: Any) -> int:
-        if made.signatures:
-            return made(*arguments)
-        with optimise_once(right_hand_sides.__qualname__):
-            return made(*arguments)
-
-    return call
+@kernel
+def right_hand_sides(S: System, W: Work, y: Float1, dy: Float1, n: int) -> int:
+    """`again`, compiled."""
+    return again(S, W, y, dy, n)
 
 
 def microseconds(s: Any, S: Any, y: np.ndarray, calls: int = 20000) -> tuple[float, np.ndarray]:
@@ -73,7 +56,7 @@ def microseconds(s: Any, S: Any, y: np.ndarray, calls: int = 20000) -> tuple[flo
     W, dy = work(s, S), np.zeros(len(y))
     W.info[MADE + 1 : MADE + SAMPLED] = S.flat[1:SAMPLED]
     W.option[[STABILIZE, PASS, TOL_G, TOL_V]] = STAGES, 1e-13, 1e-10, 1e-9
-    run = compiled()
+    run = right_hand_sides
     if run(S, W, y, dy, 1) != 0:
         raise RuntimeError("the right-hand side has no value")
     return min(timing.cpu(lambda: run(S, W, y, dy, calls)) for _ in range(7)) / calls * 1e6, dy

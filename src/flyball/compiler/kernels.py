@@ -103,9 +103,19 @@ class Kernel:
 
 
 class ArrayBuffer:
-    """An array as kernels read it."""
+    """An array as kernels read it.
+
+    Parameters
+    ----------
+    x : ndarray
+        It is kept.
+    of : Array
+    name : str
+        In a message where it is not of that type.
+    """
 
     def __init__(self, x: np.ndarray, of: Array, name: str) -> None:
+        self.array = x
         self.words = np.array(described(x, of, name), np.int64)
         self.address = self.words.ctypes.data
 
@@ -116,7 +126,7 @@ def _buffer(x: Any, of: Any, kernel: Kernel) -> Any:
     if of is float:
         return float(x)
     if isinstance(of, Array):
-        return ArrayBuffer(x, of, kernel.name)
+        return x if isinstance(x, ArrayBuffer) else ArrayBuffer(x, of, kernel.name)
     made = x if isinstance(x, StructBuffer) else StructBuffer(x)
     check(kernel, of, made)
     return made

@@ -34,8 +34,7 @@ from .formulas import OPTIONS
 
 NAME = "flyball"
 PASSES = (
-    (untyped_passes, "TranslateByteCode FixupArgs IRProcessing RewriteSemanticConstants DeadBranchPrune"),
-    (untyped_passes, "GenericRewrites MakeFunctionToJitFunction ReconstructSSA"),
+    (untyped_passes, "TranslateByteCode FixupArgs IRProcessing GenericRewrites MakeFunctionToJitFunction ReconstructSSA"),
     (typed_passes, "NopythonTypeInference PreLowerStripPhis IRLegalization NativeLowering NoPythonBackend"),
 )
 """Of Numba's passes those that formulas need: no closures, generators, literal unrolling, array expressions."""

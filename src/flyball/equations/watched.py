@@ -14,8 +14,8 @@ import numpy as np
 
 from ..compiler.buffers import PooledBuffer, StructBuffer
 from ..compiler.formulas import formula
-from ..compiler.kernels import BoundKernel, kernel
-from ..compiler.layout import Float2, Int1
+from ..compiler.kernels import ArrayBuffer, BoundKernel, kernel
+from ..compiler.layout import Array, Float2, Int1
 from ..numerics.cone.shares import OPEN
 from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.expected import expect
@@ -289,24 +289,30 @@ class Loop:
         sheet = Sheet(np.zeros((4, max(width, len(S.guard_i), nv, len(S.row_i), 1))))
         self.own = Own(own, sheet, self._known[0].fields, np.zeros(2, np.int64))
         self._bound: BoundKernel | None = None
+        self._clock, self._watch, self._group = (StructBuffer(x) for x in (clock, self.desk, group))
+        self._expected = StructBuffer(self.expected)
+        self._own = [self._known[0], StructBuffer(own), StructBuffer(sheet)]
 
     def go_on(self, S: System, out: np.ndarray, sampling: Sampling | None = None) -> int:
         """Go on until an event, the end, or what else `loop.advance` returns for. Returns rows written.
 
         Where nothing is watched, what ``sampling`` says is sampled on the way.
         """
-        x, W = self.own, self.scratch.fields
+        x = self.own
         if self._bound is None or S is not self.S:
             x.doors[0] = engine.address
             own, going = (StructBuffer(f, *self._known) for f in (x, Going(self.clock, self.desk, self.group)))
-            self.S, self._bound = S, self.steps.bind(tables(self.s, S), self.scratch, own, going, x.doors)
+            written = tables(self.s, S)
+            self.S, self._bound = S, self.steps.bind(written, self.scratch, own, going, x.doors)
+            method = ArrayBuffer(self._bound.words, Array("i8", 1), "method")
+            self._asked = method, engine.address, written, self.scratch, *self._own
         if self.group.Q.count[OPEN] and not self.group.door[0]:
             self.group.door[0] = shares.address
-        asked = self._bound.words, engine.address, S, W, x.R, x.clock, x.sheet
+        asked = self._asked
         if not len(S.guard_i) and sampling is not None:
             plan, part = sampling.plan, sampling.sheet.rows
-            return int(sampled_steps_kernel(*asked, self.desk, self.clock, plan, part, out))
-        return int(watched_kernel(*asked, self.group, self.expected, self.desk, self.clock, out))
+            return int(sampled_steps_kernel(*asked, self._watch, self._clock, plan, part, out))
+        return int(watched_kernel(*asked, self._group, self._expected, self._watch, self._clock, out))
 
     @property
     def fired(self) -> tuple[int, ...]:
