@@ -34,7 +34,8 @@ from .formulas import OPTIONS
 
 NAME = "flyball"
 PASSES = (
-    (untyped_passes, "TranslateByteCode FixupArgs IRProcessing GenericRewrites MakeFunctionToJitFunction ReconstructSSA"),
+    (untyped_passes, "TranslateByteCode FixupArgs IRProcessing GenericRewrites"),
+    (untyped_passes, "MakeFunctionToJitFunction ReconstructSSA"),
     (typed_passes, "NopythonTypeInference PreLowerStripPhis IRLegalization NativeLowering NoPythonBackend"),
 )
 """Of Numba's passes those that formulas need: no closures, generators, literal unrolling, array expressions."""
