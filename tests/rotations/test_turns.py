@@ -17,7 +17,9 @@ SEQUENCES = [(i, j, k) for i in range(3) for j in range(3) for k in range(3) if 
 def every_formula(i, j, k, angles, rates, out):
     a, b, c = angles[0], angles[1], angles[2]
     speed = (rates[0], rates[1], rates[2])
-    out[0, :4] = turns.sequence_quaternion(i, j, k, a, b, c)
+    quaternion = turns.sequence_quaternion(i, j, k, a, b, c)
+    for m in range(4):
+        out[0, m] = quaternion[m]
     base = turns.axes_in_base(i, j, k, a, b)
     body = turns.axes_in_body(i, j, k, b, c)
     n = 1
