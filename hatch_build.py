@@ -7,7 +7,6 @@ Making them takes some minutes. The wheel is then one for this system; without t
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import sysconfig
 from pathlib import Path
@@ -33,20 +32,20 @@ class ObjectsHook(BuildHookInterface):
         if not wanted or version == "editable":
             return
         sys.path.insert(0, str(ROOT / "src"))
-        from flyball.compiler.ahead import compile_all
+        from flyball.compiler.ahead import all_kernels, compile_all
         from flyball.compiler.machine import baselines
+        from flyball.compiler.store import file_name
 
         cpus = baselines() if wanted == "1" else tuple(wanted.split(","))
-        folder = ROOT / "build" / "objects"
-        shutil.rmtree(folder, ignore_errors=True)
+        folder = ROOT / "build" / "objects"  # what is there of the same sources is taken
 
         def progress(name: str, done: int, total: int) -> None:
             self.app.display_info(f"object code {done} of {total}: {name}")
 
         self.app.display_info(f"compiling every kernel for {', '.join(cpus)}: some minutes")
         compile_all(folder, cpus, progress)
-        for path in folder.glob("*.o"):
-            build_data["force_include"][str(path)] = f"flyball/objects/{path.name}"
+        for name in (file_name(kernel, cpu) for kernel in all_kernels() for cpu in cpus):
+            build_data["force_include"][str(folder / name)] = f"flyball/objects/{name}"
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{platform_tag()}"
 

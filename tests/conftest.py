@@ -41,6 +41,22 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: (first[str(item.path)], str(item.path)))
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """What the tests of an installed wheel are to show."""
+    parser.addoption("--shipped", action="store_true", help="fail unless every kernel ran, from shipped object code")
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """With ``--shipped``: name the kernels that were not run, or whose object code was not the wheel's."""
+    if session.config.getoption("--shipped"):
+        from flyball.compiler.ahead import all_kernels
+
+        missing = [f"{k.name}: {k.origin or 'not run'}" for k in all_kernels() if k.origin != "shipped"]
+        if missing or ("numba" in sys.modules and sys.modules["numba"] is not None):
+            print("\nnot run from shipped object code:", *missing or ["Numba was imported"], sep="\n    ")
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
 @pytest.fixture(params=LAYERS)
 def layer(request, monkeypatch) -> str:
     """One coordinate layer after the other, in force for the test."""

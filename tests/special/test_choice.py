@@ -5,11 +5,11 @@ The maker of code is a stand-in that makes nothing, so that only what is decided
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from numba import cfunc
 from typer.testing import CliRunner
 
 import flyball as fb
@@ -206,7 +206,7 @@ def test_an_interrupt_while_code_is_made_keeps_what_was_computed(maker, monkeypa
     assert 0.0 < r.t[-1] < 20.0
 
 
-@cfunc("float64(voidptr, voidptr, float64, voidptr, voidptr, voidptr, voidptr)")
+@ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_void_p] * 2, ctypes.c_double, *[ctypes.c_void_p] * 4)
 def stuck(S, W, t, a, b, c, d):
     """What finishes a derivative, and always finds it not finite."""
     return 1.0
@@ -217,7 +217,7 @@ class Stuck(Code):
 
     def system(self, S):
         flat = np.zeros_like(S.flat)
-        flat[FINISH] = stuck.address
+        flat[FINISH] = ctypes.cast(stuck, ctypes.c_void_p).value
         return S._replace(flat=flat)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.compiler.buffers import StructBuffer
 from flyball.stepping.joined import EVALUATED, UNSETTLED, no_mechanism
 from tests.layers import LAYERS
 
@@ -107,6 +108,4 @@ def test_a_top_spins_several_radians_in_a_step(spin, coordinates):
 
 def test_no_mechanism_has_the_types_of_all_others():
     """So that the loop of steps is compiled once, and what has no joints compiles nothing of this."""
-    from numba import typeof
-
-    assert typeof(no_mechanism()) == typeof(Stepped(oscillator(1.0), H).A)
+    assert StructBuffer(no_mechanism()).layout == StructBuffer(Stepped(oscillator(1.0), H).A).layout

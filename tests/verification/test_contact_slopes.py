@@ -69,3 +69,21 @@ def test_a_slope_that_is_drawn_as_one():
     run = stepped(m, 1.0, 5e-3)["block"]
     assert run.velocity[-1] == pytest.approx(sliding(30) * along, abs=1e-6)
     assert run.position[-1] == pytest.approx(0.05 * n + sliding(30) / 2 * along, abs=1e-6)
+
+
+@pytest.mark.parametrize("shape", [BOX, fb.Sphere(radius=0.1)])
+def test_a_height_field_that_is_a_slope(shape):
+    """Over its triangles a block slides and a ball rolls as on a plane: g (sin a - mu cos a), and 5/7 g sin a."""
+    angle, mu = np.radians(20.0), 0.2
+    x = np.arange(9)[:, None] * 0.5 + np.zeros((1, 5))
+    m = fb.Mechanism("hill", gravity=(0, 0, -G))
+    m.add(fb.Ground("hill", shape=fb.HeightField(heights=-np.tan(angle) * x, dx=0.5), position=(-0.5, -1, 0)))
+    m.add(fb.Contact(friction=mu))
+    up = np.array([np.sin(angle), 0, np.cos(angle)])
+    over = (0.1 if isinstance(shape, fb.Sphere) else 0.05) * up - [0, 0, 0.5 * np.tan(angle)]
+    m.add(fb.Body("b", shape=shape, density=1000, position=tuple(over), orientation=(0, angle, 0)))
+    run = stepped(m, 0.5, 2.5e-3)
+    along = np.array([np.cos(angle), 0, -np.sin(angle)])
+    pull = 5 / 7 * np.sin(angle) if isinstance(shape, fb.Sphere) else np.sin(angle) - mu * np.cos(angle)
+    assert run["b"].velocity[-1] @ along == pytest.approx(0.5 * G * pull, rel=1e-4)
+    assert abs(run["b"].velocity[-1] @ up) < 1e-6
