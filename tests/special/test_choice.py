@@ -6,6 +6,7 @@ The maker of code is a stand-in that makes nothing, so that only what is decided
 from __future__ import annotations
 
 import ctypes
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,8 +120,8 @@ def test_short_motions_are_left_alone(maker):
     assert r.health.engine == "table-driven: too little is computed to make code for it"
 
 
-def test_a_long_motion_begins_anew_with_code_that_pays(maker):
-    """What is left after 8 steps is more than making costs; whatever the clock says, and told as if it began so."""
+def test_a_long_motion_goes_on_with_code_that_pays(maker):
+    """What is left after 8 steps is more than making costs; whatever the clock says."""
     maker.price_of_making = 1e6
     first, again = (four_bar().simulate(20.0, outputs=3) for _ in range(2))
     assert maker.made == 2
@@ -131,7 +132,7 @@ def test_a_long_motion_begins_anew_with_code_that_pays(maker):
     assert first.health.steps == again.health.steps
 
 
-def test_what_begins_anew_is_what_began_so(maker):
+def test_what_changes_to_made_code_is_what_began_so(maker):
     """To the last bit: with code from the beginning, and with the loops that stand in for it here."""
     maker.price_of_making = 1e6
     a, b, c = (four_bar().simulate(5.0, specialize=x) for x in ("auto", True, False))
@@ -151,7 +152,7 @@ def test_code_on_disk_is_taken_where_there_is_something_to_gain(maker):
 
 
 def test_code_that_the_process_has_is_taken_from_the_beginning(maker):
-    """However short the motion: nothing is begun anew."""
+    """However short the motion: the code is taken."""
     maker.where = "memory"
     for r in (four_bar().simulate(0.01), driven().kinematics(3, t_end=0.01)):
         assert r.health.engine.startswith("made")
@@ -180,11 +181,24 @@ def test_many_short_motions_pay_for_code_together(maker):
     assert again.health.engine == "table-driven: asked for"
 
 
-def test_functions_that_may_remember_are_not_begun_anew(maker):
-    m = door()
-    m.add(fb.Actuator("motor", coordinate="upper.angle", force=lambda t: np.sin(t)))
-    r = m.simulate(0.2)
-    assert r.health.engine.startswith("table-driven: a law is a Python function")
+@pytest.mark.filterwarnings("ignore::flyball.PerformanceNotice")
+def test_a_function_that_remembers_its_calls_is_called_as_often(maker):
+    """The motion goes on with the code that is made on the way: nothing is computed twice."""
+    maker.price_of_making = 1e6
+    calls = []
+
+    def torque(t):
+        calls.append(t)
+        return math.sin(t)
+
+    for specialize in (False, "auto"):
+        m = four_bar()
+        m.add(fb.Actuator("motor", coordinate="A.angle", force=torque))
+        r = m.simulate(5.0, outputs=2, specialize=specialize)
+        calls.append(None)
+    assert r.health.engine == "made for this mechanism: made now"
+    first = calls.index(None)
+    assert calls[:first] == calls[first + 1 : -1]
 
 
 def test_cams_are_taken_as_others_are(maker):

@@ -53,12 +53,14 @@ class Compiled:
         vars(self).update(state, system=state["values"].system, made=None)
 
     def run_on(self, made: Any) -> None:
-        """From now on code that was made for this mechanism does what it can for the engine, in scratch that is new."""
+        """From now on code that was made for this mechanism does what it can for the engine; the scratch is kept."""
         x, before = self.values, vars(self).pop("scratch", None)
         vars(self).pop("work", None)
         self.made, self.system = made, x.kept.get("made", id(made), 1, lambda: (made, made.system(x.system)))[1]
         if before is not None:
-            self.array("option")[:] = before.array("option")
+            for mine, old in zip(self.work, before.fields, strict=True):
+                if mine.shape == old.shape:  # that of the code itself is longer now
+                    mine[...] = old
 
     def run_on_tables(self) -> None:
         """From now on the engine's own loops do all."""

@@ -311,7 +311,7 @@ def run_clock(
 ) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted).
 
-    ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven.
+    ``engine`` may choose another one on the way; without it the run is table-driven.
     ``pace`` may ask for another method, and then this one goes no further. It ends early where ``part`` does.
     """
     c, engine, part = a.compiled, engine or Engine(a.compiled, False), part or whole()
@@ -342,10 +342,7 @@ def run_clock(
             took = time.perf_counter() - begin
             done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before
             part.took(done)
-            if engine.begins_anew(clock):
-                rows.clear()
-                part.anew()
-                forget(c.array("stack"))
+            engine.choose_again(clock)
             if part.over(clock if task == INTEGRATE else None):  # of what is followed every step is one
                 return np.concatenate(rows), False
             quota = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))

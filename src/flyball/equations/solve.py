@@ -237,7 +237,12 @@ def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
     semidefinite = S.glob[SEMIDEFINITE] > 0.0 and not W.option[PARTED] > 0.0
     for d in range(x.shape[0]):
         rhs[d] = f[d] if loaded else 0.0
-    pass_schur(S, W, rhs, x, lam, loaded)
+    if loaded and not semidefinite:
+        for b in range(S.body_i.shape[0]):
+            inverse_mass(S, b, f, S.body_i[b, V0], x, S.body_i[b, V0])
+        for k in range(lam.shape[0]):
+            W.row[R1, k] = gamma[k] - row_times(S, W, k, x)
+    pass_schur(S, W, rhs, x, lam, semidefinite)
     worst = 0.0
     last = 1e300
     for _ in range(refinements):

@@ -201,9 +201,17 @@ NUMPY = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
 
 
 class Graph:
-    """Nodes of which no two are equal."""
+    """Nodes of which no two are equal.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    rounded : bool
+        Whether expressions are to round as the formulas do that make them: numeric factors are joined only where they
+        are powers of two, and what would cancel is computed.
+    """
+
+    def __init__(self, rounded: bool = False) -> None:
+        self.rounded = rounded
         self.nodes: list[Node] = []
         self.functions = Functions()
         self.granted: list[tuple[Node, str]] = []  # what formulas could not decide
@@ -266,7 +274,7 @@ class Graph:
             return b
         if b.op == NUMBER and b.value == 0.0:
             return a
-        (c, x), (d, y) = _scaled(a), _scaled(b)
+        (c, x), (d, y) = self._scaled(a), self._scaled(b)
         if x is y and a.op != NUMBER:
             return self.multiply(c + d, x)
         if a.index > b.index:
@@ -289,18 +297,24 @@ class Graph:
                 return self.number(0.0)
             if a.value == 1.0:
                 return b
-            c, x = _scaled(b)
+            c, x = self._scaled(b)
             return self._made(MULTIPLY, (self.number(a.value * c), x)) if a.value * c != 1.0 else x
-        (c, x), (d, y) = _scaled(a), _scaled(b)
+        (c, x), (d, y) = self._scaled(a), self._scaled(b)
         if c != 1.0 or d != 1.0:
             return self.multiply(c * d, self.multiply(x, y))
-        if a.op == DIVIDE and a.args[1] is b:
+        if a.op == DIVIDE and a.args[1] is b and not self.rounded:
             return a.args[0]
-        if b.op == DIVIDE and b.args[1] is a:
+        if b.op == DIVIDE and b.args[1] is a and not self.rounded:
             return b.args[0]
         if a.index > b.index:
             a, b = b, a
         return self._made(MULTIPLY, (a, b))
+
+    def _scaled(self, x: Node) -> tuple[float, Node]:
+        """Numeric factor and the rest."""
+        if x.op == MULTIPLY and x.args[0].op == NUMBER and (not self.rounded or _is_power_of_two(x.args[0].value)):
+            return x.args[0].value, x.args[1]
+        return 1.0, x
 
     def divide(self, a: Any, b: Any) -> Node:
         """A / b, with a numeric factor in front."""
@@ -308,10 +322,11 @@ class Graph:
         if b.op == NUMBER:
             if a.op == NUMBER:
                 return self.number(scalar.divide(a.value, b.value))
-            return self.multiply(scalar.divide(1.0, b.value), a)
+            if not self.rounded or _is_power_of_two(b.value):
+                return self.multiply(scalar.divide(1.0, b.value), a)
         if a.op == NUMBER and a.value == 0.0:
             return a
-        (c, x), (d, y) = _scaled(a), _scaled(b)
+        (c, x), (d, y) = self._scaled(a), self._scaled(b)
         if x is y and a.op != NUMBER:
             return self.number(c / d)
         if a.op == NUMBER:
@@ -327,7 +342,7 @@ class Graph:
             return self.number(scalar.power(a.value, b.value))
         if b.op == NUMBER and b.value == math.floor(b.value) and abs(b.value) <= 64:
             return self.node(scalar.integer_power(a, int(b.value)))
-        if b.op == NUMBER and b.value == 0.5:
+        if b.op == NUMBER and b.value == 0.5 and not self.rounded:
             return self.function("sqrt", a)
         return self._made(POWER, (a, b))
 
@@ -341,7 +356,7 @@ class Graph:
         if name in ("minimum", "maximum") and nodes[0] is nodes[1]:
             return nodes[0]
         if len(nodes) == 1 and (name in ODD or name in EVEN):
-            c, x = _scaled(nodes[0])
+            c, x = self._scaled(nodes[0])
             if c < 0.0:
                 inner = self.function(name, self.multiply(-c, x))
                 return self.multiply(-1.0, inner) if name in ODD else inner
@@ -390,8 +405,6 @@ def _value(op: str, args: tuple[Node, ...], data: Any) -> float:
     return float(data.python(*values) if op == CALL else OPERATIONS[op](*values))
 
 
-def _scaled(x: Node) -> tuple[float, Node]:
-    """Numeric factor and the rest."""
-    if x.op == MULTIPLY and x.args[0].op == NUMBER:
-        return x.args[0].value, x.args[1]
-    return 1.0, x
+def _is_power_of_two(x: float) -> bool:
+    """Whether products with x are exact."""
+    return abs(math.frexp(x)[0]) == 0.5

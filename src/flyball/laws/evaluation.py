@@ -167,7 +167,7 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
                 f1, f2 = slopes(operand, v, f)
             else:
                 f = integer_power(v, operand)
-                f1, f2 = power_slopes(v, operand)
+                f1, f2 = integer_power_slopes(v, operand)
             put_chain(stack, top, f, f1, f2)
         elif operation == WHERE:
             top -= 2
@@ -326,6 +326,18 @@ def power_slopes(x, b):
         f1 = b * power(x, b - 1.0)
         if b != 1.0:
             f2 = b * (b - 1.0) * power(x, b - 2.0)
+    return f1, f2
+
+
+@formula
+def integer_power_slopes(x, n):
+    """First and second derivative of x ** n by x."""
+    f1 = 0.0 * x
+    f2 = 0.0 * x
+    if n != 0:
+        f1 = integer_power(x, n - 1) * n
+        if n != 1:
+            f2 = integer_power(x, n - 2) * (n * (n - 1))
     return f1, f2
 
 

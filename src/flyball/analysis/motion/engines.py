@@ -1,13 +1,12 @@
 """Which engine steps a motion: the table-driven one, or code made for its mechanism alone (``special/``).
 
-They round differently: results agree within the tolerance, not to the last bit. A motion is computed by one of them
-from its beginning to its end, so that a result is to the last bit the one of ``specialize=True``, or of ``False``.
+They compute the same operations in the same order: results are the same to the last bit. A motion may change to the
+other at the end of any step.
 
 Left to choose (``auto``), a motion has the code that this process has for its mechanism from its beginning on: to know
 that takes some microseconds. Else it begins by the tables. After some steps, code that is on disk is taken, if the rest
 is worth looking for it, and other code is made where the rest, or what was computed of such mechanisms in this process,
-takes longer than that; the motion then begins anew. How long is estimated from counts (`account.py`): clocks have no
-say. So the same call gives the same digits, but for once, when code has come to be since.
+takes longer than that. How long is estimated from counts (`account.py`).
 """
 
 from __future__ import annotations
@@ -15,10 +14,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from ... import special
-from ...equations.within import LOOK
 from ...errors import ModelError
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.refusal import afresh
@@ -39,7 +35,6 @@ FAILED = (ex.STUCK, ex.NOT_FINITE, ex.UNREPORTED)
 TABLES, MADE = "table-driven", "made for this mechanism"
 SHORT = f"{TABLES}: too little is computed to make code for it"
 MODES = "rows that hold at times and let go at others, and events, are for the tables"
-CALLS = "a law is a Python function, which may remember calls: it is not begun anew"
 
 
 def check_specialize(value: Any) -> None:
@@ -61,13 +56,6 @@ def worth_making(x: Values, evaluations: int, runs: int) -> bool:
         return False
     computing = runs * evaluations * kind(x.structure)[1]
     return computing * (1.0 - 1.0 / GAIN) >= MARGIN * special.price(plan, special.known(plan, x))
-
-
-def _bound(c: Compiled) -> str:
-    """Why a motion cannot begin anew."""
-    if c.structure.guards:
-        return MODES
-    return CALLS if c.structure.functions else ""
 
 
 class Engine:
@@ -97,13 +85,13 @@ class Engine:
 
     def __init__(self, c: Compiled, wish: bool | str, without: str = "") -> None:
         self.c, self.told, self.due = c, f"{TABLES}: asked for", math.inf
-        self._first: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # the clock as the motion begins
+        self._first = math.nan  # time at which the motion begins
         self._counted = 0
         if wish is False:
             return
         if wish is True:
             self._wanted(without or (MODES if c.structure.guards else ""))
-        elif why := without or _bound(c):
+        elif why := without or (MODES if c.structure.guards else ""):
             self.told = f"{TABLES}: {why}"
         else:
             self.told, self.due = SHORT, FIRST
@@ -113,22 +101,19 @@ class Engine:
 
     def begin(self, clock: ex.Clock) -> None:
         """The motion begins there."""
+        self._first = float(clock.real[ex.T])
         if self.due < math.inf:
-            self._first = clock.real.copy(), clock.count.copy(), clock.y[ex.NOW].copy()
             self._counted = int(self.c.work.info[EVALUATIONS])
 
-    def begins_anew(self, clock: ex.Clock) -> bool:
-        """Choose again, if it is time: whether the motion has to go back to where it began, as the clock is then."""
+    def choose_again(self, clock: ex.Clock) -> None:
+        """Take made code for the rest of the motion, if it is time to decide and that pays."""
         steps = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED])
-        if steps < self.due or self._first is None:
-            return False
+        if steps < self.due:
+            return
         self.due = AGAIN * steps
-        t, end, first = clock.real[ex.T], clock.real[ex.T_END], self._first[0][ex.T]
-        if not t > first or not self._choose(self._spent() * float((end - t) / (t - first))):
-            return False
-        clock.K[:] = clock.y[:] = clock.seen[:LOOK] = 0.0
-        clock.real[:], clock.count[:], clock.y[ex.NOW] = self._first
-        return True
+        t, end = clock.real[ex.T], clock.real[ex.T_END]
+        if t > self._first:
+            self._choose(self._spent() * float((end - t) / (t - self._first)))
 
     def hands_over(self, clock: ex.Clock) -> bool:
         """Whether made code got stuck, and the engine for all mechanisms goes on from the last step: through, or it
@@ -172,27 +157,24 @@ class Engine:
         except special.Refused as error:
             raise ModelError(f"specialize=True: {error}; leave it out") from None
 
-    def _choose(self, left: float) -> bool:
-        """Whether made code is taken; ``left``: what is still to be computed [ns]."""
+    def _choose(self, left: float) -> None:
+        """Take made code where it pays; ``left``: what is still to be computed [ns]."""
         if not self._pays(left, THERE):
-            return False
+            return
         x = self.c.values
         plan = special.plan(x)
         try:
             if why := special.refusal(plan):
                 raise special.Refused(why)
             there = special.known(plan, x)
-            if not there and not self._pays(left + SPENT.of(self._kind) / MANY, special.price(plan, there)):
-                return False
-            self._take(plan)
+            if there or self._pays(left + SPENT.of(self._kind) / MANY, special.price(plan, there)):
+                self._take(plan)
         except special.Refused as error:
             self.told, self.due = f"{TABLES}: {error}", math.inf
-            return False
-        return True
 
     def _pays(self, computing: float, price: float) -> bool:
-        """Whether code is worth a price, and the begin of the motion once more (all [ns])."""
-        return computing * (1.0 - 1.0 / GAIN) >= MARGIN * price + self._spent() / GAIN
+        """Whether code is worth a price (both [ns])."""
+        return computing * (1.0 - 1.0 / GAIN) >= MARGIN * price
 
     def _take(self, plan: special.Plan) -> None:
         made, how = special.code(plan, self.c.values)

@@ -51,7 +51,7 @@ class Part:
         self.first, self.later, self.paused = first, later, False
         self.open = self.asked = False
         self._lasts = LASTS if lasts is None else lasts
-        self._whole = self._left = math.inf
+        self._left = math.inf
         self._event, self._since = 0.0, time.monotonic()
 
     def begin(self, s: Structure) -> None:
@@ -64,11 +64,7 @@ class Part:
 
     def _measure(self, step: float) -> None:
         self._event = DECISION / step
-        self._whole = self._left = max(LEAST, math.ceil(self._lasts / step)) if self._lasts < math.inf else math.inf
-
-    def anew(self) -> None:
-        """The part begins once more."""
-        self._left = self._whole
+        self._left = max(LEAST, math.ceil(self._lasts / step)) if self._lasts < math.inf else math.inf
 
     def most(self, steps: float, weight: float = 1.0) -> int:
         """As many of these steps, each of which counts so much, as are left of it; one at least."""

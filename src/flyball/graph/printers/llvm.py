@@ -35,7 +35,7 @@ DECLARED = "\n".join(
     ]
     + [f"declare double @{name}(double, double) nounwind willreturn memory(none)" for name in TWO.values()]
 )
-INFIX = {ADD: "fadd contract", MULTIPLY: "fmul contract", DIVIDE: "fdiv"}
+INFIX = {ADD: "fadd", MULTIPLY: "fmul", DIVIDE: "fdiv"}
 
 
 BAD = {"positive": "ule", "nonzero": "ueq", "finite": "une"}  # against 0; "u": or no number

@@ -67,7 +67,7 @@ class Pieces:
 
     def two(self, operation: str, a: str, b: str) -> str:
         """An operation on two numbers."""
-        return self.new(f"{operation} contract double {a}, {b}")
+        return self.new(f"{operation} double {a}, {b}")
 
 
 PIECE = """define internal { i64, double } @piece(ptr %d, double %x, i64 %guess) nounwind {

@@ -106,11 +106,6 @@ class Legs:
         """Have it run to the end of the motion."""
         self.clock.real[ex.T_END] = self.end
 
-    def anew(self) -> None:
-        """Begin with the first one."""
-        self.at = 0
-        self.aim()
-
     def ends_sharply(self) -> bool:
         """Whether forces may jump at the end of this stretch."""
         return bool(self.at < len(self.times) and self.sharp[self.at])

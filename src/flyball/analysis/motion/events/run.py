@@ -216,12 +216,8 @@ class Run:
             return True
         self.turned()
         self.legs.whole()
-        if self.loop is None and engine.begins_anew(clock):
-            self.rows = self.rows[:1]
-            self.part.anew()
-            self.here.seen = self.here.seen and Segments()
-            forget(self.here.c.array("stack"))
-            self.legs.anew()
+        if self.loop is None:
+            engine.choose_again(clock)
         if self.pauses.here():
             return True
         self.legs.aim()
