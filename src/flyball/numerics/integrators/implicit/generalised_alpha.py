@@ -23,16 +23,16 @@ from ...lu import lu_factor
 from ..clock import ASIDE, ASIDE_RATE, NEW, NOW, STEP, T
 from .desk import (
     BEFORE,
-    CORNERS,
+    CORRECTION,
     FACTORS,
     FRESH,
     ITERATIONS,
-    JACOBIANS,
     LAST_H,
     LEAST,
     NEWTON,
     ROUGH,
     START,
+    STEEP,
     THETA,
     WHOLE,
     WIDTH,
@@ -40,7 +40,7 @@ from .desk import (
 from .even import account
 from .even import enter as enter_step
 from .hermite import END, V_RATE, V_RATE_END
-from .newton import solve
+from .newton import confirm, renew, solve
 from .step import begin as tolerances
 
 # rows of past: a and v' where the step begins; a at its end; v'' at a start
@@ -120,18 +120,18 @@ def ends(callbacks, S, K, h):
 
 
 @formula
-def predict(K, h):
-    """Start values of the end: accelerations and multipliers stay."""
+def predict(K, h, ahead):
+    """Start values of the end: accelerations (or, if ``ahead`` is 0, velocities) and multipliers stay."""
     for i in range(K.v.shape[1]):
-        K.v[END, i] = K.v[START, i] + h * K.a[START, i]
-        K.d[END, i] = h * (K.v[START, i] + 0.5 * h * K.a[START, i])
+        K.v[END, i] = K.v[START, i] + ahead * h * K.a[START, i]
+        K.d[END, i] = h * (K.v[START, i] + ahead * 0.5 * h * K.a[START, i])
     for r in range(K.lam.shape[1]):
         K.lam[END, r] = K.lam[START, r]
         K.mu[END, r] = 0.0
     for i in range(K.z.shape[1]):
         K.rate[END, i] = K.rate[START, i]
     for i in range(K.tol_x.shape[0]):
-        K.z[END, i] = K.z[START, i] + h * K.xd[START, i]
+        K.z[END, i] = K.z[START, i] + ahead * h * K.xd[START, i]
 
 
 @formula
@@ -186,33 +186,41 @@ def correct(K, h):
 
 
 @formula
-def renewed(callbacks, S, K, c, t, k):
-    """The Jacobian at the end of the step as far as it is known (k = END), or where it begins. Returns a status."""
-    if callbacks[1](t, k, S, K, c) != 0:
-        return DIVERGED
-    for e in range(K.J.shape[1] if k != START else 0):
-        K.J[START, e] = K.J[k, e]
-    K.count[JACOBIANS] += 1
-    K.real[WIDTH] = 0.0
-    return 0
+def missed(callbacks, S, K, c, h):
+    """What the equations miss at the end of the step. Returns a status."""
+    ends(callbacks, S, K, h)
+    return callbacks[0](c.real[T] + h, END, S, K, c)
+
+
+@formula
+def correct_at_end(callbacks, S, K, c, h):
+    """One correction with the Jacobian of the end of the step. Returns a status, and its size."""
+    if missed(callbacks, S, K, c, h) != 0:
+        return DIVERGED, 0.0
+    if renew(callbacks[1], c.real[T] + h, END, S, K, c) != 0 or factor(K, h) != 0:
+        return DIVERGED, 0.0
+    return 0, correct(K, h)
 
 
 @formula
 def iterate(callbacks, S, K, c, h, whole):
-    """Find the end of the step, with one Jacobian or that of every iteration. Returns a status."""
-    t = c.real[T]
+    """Find the end of the step, with one Jacobian or that of every iteration. Returns a status.
+
+    The root of a concave law, such as sqrt(x) from rest, is found by Newton's method from the steep side only: from
+    where the step begins.
+    """
     last = rate = 1.0
-    predict(K, h)
+    predict(K, h, 0.0 if whole and K.count[STEEP] == 1 else 1.0)
     for n in range(MOST_WHOLE if whole else MOST):
-        ends(callbacks, S, K, h)
-        if callbacks[0](t + h, END, S, K, c) != 0:
-            return DIVERGED
-        if whole and (renewed(callbacks, S, K, c, t + h, END) != 0 or factor(K, h) != 0):
-            return DIVERGED
-        size = correct(K, h)
+        if whole:
+            status, size = correct_at_end(callbacks, S, K, c, h)
+        else:
+            status = missed(callbacks, S, K, c, h)
+            size = correct(K, h) if status == 0 else 0.0
         K.count[WHOLE if whole else ITERATIONS] += 1
-        if not size < 1e300:
+        if status != 0 or not size < 1e300:
             return DIVERGED
+        K.real[CORRECTION] = size
         rate = size / last if n > 0 else 1.0
         left = size * rate / (1.0 - rate) if rate < 1.0 else 1e300
         if n + 1 >= K.count[LEAST] and (size <= 1e-3 * K.real[NEWTON] or left <= K.real[NEWTON]):
@@ -237,16 +245,10 @@ def attempt(callbacks, S, K, c, h):
             K.count[FRESH] = -1
     tolerances(c, K)
     if K.count[FRESH] < 0:
-        if K.count[BEFORE] == 0 and K.count[CORNERS] == 1:  # see `radau.differentiate`
-            place(K, h)
-            predict(K, h)
-            ends(callbacks, S, K, h)
-            status = renewed(callbacks, S, K, c, c.real[T] + h, END)
-        else:
-            for i in range(K.v.shape[1]):
-                K.d[START, i] = 0.0
-                K.a[START, i] = K.past[TRUE, i]
-            status = renewed(callbacks, S, K, c, c.real[T], START)
+        for i in range(K.v.shape[1]):
+            K.d[START, i] = 0.0
+            K.a[START, i] = K.past[TRUE, i]
+        status = renew(callbacks[1], c.real[T], START, S, K, c)
         if status != 0:
             return status, 0.0, 1.0
         K.count[FRESH] = 1
@@ -256,6 +258,10 @@ def attempt(callbacks, S, K, c, h):
         status = iterate(callbacks, S, K, c, h, False)
     if status != 0:
         status = iterate(callbacks, S, K, c, h, True)
+    if status == 0 and K.count[STEEP] == 1:
+        status = confirm(correct_at_end, callbacks, S, K, c, h)
+        if status == 0:  # the Jacobian is that of the end now: `enter` has it serve on, another try does not
+            K.count[FRESH] = -1
     if status != 0:
         return status, 0.0, 1.0
     ends(callbacks, S, K, h)
