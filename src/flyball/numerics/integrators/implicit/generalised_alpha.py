@@ -120,18 +120,18 @@ def ends(callbacks, S, K, h):
 
 
 @formula
-def predict(K, h, ahead):
-    """Start values of the end: accelerations (or, if ``ahead`` is 0, velocities) and multipliers stay."""
+def predict(K, h):
+    """Start values of the end: accelerations and multipliers stay."""
     for i in range(K.v.shape[1]):
-        K.v[END, i] = K.v[START, i] + ahead * h * K.a[START, i]
-        K.d[END, i] = h * (K.v[START, i] + ahead * 0.5 * h * K.a[START, i])
+        K.v[END, i] = K.v[START, i] + h * K.a[START, i]
+        K.d[END, i] = h * (K.v[START, i] + 0.5 * h * K.a[START, i])
     for r in range(K.lam.shape[1]):
         K.lam[END, r] = K.lam[START, r]
         K.mu[END, r] = 0.0
     for i in range(K.z.shape[1]):
         K.rate[END, i] = K.rate[START, i]
     for i in range(K.tol_x.shape[0]):
-        K.z[END, i] = K.z[START, i] + ahead * h * K.xd[START, i]
+        K.z[END, i] = K.z[START, i] + h * K.xd[START, i]
 
 
 @formula
@@ -186,8 +186,8 @@ def correct(K, h):
 
 
 @formula
-def missed(callbacks, S, K, c, h):
-    """What the equations miss at the end of the step. Returns a status."""
+def residual(callbacks, S, K, c, h):
+    """The residual at the end of the step, into its row. Returns a status."""
     ends(callbacks, S, K, h)
     return callbacks[0](c.real[T] + h, END, S, K, c)
 
@@ -195,7 +195,7 @@ def missed(callbacks, S, K, c, h):
 @formula
 def correct_at_end(callbacks, S, K, c, h):
     """One correction with the Jacobian of the end of the step. Returns a status, and its size."""
-    if missed(callbacks, S, K, c, h) != 0:
+    if residual(callbacks, S, K, c, h) != 0:
         return DIVERGED, 0.0
     if renew(callbacks[1], c.real[T] + h, END, S, K, c) != 0 or factor(K, h) != 0:
         return DIVERGED, 0.0
@@ -204,18 +204,14 @@ def correct_at_end(callbacks, S, K, c, h):
 
 @formula
 def iterate(callbacks, S, K, c, h, whole):
-    """Find the end of the step, with one Jacobian or that of every iteration. Returns a status.
-
-    The root of a concave law, such as sqrt(x) from rest, is found by Newton's method from the steep side only: from
-    where the step begins.
-    """
+    """Find the end of the step, with one Jacobian or that of every iteration. Returns a status."""
     last = rate = 1.0
-    predict(K, h, 0.0 if whole and K.count[STEEP] == 1 else 1.0)
+    predict(K, h)
     for n in range(MOST_WHOLE if whole else MOST):
         if whole:
             status, size = correct_at_end(callbacks, S, K, c, h)
         else:
-            status = missed(callbacks, S, K, c, h)
+            status = residual(callbacks, S, K, c, h)
             size = correct(K, h) if status == 0 else 0.0
         K.count[WHOLE if whole else ITERATIONS] += 1
         if status != 0 or not size < 1e300:

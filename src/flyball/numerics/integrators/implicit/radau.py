@@ -101,8 +101,10 @@ def attempt(callbacks, S, K, c, h):
     begin(c, K)
     rest(K, c)
     predict(K, h)
-    worn = K.count[STEEP] == 1 or (K.count[FRESH] == 0 and (c.count[TROUBLE] != 0 or K.real[THETA] > K.real[SERVES]))
-    if c.real[GROW] <= 1.0 and worn:
+    outdated = K.count[STEEP] == 1 or (
+        K.count[FRESH] == 0 and (c.count[TROUBLE] != 0 or K.real[THETA] > K.real[SERVES])
+    )
+    if c.real[GROW] <= 1.0 and outdated:
         K.count[FRESH] = -1
     if K.count[FRESH] < 1 and not (K.count[FRESH] == 0 and K.real[WIDTH] > 0.0):
         if renew(linearise, c.real[T], START, S, K, c) != 0:
