@@ -224,3 +224,32 @@ def test_beyond_the_end_of_a_table_nothing_is_known(points):
     for ask in (m.equilibrium, m.modes):
         with pytest.raises(fb.SingularityError, match=r"'ended\(value\)' has no value or no slope at push.value = 0 m"):
             ask()
+
+
+@pytest.mark.parametrize(("law", "kind"), [("-sign(value)*sqrt(abs(value))", "stable"), ("sign(value)*sqrt(abs(value))", "unstable"),
+                                           ("sqrt(max(-value, 0)) - sqrt(max(value, 0))", "stable")])  # fmt: skip
+def test_an_equilibrium_where_a_slope_is_infinite(law, kind):
+    """Every direction beside it has other slopes: the search for faces between pieces had no end."""
+    m = slider(law)
+    assert m.equilibrium().stability == kind
+    for ask in (m.linearize, m.modes):
+        with pytest.raises(fb.SingularityError, match=r"'push': its law .* has an infinite slope at push\.value = 0 m"):
+            ask()
+
+
+@pytest.mark.parametrize(("law", "at"), [("-value - sign(rate)*sqrt(abs(rate))", r"an infinite slope at push\.rate = 0 m/s"),
+                                         ("-2*value - sqrt(value**2 + rate**2)", r"a kink at push\.value = 0 m")])  # fmt: skip
+def test_no_linear_equations_at_an_infinite_slope_or_a_cone(law, at):
+    with pytest.raises(fb.SingularityError, match=at):
+        slider(law).linearize()
+
+
+@pytest.mark.parametrize("coordinates", LAYERS)
+def test_a_parameter_shifts_a_motion_from_rest_at_an_infinite_slope(coordinates):
+    """p = s^2 (t - 1/2)^2 with 2 s^2 + s = a: s = 1/2 and ds/da = 1/(4 s + 1) = 1/3 at a = 1."""
+    m = slider("0", a=1.0)
+    m.add(fb.State("p", rate="a*max(t - 0.5, 0) - sqrt(max(p, 0))"))
+    found = m.sensitivity(
+        ["p.value"], ["a"], analysis="motion", t_end=1.5, outputs=[0.25, 1.0, 1.5], coordinates=coordinates
+    )
+    assert found["p.value", "a"] == pytest.approx([0.0, 0.25 / 3, 1.0 / 3], abs=1e-9)

@@ -127,6 +127,44 @@ def test_implicit_steps_of_a_body_at_rest_where_a_slope_is_infinite(law, value):
         assert m.simulate(2, **options)["x.displacement"][-1] == pytest.approx(value, abs=1e-7)
 
 
+FROM_REST = {  # where a mass of 1 kg is after 2 s, by SciPy, as above
+    "max(t - 0.5, 0) - sqrt(max(value, 0))": 0.3929833512064383,
+    "1e-3*t**8 - sqrt(max(value, 0))": 0.0060336720,
+    "0.1*t**4 - 3*sign(rate)*sqrt(abs(rate))": 0.0356372396,
+    "max(t - 0.5, 0) - 3*sign(rate)*abs(rate)**0.5": 0.0886898142,
+}
+IMPLICIT = [{"method": "radau"}, {"method": "radau", "step": 1e-3}, {"method": "generalised-alpha", "step": 1e-3}]
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+@pytest.mark.parametrize("options", IMPLICIT, ids=lambda x: "-".join(map(str, x.values())))
+def test_implicit_methods_from_rest_at_an_infinite_slope(options, coordinates):
+    """Newton's corrections with the slope there are next to nothing, though the equations are not satisfied."""
+    for law, value in FROM_REST.items():
+        m = fb.Mechanism(planar=True)
+        m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)))
+        m.add(fb.Actuator("k", "x.displacement", force=law))
+        assert m.simulate(2, coordinates=coordinates, **options)["x.displacement"][-1] == pytest.approx(value, abs=2e-7)
+    for rate, value in (("max(t - 0.5, 0) - sqrt(max(p, 0))", 0.0625), ("t - sqrt(max(p, 0))", 0.25)):
+        m = fb.Mechanism(planar=True)
+        m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)))
+        m.add(fb.State("p", rate=rate), fb.Actuator("k", "x.displacement", force="p"))
+        assert m.simulate(1, coordinates=coordinates, **options)["p"].output[-1] == pytest.approx(value, abs=2e-7)
+
+
+def test_a_fixed_step_without_a_solution_names_the_steep_law():
+    """p is (t - 0.5)^2 / 1e6, to 1e-3 of it; the method gave 19."""
+    m = fb.Mechanism(planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.State("p", rate="max(t - 0.5, 0) - 1000*sqrt(max(p, 0))"), fb.Actuator("k", "x.displacement", force="p"))
+    with pytest.raises(
+        fb.SimulationError, match=r"slope of value of State 'p' may be infinite there\); give a shorter"
+    ):
+        m.simulate(1, method="generalised-alpha", step=1e-3)
+    for options in ({}, {"step": 1e-3}):
+        assert m.simulate(1, method="radau", **options)["p"].output[-1] == pytest.approx(2.49999e-7, rel=1e-3)
+
+
 @pytest.mark.parametrize("law", ["sqrt(max(t-1, 0))**5", "where(t > 1, (t-1)**2*sqrt(t-1), 0)", "sqrt(t)**5", "t**2*sqrt(t)",
                                  "sqrt(max(t-1, 0))**4", "atan2(max(t-1, 0)**3, max(t-1, 0)**3)*0"])  # fmt: skip
 def test_driver_whose_law_is_smooth_though_a_part_of_it_is_not(law):

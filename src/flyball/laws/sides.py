@@ -137,6 +137,19 @@ def whole(node: Node) -> bool:
     return node.kind == "number" and node.value == int(node.value) and abs(node.value) <= LARGEST_WHOLE_POWER
 
 
+def may_be_steep(tree: Node, still: Collection[str]) -> bool:
+    """Whether a law has a root, a power below 1, an arc sine or an arc cosine of anything but the names ``still``.
+
+    At an end of the domain the slope of these functions is infinite.
+    """
+    return any(
+        n.kind in ("sqrt", "asin", "acos")
+        or (n.kind == "**" and not (n.args[1].kind == "number" and not 0.0 < n.args[1].value < 1.0))
+        for n in tree.walk()
+        if n.args and any(x.kind == "name" and x.value not in still for x in n.args[0].walk())
+    )
+
+
 def _both(a: Node | None, b: Node) -> Node:
     return b if a is None else _made(b, "and", a, b)
 

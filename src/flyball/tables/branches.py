@@ -17,7 +17,7 @@ from ..constraints.modes import BRANCH
 from ..laws.intervals.steps import bent
 from ..laws.opcodes import SENSOR
 from ..laws.program import bends, calls, compile_side
-from ..laws.sides import Corners, meaning
+from ..laws.sides import Corners, may_be_steep, meaning
 from ..math.spline import packed
 from ..model.element import Element, LawOf, fields_with
 from ..model.expressions import Expression
@@ -62,6 +62,12 @@ def _bent_laws(model: Model) -> list[Element]:
         if bends(law, ("t", *inputs), moving) and _counts(model, law):
             out.append(e)
     return out
+
+
+def steep_laws(model: Model) -> list[str]:
+    """The laws whose slope may be infinite somewhere, as messages name them."""
+    still = {"t", *model.parameters}
+    return [law.where for _, law, _ in laws(model) if not calls(law) and may_be_steep(law.tree, still)]
 
 
 def _counts(model: Model, law: Expression) -> bool:

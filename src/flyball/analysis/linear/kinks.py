@@ -4,6 +4,7 @@
 A law is followed a little way to both sides of every quantity that it depends on, and a tenth of that way. What differs
 by as much at a tenth has a kink or a jump there; what is smooth differs by a tenth. The slopes on two sides of a kink
 differ across it only (Hadamard), so their difference says in which direction it lies.
+Slopes that grow from the one place to the nearer one are infinite between them: sqrt(abs(x)) at zero.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ AS_MUCH = 0.5  # of the difference that far away
 ROUNDED = 16.0 * np.finfo(float).eps
 FLAT = 1e-7  # differences of slopes below this part of them are none
 
-KINK, JUMP, NO_VALUE = "has a kink", "jumps", "has no value or no slope"
+GROWS = 1.1  # what slopes to both sides grow by over the last nine tenths of the way, if the slope is infinite
+KINK, JUMP, STEEP, NO_VALUE = "has a kink", "jumps", "has an infinite slope", "has no value or no slope"
 
 Law = Callable[[np.ndarray], complex]
 
@@ -137,7 +139,8 @@ def across(law: Law, at: np.ndarray, sizes: np.ndarray) -> list[tuple[np.ndarray
         known = np.isfinite([near.value, near.slope])
         if known.all() and not jump and not kink:
             continue
-        what = NO_VALUE if not known.all() else JUMP if jump else KINK
+        steep = near.steepest > GROWS * far.steepest
+        what = NO_VALUE if not known.all() else JUMP if jump else STEEP if steep else KINK
         normal = near.across if what == KINK and np.abs(near.across).max() > FLAT * near.slope else step / size
         normal = normal / np.linalg.norm(normal)
         if not any(what == w and abs(abs(normal @ n) - 1.0) < FLAT**0.5 for n, w in out):
@@ -155,7 +158,7 @@ class Beside:
     """What differs between a place and its two sides, slopes in units of the sizes.
 
     ``jump`` of the value, ``bend`` of the slopes, ``across``: by what the slopes of one side exceed those of the other;
-    ``value`` and ``slope`` are how large these are.
+    ``value`` and ``slope`` are how large these are, ``steepest`` the latter at the two sides.
     """
 
     jump: float
@@ -163,6 +166,7 @@ class Beside:
     across: np.ndarray
     value: float
     slope: float
+    steepest: float
 
     @classmethod
     def of(cls, law: Law, at: np.ndarray, step: np.ndarray, sizes: np.ndarray) -> Beside:
@@ -175,6 +179,7 @@ class Beside:
             df - dg,
             float(np.max(np.abs([f, g, h]))),  # nan if any is
             float(np.max(np.abs([df, dg, dh]))),
+            float(np.max(np.abs([df, dg]))),
         )
 
 
@@ -264,4 +269,4 @@ def _told(
         if abs(n) > FLAT
     )
     by = any(name in to and abs(n) > FLAT for (name, _, _), n in zip(at, normal, strict=True))
-    return Kink(element, f"{text} {what} at {where}", what != KINK, along, by)
+    return Kink(element, f"{text} {what} at {where}", what not in (KINK, STEEP), along, by)

@@ -71,8 +71,10 @@ def faces(of: Slopes, n: int, far: float, near: float, same: float, flat: float)
     found: list[Piece] = []
     for way in _around(n):
         other = Piece(of, way, far, near, same, flat)
-        if len(found) < PIECES and all(known.across(other) is not None for known in found):
+        if len(found) <= PIECES and all(known.across(other) is not None for known in found):
             found.append(other)
+    if len(found) > PIECES:  # slopes that change all around, as those of a cone do
+        return list(np.eye(n))
     out: list[np.ndarray] = []
     for a, b in itertools.combinations(found, 2):
         for normal in _between(a, b, HALVED):

@@ -14,7 +14,8 @@ from ....errors import SimulationError
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
 from ....numerics.integrators.implicit.desk import Desk
-from ....tables.system import FREE, G_CORNER, NV, Q0, SCHUR, SCRATCH, SOLVER, SPHERICAL, TREE, V0, System
+from ....tables.branches import steep_laws
+from ....tables.system import FREE, NV, Q0, SCHUR, SCRATCH, SOLVER, SPHERICAL, TREE, V0, System
 from ...compiled import Compiled
 from ...linear.derivatives import refuse_functions
 from ...linear.loads import STEP, as_complex
@@ -102,6 +103,8 @@ class Implicit:
             if self.clock.count[ex.TROUBLE] != 0
             else f"what happens within a step of {step:g} s cannot be told: between its ends it is too far off"
         )
+        if steep := self._steep():
+            why += f" (the slope of {' and of '.join(steep)} may be infinite there)"
         return SimulationError(f"at t = {t:.6g} s {why}; give a shorter step, or leave it out", t=t)
 
     def _benches(self, ny: int) -> tuple[Bench, Bench, Bench]:
@@ -132,7 +135,11 @@ class Implicit:
         real[ds.STAYS] = 2.0 if x.dear else 1.2  # Hairer and Wanner (1996), IV.8, of large systems and of others
         count[ds.LEAST], count[ds.INDEX_3] = 2 if turns else 1, int(x.index_3)
         count[ds.SHARED] = int(x.first[SIZES]) if len(x.pressing) else 0
-        count[ds.CORNERS] = int(any(kind == G_CORNER for kind, _, _ in x.s.guards))
+        count[ds.STEEP] = int(len(self._steep()) > 0)
+
+    def _steep(self) -> list[str]:
+        s = self.layout.s
+        return s.kept.get("steep laws", None, 1, lambda: steep_laws(s.model))
 
     def _desk(self, nz: int, springy: np.ndarray) -> Desk:
         """The desk of a run as it is new."""

@@ -18,14 +18,16 @@ from ...lu import Rows
 # entries of Desk.count: what was done; whether the Jacobian is that of the present state (1), serves (0) or not (-1);
 # whether there is a polynomial of the step before; refinements of each linear solve; iterations of a step at least;
 # iterations of all stages together; whether velocities are not held to the constraints (index 3); where the sizes of
-# rows begin in the Jacobian, if forces depend on multipliers; whether laws of forces or states have corners
-ITERATIONS, JACOBIANS, FACTORS, FRESH, BEFORE, REFINE, LEAST, WHOLE, INDEX_3, SHARED, CORNERS, COUNTS = range(12)
+# rows begin in the Jacobian, if forces depend on multipliers; whether slopes of laws may be infinite (`newton.confirm`)
+ITERATIONS, JACOBIANS, FACTORS, FRESH, BEFORE, REFINE, LEAST, WHOLE, INDEX_3, SHARED, STEEP, COUNTS = range(12)
 # entries of Desk.real: tolerances as the estimate needs them; bound of the iteration; its last ratio, and its rate;
 # width that is factored for; width and error of the step before; what the last step asks for: iterations it took, or
 # the factor of its width; regularisation; size of corrections that are taken for rounding where they do not fall any
 # more; rate of the iteration up to which a Jacobian serves on; what a step could be wider by and is not, since its
-# factors serve on
-RTOL, ATOL, NEWTON, THETA, RATE, WIDTH, LAST_H, LAST_ERROR, ASKED, SOFT, ROUGH, SERVES, STAYS, REALS = range(14)
+# factors serve on; size of the last correction of the iteration
+(
+    RTOL, ATOL, NEWTON, THETA, RATE, WIDTH, LAST_H, LAST_ERROR, ASKED, SOFT, ROUGH, SERVES, STAYS, CORRECTION, REALS,
+) = range(15)  # fmt: skip
 START = 3  # row of the state at which a step begins, and of the error estimate
 
 

@@ -1,10 +1,13 @@
-"""What methods of fixed steps have in common: how a step is entered, its works, and that none is tried again."""
+"""What methods of fixed steps have in common: how a step is entered, its works, what follows one that fails."""
 
 from __future__ import annotations
 
 from ....compiler.formulas import formula
-from ..clock import ACCEPTED, GROW, NEW, NOW, STEP, H, T
+from ..clock import ACCEPTED, GROW, NEW, NOW, STEP, TRIED, H, T
+from ..loop import shorten
+from .desk import FRESH, STEEP
 
+NARROWEST = 1e-3  # part of the step below which none is tried
 GROWN = 6.0  # what tells that the last step was not refused
 
 
@@ -30,5 +33,10 @@ def enter(c, t):
 
 @formula
 def refuse(K, c):
-    """There is nothing else to try."""
-    return 1
+    """Try half the width where slopes of laws may be infinite. Returns 0, or that there is nothing to try."""
+    h = 0.5 * c.real[TRIED]
+    if K.count[STEEP] == 0 or h < NARROWEST * c.real[STEP]:
+        return 1
+    shorten(c, h)
+    K.count[FRESH] = -1
+    return 0

@@ -23,16 +23,16 @@ from ...lu import lu_factor
 from ..clock import ASIDE, ASIDE_RATE, NEW, NOW, STEP, T
 from .desk import (
     BEFORE,
-    CORNERS,
+    CORRECTION,
     FACTORS,
     FRESH,
     ITERATIONS,
-    JACOBIANS,
     LAST_H,
     LEAST,
     NEWTON,
     ROUGH,
     START,
+    STEEP,
     THETA,
     WHOLE,
     WIDTH,
@@ -40,7 +40,7 @@ from .desk import (
 from .even import account
 from .even import enter as enter_step
 from .hermite import END, V_RATE, V_RATE_END
-from .newton import solve
+from .newton import confirm, renew, solve
 from .step import begin as tolerances
 
 # rows of past: a and v' where the step begins; a at its end; v'' at a start
@@ -186,33 +186,37 @@ def correct(K, h):
 
 
 @formula
-def renewed(callbacks, S, K, c, t, k):
-    """The Jacobian at the end of the step as far as it is known (k = END), or where it begins. Returns a status."""
-    if callbacks[1](t, k, S, K, c) != 0:
-        return DIVERGED
-    for e in range(K.J.shape[1] if k != START else 0):
-        K.J[START, e] = K.J[k, e]
-    K.count[JACOBIANS] += 1
-    K.real[WIDTH] = 0.0
-    return 0
+def residual(callbacks, S, K, c, h):
+    """The residual at the end of the step, into its row. Returns a status."""
+    ends(callbacks, S, K, h)
+    return callbacks[0](c.real[T] + h, END, S, K, c)
+
+
+@formula
+def correct_at_end(callbacks, S, K, c, h):
+    """One correction with the Jacobian of the end of the step. Returns a status, and its size."""
+    if residual(callbacks, S, K, c, h) != 0:
+        return DIVERGED, 0.0
+    if renew(callbacks[1], c.real[T] + h, END, S, K, c) != 0 or factor(K, h) != 0:
+        return DIVERGED, 0.0
+    return 0, correct(K, h)
 
 
 @formula
 def iterate(callbacks, S, K, c, h, whole):
     """Find the end of the step, with one Jacobian or that of every iteration. Returns a status."""
-    t = c.real[T]
     last = rate = 1.0
     predict(K, h)
     for n in range(MOST_WHOLE if whole else MOST):
-        ends(callbacks, S, K, h)
-        if callbacks[0](t + h, END, S, K, c) != 0:
-            return DIVERGED
-        if whole and (renewed(callbacks, S, K, c, t + h, END) != 0 or factor(K, h) != 0):
-            return DIVERGED
-        size = correct(K, h)
+        if whole:
+            status, size = correct_at_end(callbacks, S, K, c, h)
+        else:
+            status = residual(callbacks, S, K, c, h)
+            size = correct(K, h) if status == 0 else 0.0
         K.count[WHOLE if whole else ITERATIONS] += 1
-        if not size < 1e300:
+        if status != 0 or not size < 1e300:
             return DIVERGED
+        K.real[CORRECTION] = size
         rate = size / last if n > 0 else 1.0
         left = size * rate / (1.0 - rate) if rate < 1.0 else 1e300
         if n + 1 >= K.count[LEAST] and (size <= 1e-3 * K.real[NEWTON] or left <= K.real[NEWTON]):
@@ -237,16 +241,10 @@ def attempt(callbacks, S, K, c, h):
             K.count[FRESH] = -1
     tolerances(c, K)
     if K.count[FRESH] < 0:
-        if K.count[BEFORE] == 0 and K.count[CORNERS] == 1:  # see `radau.differentiate`
-            place(K, h)
-            predict(K, h)
-            ends(callbacks, S, K, h)
-            status = renewed(callbacks, S, K, c, c.real[T] + h, END)
-        else:
-            for i in range(K.v.shape[1]):
-                K.d[START, i] = 0.0
-                K.a[START, i] = K.past[TRUE, i]
-            status = renewed(callbacks, S, K, c, c.real[T], START)
+        for i in range(K.v.shape[1]):
+            K.d[START, i] = 0.0
+            K.a[START, i] = K.past[TRUE, i]
+        status = renew(callbacks[1], c.real[T], START, S, K, c)
         if status != 0:
             return status, 0.0, 1.0
         K.count[FRESH] = 1
@@ -256,6 +254,10 @@ def attempt(callbacks, S, K, c, h):
         status = iterate(callbacks, S, K, c, h, False)
     if status != 0:
         status = iterate(callbacks, S, K, c, h, True)
+    if status == 0 and K.count[STEEP] == 1:
+        status = confirm(correct_at_end, callbacks, S, K, c, h)
+        if status == 0:  # the Jacobian is that of the end now: `enter` has it serve on, another try does not
+            K.count[FRESH] = -1
     if status != 0:
         return status, 0.0, 1.0
     ends(callbacks, S, K, h)

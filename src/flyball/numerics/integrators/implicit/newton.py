@@ -11,10 +11,14 @@ from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ...lu import lu_factor, lu_solve, times
 from .coefficients import ALPHA, BETA, GAMMA, T_INVERSE, T
-from .desk import FACTORS, REFINE, START, WIDTH
+from .desk import CORRECTION, FACTORS, JACOBIANS, NEWTON, REFINE, ROUGH, START, THETA, WIDTH
 
 TI0, TI1, TI2 = T_INVERSE
 T0, T1, T2 = T
+
+GROWTH = 2.0  # what a correction may be larger by than the one before, if Newton's method has converged
+MOST = 60  # corrections of `confirm`: from x = 0 sqrt(x) takes 8, abs(x)**0.2 takes 30
+DIVERGED = 1
 
 
 @formula
@@ -120,3 +124,36 @@ def correct(K, h):
         s += x * x + p.real * p.real + p.imag * p.imag
         put_part(K, i, j, K.z)
     return sqrt(s / max(6 * nv + 3 * nx, 1))
+
+
+@formula
+def renew(linearise, t, k, S, K, c):
+    """Put the Jacobian at stage k, or where the step begins, into row START. Returns a status."""
+    if linearise(t, k, S, K, c) != 0:
+        return DIVERGED
+    for e in range(K.J.shape[1] if k != START else 0):
+        K.J[START, e] = K.J[k, e]
+    K.count[JACOBIANS] += 1
+    K.real[WIDTH] = 0.0
+    return 0
+
+
+@formula
+def confirm(correct_at_end, callbacks, S, K, c, h):
+    """Go on by corrections with the Jacobian at the end of the step. Returns a status.
+
+    Where the slope of a law may be infinite (sqrt(x) at 0) corrections by it, and the error estimated with it, are next
+    to nothing whatever the equations miss. Newton's method has converged once a correction that is small has not grown
+    over the one before: from too steep a slope they grow, each with the slope of where the last one has led.
+    """
+    last = K.real[CORRECTION]
+    for _ in range(MOST):
+        status, size = correct_at_end(callbacks, S, K, c, h)
+        if status != 0 or not size < 1e300:
+            return DIVERGED
+        small = size <= K.real[NEWTON] or last < GROWTH * size <= GROWTH * K.real[ROUGH]
+        if small and size <= GROWTH * last:
+            K.real[THETA] = 0.0
+            return 0
+        last = size
+    return DIVERGED

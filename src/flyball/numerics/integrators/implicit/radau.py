@@ -41,9 +41,7 @@ from .coefficients import C
 from .desk import (
     ASKED,
     BEFORE,
-    CORNERS,
     FRESH,
-    JACOBIANS,
     LAST_ERROR,
     LAST_H,
     REFINE,
@@ -52,11 +50,13 @@ from .desk import (
     SHARED,
     START,
     STAYS,
+    STEEP,
     THETA,
     WIDTH,
 )
-from .newton import factor
-from .step import MOST, STAGES, begin, estimate, iterate, predict
+from .even import refuse as narrower
+from .newton import confirm, correct, factor, renew
+from .step import MOST, STAGES, account, begin, estimate, iterate, predict, rates, share
 from .whole import iterate_whole
 
 SAFETY = 0.9
@@ -81,59 +81,17 @@ def rest(K, c):
 
 
 @formula
-def differentiate(linearise, S, K, c, h):
-    """The numbers of the Jacobian, in row START. Returns a status.
-
-    It is that of where the step begins. Where laws have corners, that of the first step of a stretch is that of where
-    the step is expected to end: a stretch may begin at the corner of a law, where its slope may be infinite (sqrt(x) at
-    0), and with that Newton's corrections, and the estimated error, would be next to nothing whatever the equations
-    miss.
-    """
-    if K.count[BEFORE] == 1 or K.count[CORNERS] == 0:
-        return linearise(c.real[T], START, S, K, c)
-    last = STAGES - 1
-    status = linearise(c.real[T] + h, last, S, K, c)
-    for e in range(K.J.shape[1]):
-        K.J[START, e] = K.J[last, e]
-    return status
-
-
-@formula
-def expect(callbacks, S, K, c, h):
-    """Start values of the stages, and accelerations at the last one.
-
-    What hardly moves by the rates of where a stretch begins moves by those of where it would end so: else
-    dx/dt = t - sqrt(x) would be linearised at x = 0 however wide the step is (`differentiate`). With what begins to
-    move so the Jacobian of where it was at rest serves no longer.
-    """
-    predict(K, h)
-    last, nv = STAGES - 1, K.v.shape[1]
-    for i in range(nv):
-        K.a[last, i] = K.a[START, i]
-    if K.count[BEFORE] == 1 or K.count[CORNERS] == 0:
-        return
-    compose, evaluate = callbacks[2], callbacks[5]
-    compose(c.y[NOW], K.d[last], K.v[last], K.z[last], c.y[NEW], S)
-    status, _ = evaluate(c.real[T] + h, c.y[NEW], c.K[1], S, K)
-    if status != 0:
-        return
-    at = c.y.shape[1] - K.z.shape[1] - nv
-    for i in range(nv):
-        if abs(K.d[last, i]) <= K.tol[0, i] and abs(K.v[last, i] - K.v[START, i]) <= K.tol[1, i]:
-            change = c.K[1, at + i] - K.a[START, i]
-            K.a[last, i] += change
-            for k in range(STAGES):
-                K.v[k, i] += C[k] * C[k] * h * change / 2.0
-                K.d[k, i] += C[k] * C[k] * C[k] * h * h * change / 6.0
-            if abs(K.d[last, i]) > K.tol[0, i] or abs(K.v[last, i] - K.v[START, i]) > K.tol[1, i]:
-                K.count[FRESH] = -1
-    for i in range(K.tol_x.shape[0]):
-        if abs(K.z[last, i] - K.z[START, i]) <= K.tol_x[i]:
-            change = c.K[1, at + nv + i] - K.rate[START, i]
-            for k in range(STAGES):
-                K.z[k, i] += C[k] * C[k] * h * change / 2.0
-            if abs(K.z[last, i] - K.z[START, i]) > K.tol_x[i]:
-                K.count[FRESH] = -1
+def correct_at_end(callbacks, S, K, c, h):
+    """One correction of the stages with the Jacobian of the last one. Returns a status, and its size."""
+    residual, linearise = callbacks
+    if renew(linearise, c.real[T] + h, STAGES - 1, S, K, c) != 0 or factor(K, h) != 0:
+        return SINGULAR, 0.0
+    rates(K, h)
+    for k in range(STAGES):
+        if residual(c.real[T] + C[k] * h, k, S, K, c) != 0:
+            return SINGULAR, 0.0
+    share(K, h)
+    return 0, correct(K, h)
 
 
 @formula
@@ -142,27 +100,33 @@ def attempt(callbacks, S, K, c, h):
     residual, linearise, compose, arrive = callbacks[:4]
     begin(c, K)
     rest(K, c)
-    expect(callbacks, S, K, c, h)
-    if c.real[GROW] <= 1.0 and K.count[FRESH] == 0 and (c.count[TROUBLE] != 0 or K.real[THETA] > K.real[SERVES]):
+    predict(K, h)
+    outdated = K.count[STEEP] == 1 or (
+        K.count[FRESH] == 0 and (c.count[TROUBLE] != 0 or K.real[THETA] > K.real[SERVES])
+    )
+    if c.real[GROW] <= 1.0 and outdated:
         K.count[FRESH] = -1
     if K.count[FRESH] < 1 and not (K.count[FRESH] == 0 and K.real[WIDTH] > 0.0):
-        if differentiate(linearise, S, K, c, h) != 0:
+        if renew(linearise, c.real[T], START, S, K, c) != 0:
             return SINGULAR, 0.0, 0.5
-        K.count[JACOBIANS] += 1
         K.count[FRESH] = 1
-        K.real[WIDTH] = 0.0
     if K.real[WIDTH] != h and factor(K, h) != 0:
         return SINGULAR, 0.0, 0.5
     status, asked = iterate(residual, S, K, c, h)
+    if status != 0 and K.count[FRESH] == 1:
+        predict(K, h)
+        status = iterate_whole((residual, linearise), S, K, c, h)
+        if status == 0:
+            asked = float(MOST)
+            K.real[THETA] = 1.0
+    if status == 0 and K.count[STEEP] == 1:
+        status = confirm(correct_at_end, (residual, linearise), S, K, c, h)
+        asked = 0.5 if status != 0 else asked
+        if status == 0:  # the Jacobian is that of the end now: `enter` has it serve on, another try does not
+            K.count[FRESH] = -1
+            status = account(residual, S, K, c, h)
     if status != 0:
-        if K.count[FRESH] == 1:
-            expect(callbacks, S, K, c, h)
-            status = iterate_whole((residual, linearise), S, K, c, h)
-            if status == 0:
-                asked = float(MOST)
-                K.real[THETA] = 1.0
-        if status != 0:
-            return status, 0.0, asked
+        return status, 0.0, asked
     compose(c.y[NOW], K.d[2], K.v[2], K.z[2], c.y[NEW], S)
     error = 0.0
     if c.real[STEP] == 0.0:
@@ -189,9 +153,11 @@ def refuse(K, c):
     if K.count[SHARED] == 0 and (c.count[TROUBLE] != 0 or c.real[GROW] <= 1.0):
         K.count[REFINE] = REFINED
     if c.count[TROUBLE] != 0:
+        if c.real[STEP] > 0.0 and K.count[FRESH] == 1:
+            return narrower(K, c)
         if c.real[STEP] > 0.0:
             shorten(c, h)
-            return 1 if K.count[FRESH] == 1 else 0
+            return 0
         shorten(c, asked * h)
         stranded(K, c)
         return 0

@@ -9,7 +9,7 @@ from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ..clock import LEDGER, NOW, SCALE, T
 from .coefficients import BEND, BENT, BENT_MOST, ERROR, GAMMA, INVERSE, THROUGH_STAGES, THROUGH_START, A, C
-from .desk import ATOL, BEFORE, CORNERS, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, ROUGH, RTOL, SHARED, START, THETA
+from .desk import ATOL, BEFORE, CORRECTION, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, ROUGH, RTOL, SHARED, START, THETA
 from .newton import correct, solve_real
 
 MOST = 7  # iterations
@@ -44,15 +44,11 @@ def begin(c, K):
 
 @formula
 def predict(K, h):
-    """Start values of the stages: all goes on as in the step before.
-
-    Where a stretch begins velocities stay, or change by their rates where laws have corners: see `radau.expect`.
-    """
+    """Start values of the stages: all goes on as in the step before; where a stretch begins velocities and x stay."""
     nv = K.v.shape[1]
-    ahead = h if K.count[CORNERS] == 1 else 0.0
     for i in range(nv):
         for k in range(STAGES):
-            K.v[k, i] = K.v[START, i] + C[k] * ahead * K.a[START, i]
+            K.v[k, i] = K.v[START, i]
         if K.count[BEFORE] == 1:
             b1, b2, b3 = coefficients(K.before_v, i, K.before_v[START, i])
             for k in range(STAGES):
@@ -73,7 +69,7 @@ def predict(K, h):
             K.rate[k, i] = K.rate[START, i]
     for i in range(K.tol_x.shape[0]):
         for k in range(STAGES):
-            K.z[k, i] = K.z[START, i] + C[k] * ahead * K.rate[START, i]
+            K.z[k, i] = K.z[START, i]
         if K.count[BEFORE] == 1:
             b1, b2, b3 = coefficients(K.before_x, i, K.before_x[START, i])
             for k in range(STAGES):
@@ -189,7 +185,7 @@ def settle(residual, S, K, c, h):
             if residual(c.real[T] + C[k] * h, k, S, K, c) != 0:
                 return DIVERGED, 0.5, moved
         share(K, h)
-        size = correct(K, h)
+        K.real[CORRECTION] = size = correct(K, h)
         K.count[ITERATIONS] += 1
         if not size < 1e300:
             return DIVERGED, 0.5, moved

@@ -11,7 +11,7 @@ from ....math.scalar import sqrt
 from ...lu import lu_factor, lu_solve, times
 from ..clock import T
 from .coefficients import GAMMA, INVERSE, C
-from .desk import NEWTON, ROUGH, SHARED, WHOLE
+from .desk import CORRECTION, NEWTON, ROUGH, SHARED, WHOLE
 from .step import STAGES, account, lead, rates, share
 
 MOST = 12
@@ -102,7 +102,7 @@ def settle_whole(callbacks, S, K, c, h):
         fill_whole(K, h)
         if lu_factor(K.whole_P, K.whole_A, K.whole_L, K.whole_U, K.whole_D, K.whole_Y) != 0:
             return 1, moved
-        size = correct_whole(K, h)
+        K.real[CORRECTION] = size = correct_whole(K, h)
         K.count[WHOLE] += 1
         moved = size if n == 0 else moved
         if not size < 1e300 or (n > 1 and size > AGAIN * last):
