@@ -129,6 +129,18 @@ def of_drivers(a: Assembly, clock: ex.Clock) -> str:
     return ""
 
 
+def no_solution(c: Compiled, t: float) -> str:
+    """Why the equations of motion have no solution at the state evaluated last, as a sentence."""
+    stack = c.work.stack
+    found = fault(stack, c.structure.functions) or c.structure.missed(stack)
+    text = found.message if found else broken_force(c, t) or _broken_rate(c, t)
+    if text:
+        return f"{text[0].upper()}{text[1:]}"
+    if c.work.info[STATUS] == motion.JAMMED:
+        return f"{c.structure.forces[int(c.work.info[GUILTY])].title} jams there: it grows with the load that it makes"
+    return "The position is singular: constraints depend on one another, or a freedom moves no inertia"
+
+
 def _broken(a: Assembly, clock: ex.Clock) -> str:
     """A force whose formula ends where the motion stopped; else nothing."""
     t = float(clock.real[ex.T])
