@@ -120,7 +120,7 @@ def test_works_that_were_interrupted_are_found_the_next_time():
     assert np.array_equal(r.states, wanted)
 
 
-@pytest.mark.parametrize("specialize", [False])
+@pytest.mark.parametrize("specialize", [True, False])
 @pytest.mark.parametrize("coordinates", ["absolute", "joint"])
 def test_output_times_without_accelerations_are_named_with_the_cause(coordinates, specialize):
     """The force has no value at one instant, which steps pass over: position and velocity there are right."""

@@ -21,7 +21,7 @@ import numpy as np
 from ..math import scalar
 from .branch import taken
 from .function import Function, Functions
-from .operations import ADD, CALL, DIVIDE, EVEN, FUNCTIONS, MULTIPLY, NUMBER, ODD, OPERATIONS, POWER, SYMBOL
+from .operations import ADD, CALL, DIVIDE, EVEN, FUNCTIONS, MULTIPLY, NUMBER, ODD, OPERATIONS, PARTIAL, POWER, SYMBOL
 
 
 class Undecided(Exception):
@@ -42,14 +42,15 @@ class Symbol:
 class Node:
     """One expression of a graph. Behaves like a number in every formula; see the head of this file."""
 
-    __slots__ = ("args", "data", "graph", "index", "moving", "op", "value")
+    __slots__ = ("args", "data", "graph", "index", "moving", "op", "partial", "value")
 
     def __init__(
         self, graph: Graph, op: str, args: tuple[Node, ...], data: Any, index: int, moving: bool, value: float
     ) -> None:
         self.graph, self.op, self.args, self.data, self.index = graph, op, args, data, index
         self.moving = moving  # whether it depends on more than parameters
-        self.value = value  # with the parameters' own values; nan if it moves
+        self.value = value  # with the parameters' own values; nan if it moves, but 0 of x - x
+        self.partial = op in PARTIAL or any(x.partial for x in args)  # whether it may have no finite value
 
     def __add__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.add(self, other)
@@ -136,7 +137,7 @@ class Node:
         Undecided
             If it depends on where the mechanism is.
         """
-        if self.moving:
+        if self.moving and math.isnan(self.value):
             raise Undecided(f"a formula decides by {self!r}, which moves; it has to use scalar.choose")
         if self.op != NUMBER:
             self.graph.decided.add(self.index)
@@ -201,9 +202,17 @@ NUMPY = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
 
 
 class Graph:
-    """Nodes of which no two are equal."""
+    """Nodes of which no two are equal.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    strict : bool
+        Whether x/x, y/x x, and x - x of what may have no finite value, stay as they are: then expressions have no
+        value where the operations that they were made by have none.
+    """
+
+    def __init__(self, strict: bool = False) -> None:
+        self.strict = strict
         self.nodes: list[Node] = []
         self.functions = Functions()
         self.granted: list[tuple[Node, str]] = []  # what formulas could not decide
@@ -267,11 +276,15 @@ class Graph:
         if b.op == NUMBER and b.value == 0.0:
             return a
         (c, x), (d, y) = _scaled(a), _scaled(b)
-        if x is y and a.op != NUMBER:
+        joined = x is y and a.op != NUMBER
+        if joined and not (self.strict and c + d == 0.0 and x.partial):
             return self.multiply(c + d, x)
         if a.index > b.index:
             a, b = b, a
-        return self._made(ADD, (a, b))
+        made = self._made(ADD, (a, b))
+        if joined:
+            made.value = 0.0
+        return made
 
     def subtract(self, a: Any, b: Any) -> Node:
         """A - b."""
@@ -294,9 +307,9 @@ class Graph:
         (c, x), (d, y) = _scaled(a), _scaled(b)
         if c != 1.0 or d != 1.0:
             return self.multiply(c * d, self.multiply(x, y))
-        if a.op == DIVIDE and a.args[1] is b:
+        if not self.strict and a.op == DIVIDE and a.args[1] is b:
             return a.args[0]
-        if b.op == DIVIDE and b.args[1] is a:
+        if not self.strict and b.op == DIVIDE and b.args[1] is a:
             return b.args[0]
         if a.index > b.index:
             a, b = b, a
@@ -312,7 +325,7 @@ class Graph:
         if a.op == NUMBER and a.value == 0.0:
             return a
         (c, x), (d, y) = _scaled(a), _scaled(b)
-        if x is y and a.op != NUMBER:
+        if x is y and a.op != NUMBER and not self.strict:
             return self.number(c / d)
         if a.op == NUMBER:
             c, x = 1.0, a

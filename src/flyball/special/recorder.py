@@ -41,7 +41,8 @@ def symbols(S: System, graph: Graph, known: Sequence[tuple[str, int]] = ()) -> t
         table = getattr(S, name)
         out = np.empty(table.shape, object)
         for k, x in enumerate(table.ravel().tolist()):
-            if x in PLAIN or (name, k) in told:
+            law_zero = name == "const" and x == 0.0  # 0 sqrt(x) has no value where sqrt(x) has none
+            if (x in PLAIN and not law_zero) or (name, k) in told:
                 out.ravel()[k] = x
                 continue
             node = graph.symbol(Symbol(f"{name}[{k}]", "parameter"), x)
@@ -64,7 +65,7 @@ class Recorder:
     """
 
     def __init__(self, s: Structure, S: System, known: Sequence[tuple[str, int]] = ()) -> None:
-        self.s, self.graph = s, Graph()
+        self.s, self.graph = s, Graph(strict=True)
         self.S, self.constants = symbols(S, self.graph, known)
         self.W: Work = work(s, self.S, dtype=object)
         self.nv, self.nr, self.nm = s.nv, len(S.row_i), measured(S)
