@@ -69,7 +69,7 @@ class State:
         """
         if c.at(t, q, v, MOTION)[0] != 0:
             name = c.structure.model.name
-            raise AnalysisError(f"{name!r} at t = {t:.6g} s has no accelerations: {no_solution(c, t)}")
+            raise AnalysisError(f"{name!r} at t = {t:.6g} s has no accelerations: {no_solution(c, t, abs(t))}")
         W = c.work
         return cls(c, t, q, v, c.z.copy(), W.vel[X_SOLVED].copy(), W.row[LAM].copy(), W.vel[EFFORT].copy())
 

@@ -68,7 +68,8 @@ def unsolved(c: Compiled, rows: np.ndarray) -> str:
     again = c.again()
     again.z = z
     again.at(float(t[0]), q, v, MOTION)
+    why = no_solution(again, float(t[0]), float(np.abs(rows[:, 0]).max()))
     return (
         f"at {len(missing)} of {len(rows)} output times, the first t = {t[0]:.6g} s, the equations of motion have no "
-        f"solution: accelerations and reactions are nan there. {no_solution(again, float(t[0]))}"
+        f"solution: accelerations and reactions are nan there. {why}"
     )

@@ -104,7 +104,7 @@ def _behind(a: Assembly, clock: ex.Clock) -> str:
     """What is behind a step of fixed width that has no solution, if it is known; else nothing."""
     t = float(clock.real[ex.T])
     text = crossed(a.compiled, t)
-    return f"at t = {t:.6g} s, {text}" if text else of_drivers(a, clock)
+    return f"at t = {t:.6g} s, {text}" if text else of_drivers(a.compiled, t, float(clock.real[ex.LARGEST]))
 
 
 def _for_the_next(here: Here, followed: bool) -> dict[str, Any]:
