@@ -50,7 +50,7 @@ class Node:
         self.graph, self.op, self.args, self.data, self.index = graph, op, args, data, index
         self.moving = moving  # whether it depends on more than parameters
         self.value = value  # with the parameters' own values; nan if it moves, but 0 of x - x
-        self.partial = op in PARTIAL or any(x.partial for x in args)  # whether it may have no finite value
+        self.partial: bool = op in PARTIAL or any(x.partial for x in args)  # whether it may have no finite value
 
     def __add__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.add(self, other)

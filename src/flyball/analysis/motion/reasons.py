@@ -36,13 +36,11 @@ from ...tables.system import (
     NU,
     NU_DOT,
     OFF,
-    RATE,
     REVOLUTE,
     ROW_LAW,
     ROW_WRAP,
     STATUS,
     TREE,
-    VALUE,
 )
 from ..assembly.start import Assembly
 from ..compiled import Compiled
@@ -53,7 +51,7 @@ from .residual import missed
 from .rounding import excess, far_off, rounded
 from .samples import too_often
 from .unbounded import boundless, escaping, too_long
-from .undefined import undefined_in
+from .undefined import inputs_of, undefined_in
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
@@ -286,9 +284,7 @@ def broken_force(c: Compiled, t: float) -> str:
                     return f"what {e.title} presses with is no number"
                 continue
             F, M, par = load(W.FK, S.force_i[k, FORCE_F]), load(W.FK, S.force_i[k, FORCE_M]), wide(S.force_x, k)
-            along = isinstance(e, CoordinateForce)
-            m = S.force_i[k, FORCE_F]
-            x, y = W.sensed[VALUE : RATE + 1, m] if along else e.inputs(par, F, M)
+            x, y = inputs_of(c, k)
             if not math.isfinite(x) or not math.isfinite(y):
                 return f"what {e.title} measures is no number. {e.fails}"
             laws = [
