@@ -49,7 +49,7 @@ class Node:
     ) -> None:
         self.graph, self.op, self.args, self.data, self.index = graph, op, args, data, index
         self.moving = moving  # whether it depends on more than parameters
-        self.value = value  # with the parameters' own values; nan if it moves, but 0 of x - x
+        self.value = value  # with the parameters' own values; nan if it moves
         self.partial: bool = op in PARTIAL or any(x.partial for x in args)  # whether it may have no finite value
 
     def __add__(self, other: Any) -> Any:
@@ -137,7 +137,7 @@ class Node:
         Undecided
             If it depends on where the mechanism is.
         """
-        if self.moving and math.isnan(self.value):
+        if self.moving:
             raise Undecided(f"a formula decides by {self!r}, which moves; it has to use scalar.choose")
         if self.op != NUMBER:
             self.graph.decided.add(self.index)
@@ -204,15 +204,15 @@ NUMPY = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
 class Graph:
     """Nodes of which no two are equal.
 
-    Parameters
+    Attributes
     ----------
     strict : bool
         Whether x/x, y/x x, and x - x of what may have no finite value, stay as they are: then expressions have no
         value where the operations that they were made by have none.
     """
 
-    def __init__(self, strict: bool = False) -> None:
-        self.strict = strict
+    def __init__(self) -> None:
+        self.strict = False
         self.nodes: list[Node] = []
         self.functions = Functions()
         self.granted: list[tuple[Node, str]] = []  # what formulas could not decide
@@ -276,15 +276,11 @@ class Graph:
         if b.op == NUMBER and b.value == 0.0:
             return a
         (c, x), (d, y) = _scaled(a), _scaled(b)
-        joined = x is y and a.op != NUMBER
-        if joined and not (self.strict and c + d == 0.0 and x.partial):
+        if x is y and a.op != NUMBER and not (self.strict and c + d == 0.0 and x.partial):
             return self.multiply(c + d, x)
         if a.index > b.index:
             a, b = b, a
-        made = self._made(ADD, (a, b))
-        if joined:
-            made.value = 0.0
-        return made
+        return self._made(ADD, (a, b))
 
     def subtract(self, a: Any, b: Any) -> Node:
         """A - b."""

@@ -65,7 +65,7 @@ class Recorder:
     """
 
     def __init__(self, s: Structure, S: System, known: Sequence[tuple[str, int]] = ()) -> None:
-        self.s, self.graph = s, Graph(strict=True)
+        self.s, self.graph = s, Graph()
         self.S, self.constants = symbols(S, self.graph, known)
         self.W: Work = work(s, self.S, dtype=object)
         self.nv, self.nr, self.nm = s.nv, len(S.row_i), measured(S)
