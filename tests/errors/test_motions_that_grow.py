@@ -99,3 +99,36 @@ def test_a_controller_that_never_acts_is_told():
     assert any("PID 'pid' is never sampled: its first instant is at offset = 5 s" in w for w in run.health.warnings)
     assert not run["pid.output"].any()
     assert not any("never" in w for w in often(0.01, offset=0.5).simulate(1, outputs=3).health.warnings)
+
+
+@pytest.mark.parametrize("method", ["auto", "radau"])
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+@pytest.mark.parametrize("guided", [False, True])
+def test_two_magnets_that_collide_are_told_by_the_law_that_has_no_bound(guided, coordinates, method):
+    """They meet after pi/2 sqrt(m d**3 / (4 c)): Kepler's third law, for half a degenerate ellipse from d = 1 m at rest."""
+    m = fb.Mechanism("magnets", planar=True)
+    for name, x in (("a", -0.5), ("b", 0.5)):
+        m.add(fb.Body(name, mass=1, inertia=1, position=(x, 0)))
+        if guided:
+            m.add(fb.Prismatic(f"along {name}", "ground", name, at=(x, 0), axis=(1, 0)))
+    m.add(fb.SpringDamper("pull", "a", "b", at=((-0.5, 0), (0.5, 0)), force="1/length**2"))
+    with pytest.raises(fb.SimulationError) as caught:
+        m.simulate(3.0, coordinates=coordinates, method=method)
+    text = str(caught.value)
+    assert caught.value.t == pytest.approx(np.pi / 4, rel=1e-6)
+    assert "the law of SpringDamper 'pull' gives" in text
+    assert "1/(r**2 + a**2)" in text
+    assert "law of its rate" not in text
+    assert "may lock" not in text
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+def test_an_attraction_towards_the_world_is_told_by_its_law(coordinates):
+    """From x = 1 m at rest under 1/x**2 a unit mass arrives after pi / sqrt(8)."""
+    m = fb.Mechanism("magnet", planar=True)
+    m.add(fb.Body("a", mass=1, inertia=1, position=(1, 0)))
+    m.add(fb.Prismatic("P", "ground", "a", at=(0, 0), axis=(1, 0), displacement=1))
+    m.add(fb.Actuator("pull", "P.displacement", force="-1/value**2"))
+    with pytest.raises(fb.SimulationError, match=r"the law of Actuator 'pull' gives .* grows without bound") as caught:
+        m.simulate(3.0, coordinates=coordinates)
+    assert caught.value.t == pytest.approx(np.pi / 8**0.5, rel=1e-6)

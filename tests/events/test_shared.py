@@ -221,3 +221,35 @@ def test_a_ball_at_rest_in_a_groove_needs_no_friction(e, x, layer, rtol):
     assert slip.t == pytest.approx(1.2 + 0.3 * 0.1 * 2 * G * np.sqrt(0.5) / 1.09, abs=1e-8)
     assert run["ball.angle"][2] == pytest.approx(run["ball.angle"][1], abs=1e-12)
     assert run["ball.angle"][3] > run["ball.angle"][2] + 1
+
+
+@pytest.mark.filterwarnings("ignore::flyball.StartWarning")
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (0, 2, 1), (2, 1, 0)])
+def test_who_holds_beside_a_brake_does_not_depend_on_the_order_of_elements(order, layer):
+    """A brake and the friction of one joint share what holds it, in infinitely many ways: both of them stick.
+
+    How the sliding friction of the rail follows each of the two is the same number, and known by differences.
+    """
+    m = fb.Mechanism("arm", planar=True, gravity=(0, -9.81))
+    at, com = (0.17758964033116964, 0.15407077770253524), (0.12589158865766054, 0.05735997831044087)
+    m.add(
+        fb.Body("b2", mass=1.2134362269175012, inertia=0.04853744907670006, com=com, position=at, angle=0.479258673953)
+    )
+    tip, com = (0.7075267662402256, -0.13919795754046782), (-0.04243736705314474, -0.058067256998715344)
+    m.add(fb.Body("b3", mass=0.34533740434010746, inertia=0.0138134961736043, com=com, position=tip,
+                  angle=-1.8492416123872235, velocity=(-0.06379436668625171, -0.7302353031127615),
+                  angular_velocity=-2.5757745379809682))  # fmt: skip
+    m.add(fb.Prismatic("slide", "ground", "b2", at=(-0.2931071653351156, 0.13091637683881907), axis=(1, 0)))
+    m.add(fb.Revolute("arm", "b2", "b3", at=(0.2673253940060067, -0.13919795754046782)))
+    spring = ((1.0075267662402256, -0.13919795754046782), tip)
+    m.add(fb.SpringDamper("pull", "ground", "b3", at=spring, stiffness=2.874044369432799))
+    holding = [
+        fb.Brake("brake", "arm.angle", capacity="where(t > 0.2, 5, 0)"),
+        fb.JointFriction("pin", "arm", coordinate="angle", static=0.3479590124949839, radius=0.020069304240110185,
+                         stribeck_speed=0.1),
+        fb.JointFriction("rail", "slide", coordinate="displacement", static=0.016645826675879088, preload=5),
+    ]  # fmt: skip
+    m.add(*(holding[k] for k in order))
+    r = m.simulate(0.5, outputs=5)
+    stuck = sorted(name for x in r.events if x.kind == "stick" for name in x.name.split(", "))
+    assert stuck == ["brake", "pin"]

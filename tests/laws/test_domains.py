@@ -224,3 +224,50 @@ def test_size_of_an_angle_passes_half_a_turn():
 def test_the_text_of_a_law_without_a_value_is_told():
     with pytest.raises(fb.SimulationError, match=r"in force = -5 - sqrt\(value\)"):
         end("-5 - sqrt(value)")
+
+
+def driven_along(law: str, swinging: bool = False) -> fb.Mechanism:
+    """A block on a slide, driven by a law of time; ``swinging``: a second body, which is free, hangs on it."""
+    m = fb.Mechanism("driven", planar=True)
+    m.add(fb.Body("b", mass=2, inertia=1), fb.Prismatic("P", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Driver("D", "P.displacement", law))
+    if swinging:
+        m.add(fb.Body("c", mass=1, inertia=1, position=(0, 1)), fb.Revolute("R", "b", "c", at=(0, 0)))
+    return m
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+@pytest.mark.parametrize(("exponent", "what"), [(1.5, "acceleration"), (1.2, "acceleration"), (0.5, "velocity")])
+def test_a_driver_that_asks_for_what_is_infinite_is_named_with_the_time_and_a_remedy(exponent, what, coordinates):
+    m = driven_along(f"max(t - 1, 0)**{exponent}")
+    for run in (lambda o: m.simulate(2.0, outputs=9, **o), lambda o: m.kinematics(9, t_end=2.0, **o)):
+        with pytest.raises(fb.SimulationError, match=f"infinite {what}") as e:
+            run({"coordinates": coordinates})
+        assert "Driver 'D' cannot be followed beyond t = 1 s" in str(e.value)
+        assert "step5" in str(e.value)
+        assert e.value.t == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+@pytest.mark.parametrize("exponent", [2, 2.5])
+@pytest.mark.parametrize("swinging", [False, True])
+def test_a_driver_whose_acceleration_jumps_is_followed(exponent, coordinates, swinging):
+    m = driven_along(f"max(t - 1, 0)**{exponent}", swinging)
+    results = [m.simulate(2.0, outputs=9, coordinates=coordinates)]
+    results += [] if swinging else [m.kinematics(9, t_end=2.0, coordinates=coordinates)]
+    for r in results:
+        since = np.maximum(r.t - 1.0, 0.0)
+        np.testing.assert_allclose(r["b"].x, since**exponent, atol=1e-9)
+        np.testing.assert_allclose(r["b"].vx, exponent * since ** (exponent - 1), atol=1e-8)
+        later = r.t > 1.0
+        expected = exponent * (exponent - 1) * since[later] ** (exponent - 2)
+        np.testing.assert_allclose(r["b"].ax[later], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+def test_an_output_time_at_which_a_driver_asks_for_an_infinite_acceleration_names_it(coordinates):
+    r = driven_along("max(t - 1, 0)**1.5", swinging=True).simulate(2.0, outputs=9, coordinates=coordinates)
+    np.testing.assert_array_equal(np.isnan(r["b"].ax), r.t == 1.0)
+    (text,) = r.health.warnings
+    assert "the first t = 1 s" in text
+    assert "Driver 'D'" in text

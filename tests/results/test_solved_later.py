@@ -118,3 +118,20 @@ def test_works_that_were_interrupted_are_found_the_next_time():
         _ = r.states
     r.owed = find if r.owed is interrupted else r.owed
     assert np.array_equal(r.states, wanted)
+
+
+@pytest.mark.parametrize("specialize", [True, False])
+@pytest.mark.parametrize("coordinates", ["absolute", "joint"])
+def test_output_times_without_accelerations_are_named_with_the_cause(coordinates, specialize):
+    """The force has no value at one instant, which steps pass over: position and velocity there are right."""
+    m = fb.Mechanism("block", planar=True)
+    m.add(fb.Body("b", mass=2, inertia=1), fb.Prismatic("slide", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Actuator("F", "slide.displacement", force="4 + 0/(t - 0.5)"))
+    r = m.simulate(1.0, outputs=5, coordinates=coordinates, specialize=specialize)
+    np.testing.assert_allclose(r["b"].x, r.t**2, rtol=1e-12)
+    np.testing.assert_array_equal(np.isnan(r["b"].ax), r.t == 0.5)
+    (text,) = r.health.warnings
+    assert "at 1 of 5 output times, the first t = 0.5 s" in text
+    assert "Actuator 'F'" in text
+    assert "4 + 0/(t - 0.5)" in text
+    assert text in pickle.loads(pickle.dumps(r)).health.warnings

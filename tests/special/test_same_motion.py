@@ -202,3 +202,47 @@ def test_a_branch_that_is_nan_is_a_value_like_any_other():
     m.add(fb.Body("b", mass=1.0, inertia=1), fb.Prismatic("P", "ground", "b", axis=(1, 0), at=(0, 0)))
     m.add(fb.Brake("B", coordinate="P.displacement", capacity="0.1 - t"))
     assert "nan if t - 1/10 > 0" in str(m.symbolic())
+
+
+UNDEFINED = [  # from t = 0.5 s on
+    "0*sqrt(0.5 - value)", "none*log(0.5 - value)", "0*asin(2*value)", "0*(0.5 - value)**1.5", "value*0*sqrt(0.5 - value)",
+    "0/log(0.5 - value)", "value/sqrt(0.5 - value)*sqrt(0.5 - value)", "log(0.5 - value)/log(0.5 - value)",
+    "(sqrt(0.5 - value) - sqrt(0.5 - value))", "0*exp(2000*value)", "0*sqrt(0.5 - t)", "min(0*sqrt(0.5 - t), 1)",
+    "max(1, sqrt(0.5 - t))",
+]  # fmt: skip
+DEFINED = [
+    "sqrt(0.5 - value)**0", "sqrt(0.5 - value)**none", "0*tan(value)", "where(t < 0.5, 0*sqrt(0.5 - t), 0)",
+    "where(t < 0.5, 1, 1)*0",
+]  # fmt: skip
+
+
+def pushed_block(*laws: str) -> fb.Mechanism:
+    """A block on a slide at 1 m/s, pushed by laws of where it is and of time."""
+    m = fb.Mechanism("block", planar=True, parameters={"none": 0.0})
+    m.add(fb.Body("b", mass=1, inertia=1, velocity=(1, 0)))
+    m.add(fb.Prismatic("slide", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(*(fb.Actuator(f"F{k}", "slide.displacement", force=law) for k, law in enumerate(laws)))
+    return m
+
+
+@pytest.mark.parametrize("law", UNDEFINED)
+def test_a_law_has_no_value_in_made_code_where_it_has_none_in_the_tables(law):
+    """What multiplies it by zero, or takes it away again, does not give it one."""
+    ends = []
+    for specialize in (True, False):
+        with pytest.raises(fb.SimulationError, match="the law of Actuator 'F0'") as e:
+            pushed_block(f"0.2*value + {law}").simulate(1.0, outputs=8, specialize=specialize)
+        ends.append(e.value.t)
+    assert ends[0] == pytest.approx(ends[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("law", DEFINED)
+def test_a_law_has_a_value_in_made_code_where_it_has_one_in_the_tables(law):
+    same(pushed_block(f"0.2*value + {law}"), 1.0)
+
+
+def test_forces_that_cancel_have_no_value_where_each_has_none():
+    m = pushed_block("sqrt(0.5 - value)", "-sqrt(0.5 - value)")
+    for specialize in (True, False):
+        with pytest.raises(fb.SimulationError, match="the law of Actuator 'F0'"):
+            m.simulate(1.0, outputs=8, specialize=specialize)

@@ -21,7 +21,7 @@ import numpy as np
 from ..math import scalar
 from .branch import taken
 from .function import Function, Functions
-from .operations import ADD, CALL, DIVIDE, EVEN, FUNCTIONS, MULTIPLY, NUMBER, ODD, OPERATIONS, POWER, SYMBOL
+from .operations import ADD, CALL, DIVIDE, EVEN, FUNCTIONS, MULTIPLY, NUMBER, ODD, OPERATIONS, PARTIAL, POWER, SYMBOL
 
 
 class Undecided(Exception):
@@ -42,7 +42,7 @@ class Symbol:
 class Node:
     """One expression of a graph. Behaves like a number in every formula; see the head of this file."""
 
-    __slots__ = ("args", "data", "graph", "index", "moving", "op", "value")
+    __slots__ = ("args", "data", "graph", "index", "moving", "op", "partial", "value")
 
     def __init__(
         self, graph: Graph, op: str, args: tuple[Node, ...], data: Any, index: int, moving: bool, value: float
@@ -50,6 +50,7 @@ class Node:
         self.graph, self.op, self.args, self.data, self.index = graph, op, args, data, index
         self.moving = moving  # whether it depends on more than parameters
         self.value = value  # with the parameters' own values; nan if it moves
+        self.partial: bool = op in PARTIAL or any(x.partial for x in args)  # whether it may have no finite value
 
     def __add__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.add(self, other)
@@ -207,11 +208,17 @@ class Graph:
     ----------
     rounded : bool
         Whether expressions are to round as the formulas do that make them: numeric factors are joined only where they
-        are powers of two, and what would cancel is computed.
+        are powers of two, and y/x x is computed.
+
+    Attributes
+    ----------
+    strict : bool
+        Whether x/x, and x - x of what may have no finite value, stay as they are: then expressions have no value where
+        the operations that they were made by have none.
     """
 
     def __init__(self, rounded: bool = False) -> None:
-        self.rounded = rounded
+        self.rounded, self.strict = rounded, False
         self.nodes: list[Node] = []
         self.functions = Functions()
         self.granted: list[tuple[Node, str]] = []  # what formulas could not decide
@@ -275,7 +282,7 @@ class Graph:
         if b.op == NUMBER and b.value == 0.0:
             return a
         (c, x), (d, y) = self._scaled(a), self._scaled(b)
-        if x is y and a.op != NUMBER:
+        if x is y and a.op != NUMBER and not (self.strict and c + d == 0.0 and x.partial):
             return self.multiply(c + d, x)
         if a.index > b.index:
             a, b = b, a
@@ -327,7 +334,7 @@ class Graph:
         if a.op == NUMBER and a.value == 0.0:
             return a
         (c, x), (d, y) = self._scaled(a), self._scaled(b)
-        if x is y and a.op != NUMBER:
+        if x is y and a.op != NUMBER and not self.strict:
             return self.number(c / d)
         if a.op == NUMBER:
             c, x = 1.0, a

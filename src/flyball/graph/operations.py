@@ -22,6 +22,9 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 ODD = ("sin", "tan", "asin", "atan", "sinh", "tanh", "sign")
 EVEN = ("cos", "cosh", "absolute")
 
+PARTIAL = (DIVIDE, POWER, CALL, "sqrt", "tan", "asin", "acos", "exp", "log", "sinh", "cosh")
+"""Operations that have no finite value for some finite arguments."""
+
 OPERATIONS: dict[str, Callable[..., Any]] = {
     ADD: lambda a, b: a + b,
     MULTIPLY: lambda a, b: a * b,

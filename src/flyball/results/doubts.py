@@ -44,6 +44,7 @@ CREPT = 1e-3  # part of the mechanism's length above which creep is
 
 def warnings(result: Result) -> tuple[str, ...]:
     """Reasons to look at a result twice, each with what can be done; none for a sound one."""
+    _ = result.vdot  # finding accelerations adds to the remarks where there are none
     texts = [
         *result.health.remarks,
         *doubtful(result),

@@ -41,7 +41,8 @@ def symbols(S: System, graph: Graph, known: Sequence[tuple[str, int]] = ()) -> t
         table = getattr(S, name)
         out = np.empty(table.shape, object)
         for k, x in enumerate(table.ravel().tolist()):
-            if x in PLAIN or (name, k) in told:
+            law_zero = name == "const" and x == 0.0  # 0 sqrt(x) has no value where sqrt(x) has none
+            if (x in PLAIN and not law_zero) or (name, k) in told:
                 out.ravel()[k] = x
                 continue
             node = graph.symbol(Symbol(f"{name}[{k}]", "parameter"), x)

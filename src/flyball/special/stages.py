@@ -57,10 +57,13 @@ class Stages(Solves):
         self.prepared()
         self.placed()
         self.moved()
+        self.graph.strict = True  # where a force has no value, neither has what it is added to
         self.loaded()
+        self.graph.strict = False
         self.finished()
         self.solved()
         self.drifted()
+        self.graph.strict = True
         self.sampled()
 
     def prepared(self) -> None:

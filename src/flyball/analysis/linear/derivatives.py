@@ -39,7 +39,7 @@ from ...tables.system import (
 )
 from ...tables.values import Values, values
 from ..compiled import Compiled
-from ..motion.reasons import broken_force
+from ..motion.reasons import broken_force, no_solution
 from .loads import STEP, as_complex, by_reactions, complex_tables, derivative
 
 CHUNK = 128  # directions a call
@@ -60,8 +60,16 @@ class State:
 
     @classmethod
     def moving(cls, c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> State:
-        """With the accelerations and multipliers that the equations of motion give."""
-        c.at(t, q, v, MOTION)
+        """With the accelerations and multipliers that the equations of motion give.
+
+        Raises
+        ------
+        AnalysisError
+            If they give none.
+        """
+        if c.at(t, q, v, MOTION)[0] != 0:
+            name = c.structure.model.name
+            raise AnalysisError(f"{name!r} at t = {t:.6g} s has no accelerations: {no_solution(c, t, abs(t))}")
         W = c.work
         return cls(c, t, q, v, c.z.copy(), W.vel[X_SOLVED].copy(), W.row[LAM].copy(), W.vel[EFFORT].copy())
 

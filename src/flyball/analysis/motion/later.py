@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...equations.engine import COMPLETE, INTEGRATE, motion_kernel
+from ...equations.engine import COMPLETE, INTEGRATE, MOTION, motion_kernel
 from ...equations.within import ROWS
 from ...model.actions import Set
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import tableau
+from ...results.health import Health
 from ...tables.system import LATER
+from ..compiled import Compiled
 from .options import Integration
+from .reasons import no_solution
 from .start import Start
 
 
@@ -39,16 +42,34 @@ def standing(ny: int, t: float = 0.0) -> ex.Clock:
     return ex.Clock(real, count, np.zeros(0), y, K, none, np.zeros((ROWS, 0)))
 
 
-def solved(start: Start, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Accelerations (n, nv) and multipliers (n, nr) at the states of rows of output."""
+def solved(start: Start, rows: np.ndarray, health: Health) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations (n, nv) and multipliers (n, nr) at the states of rows of output; nan where there are none.
+
+    Of these ``health`` tells in its remarks.
+    """
     c = start.assembly.compiled
-    s, W, rows = c.structure, c.work, rows.copy()
+    s, W = c.structure, c.work
     ny = s.nq + s.nv + len(s.states)
-    clock = standing(ny)
     W.option[LATER] = 0.0
-    before = rows.copy()
-    motion_kernel(c.system, W, tableau("rk45"), clock, rows, COMPLETE)
-    if c.made is not None and not np.isfinite(rows).all():  # what made code cannot do the engine's loops may
-        rows = before
-        motion_kernel(c.values.system, W, tableau("rk45"), clock, rows, COMPLETE)
-    return np.ascontiguousarray(rows[:, 1 + ny : 1 + ny + s.nv]), np.ascontiguousarray(rows[:, 1 + ny + s.nv :])
+    for tables in (c.system, c.values.system):  # what made code cannot do the engine's loops may
+        out = rows.copy()
+        if motion_kernel(tables, W, tableau("rk45"), standing(ny), out, COMPLETE) == 0:
+            break
+    else:
+        health.remarks = (*health.remarks, unsolved(c, out))
+    return np.ascontiguousarray(out[:, 1 + ny : 1 + ny + s.nv]), np.ascontiguousarray(out[:, 1 + ny + s.nv :])
+
+
+def unsolved(c: Compiled, rows: np.ndarray) -> str:
+    """What is to be said of rows of output (n, width) some of which have no accelerations: when, and why."""
+    s = c.structure
+    missing = rows[~np.isfinite(rows).all(axis=1)]
+    t, q, v, z = np.split(missing[0, : 1 + s.nq + s.nv + len(s.states)], np.cumsum([1, s.nq, s.nv]))
+    again = c.again()
+    again.z = z
+    again.at(float(t[0]), q, v, MOTION)
+    why = no_solution(again, float(t[0]), float(np.abs(rows[:, 0]).max()))
+    return (
+        f"at {len(missing)} of {len(rows)} output times, the first t = {t[0]:.6g} s, the equations of motion have no "
+        f"solution: accelerations and reactions are nan there. {why}"
+    )

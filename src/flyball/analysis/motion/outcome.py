@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from functools import partial
 from itertools import accumulate
 from typing import Any
@@ -38,11 +39,12 @@ def outcome(
     o: Integration,
     interrupted: bool = False,
     owed: Owed | None = None,
-    unsolved: Owed | None = None,
+    unsolved: Callable[[Health], tuple[np.ndarray, np.ndarray]] | None = None,
 ) -> Result:
     """Result and health; a failed run raises with its partial result.
 
-    ``owed`` finds works when they are asked for, ``unsolved`` accelerations and multipliers.
+    ``owed`` finds works when they are asked for, ``unsolved`` accelerations and multipliers; it
+    puts into the health at which times there are none.
 
     Raises
     ------
@@ -76,7 +78,7 @@ def outcome(
     t_out, q, v, z, vdot, lam = (np.ascontiguousarray(rows[:, a:b]) for a, b in parts)
     result = Result(model, a.compiled.values, t_out[:, 0], q, v, z, vdot, lam, health)
     result.final = (t, clock.y[0].copy())
-    result.owed, result.unsolved = owed, unsolved
+    result.owed, result.unsolved = owed, unsolved and partial(unsolved, health)
     result.wound, result.begun = start.wound, begun(start)
     result.carried |= carried(here) | {"made": start.engine is not None and a.compiled.made is not None}
     if here.start.part.paused:
@@ -102,7 +104,7 @@ def _behind(a: Assembly, clock: ex.Clock) -> str:
     """What is behind a step of fixed width that has no solution, if it is known; else nothing."""
     t = float(clock.real[ex.T])
     text = crossed(a.compiled, t)
-    return f"at t = {t:.6g} s, {text}" if text else of_drivers(a, clock)
+    return f"at t = {t:.6g} s, {text}" if text else of_drivers(a.compiled, t, float(clock.real[ex.LARGEST]))
 
 
 def _for_the_next(here: Here, followed: bool) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -35,13 +36,11 @@ from ...tables.system import (
     NU,
     NU_DOT,
     OFF,
-    RATE,
     REVOLUTE,
     ROW_LAW,
     ROW_WRAP,
     STATUS,
     TREE,
-    VALUE,
 )
 from ..assembly.start import Assembly
 from ..compiled import Compiled
@@ -52,13 +51,14 @@ from .residual import missed
 from .rounding import excess, far_off, rounded
 from .samples import too_often
 from .unbounded import boundless, escaping, too_long
-from .undefined import undefined_in
+from .undefined import inputs_of, undefined_in
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
 LOCKED = 1e-3  # part of the accelerations asked for that no solution of the rows leaves open
 PARTED = 1e-6  # part of a rate or second derivative by which laws of one coordinate differ that disagree
 PARTS = ("value", "rate", "second derivative")
+GROWING = 1.2  # times by which a derivative without bound grows where what separates from the instant is a hundredth
 SHARP = 10.0  # a law that changes this many times more than its own slope says has jumped
 
 
@@ -89,7 +89,7 @@ def reason(
     found = fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
     if found is not None:
         return f"{name!r}: just after t = {t:.6g} s, {found.message}{after}", found.exception
-    text = of_drivers(a, clock) or _ended(a, clock) or _not_finite(a, clock, method)
+    text = of_drivers(a.compiled, t, float(clock.real[ex.LARGEST])) or _ended(a, clock) or _not_finite(a, clock, method)
     if not text and (text := _jammed(a, clock)):
         return f"{name!r}: {text}{after}", Unresolved(text, t=t)
     text = text or boundless(a, clock, _component) or _broken(a, clock) or escaping(a, clock, _component)
@@ -113,20 +113,36 @@ def _overcome(a: Assembly) -> str:
     )
 
 
-def of_drivers(a: Assembly, clock: ex.Clock) -> str:
-    """A driver whose law is not finite, or jumps, about now; else nothing."""
-    S, W = a.compiled.values.system, a.compiled.work
-    t, span = float(clock.real[ex.T]), float(clock.real[ex.LARGEST])
+def of_drivers(c: Compiled, t: float, span: float) -> str:
+    """A driver whose law is not finite, jumps, or has a derivative without bound, about the time t; else nothing.
+
+    ``span`` is the largest time [s], by which times are told apart.
+    """
+    S, W = c.values.system, c.work
     stack = np.zeros_like(W.stack)
-    for driver, law, wrapped in _driving(a):
+    for driver, law, wrapped in _driving(c):
         with np.errstate(all="ignore"):
-            before, *after = (
-                evaluate_jet(S.code, S.const, law, stack, t + d * span, W.sensed, BY_TIME) for d in (-NEAR, *AHEAD)
+            ahead, behind = (
+                [evaluate_jet(S.code, S.const, law, stack, t + way * d * span, W.sensed, BY_TIME) for d in AHEAD]
+                for way in (1.0, -1.0)
             )
-        problem = _no_number(after) or _jump(before, after[0], NEAR * span, wrapped)
+        problem = _no_number(ahead) or _jump(behind[0], ahead[0], NEAR * span, wrapped)
+        problem = problem or _unbounded(ahead, "after") or _unbounded(behind, "before")
         if problem:
             return f"{driver.title} cannot be followed beyond t = {t:.6g} s: its law {problem}{_texts(driver)}"
     return ""
+
+
+def no_solution(c: Compiled, t: float, span: float) -> str:
+    """Why the equations of motion have no solution at the state evaluated last, as a sentence; ``span`` as above."""
+    stack = c.work.stack
+    found = fault(stack, c.structure.functions) or c.structure.missed(stack)
+    text = found.message if found else of_drivers(c, t, span) or broken_force(c, t) or _broken_rate(c, t)
+    if text:
+        return f"{text[0].upper()}{text[1:]}"
+    if c.work.info[STATUS] == motion.JAMMED:
+        return f"{c.structure.forces[int(c.work.info[GUILTY])].title} jams there: it grows with the load that it makes"
+    return "The position is singular: constraints depend on one another, or a freedom moves no inertia"
 
 
 def _broken(a: Assembly, clock: ex.Clock) -> str:
@@ -136,9 +152,9 @@ def _broken(a: Assembly, clock: ex.Clock) -> str:
     return f"at t = {t:.6g} s, {force}" if force else ""
 
 
-def _driving(a: Assembly) -> list[tuple[Any, int, bool]]:
+def _driving(c: Compiled) -> list[tuple[Any, int, bool]]:
     """Drivers, where the law of each begins, and whether whole turns count for nothing."""
-    s, S = a.compiled.structure, a.compiled.values.system
+    s, S = c.structure, c.values.system
     laws: list[tuple[Any, int, bool]] = [
         (row.element, int(S.row_i[k, ROW_LAW]), bool(S.row_i[k, ROW_WRAP]))
         for k, row in enumerate(s.rows)
@@ -155,7 +171,7 @@ def _rivals(a: Assembly, clock: ex.Clock) -> str:
     S, W, t = a.compiled.values.system, a.compiled.work, float(clock.real[ex.T])
     stack = np.zeros_like(W.stack)
     first: dict[str, tuple[Any, tuple]] = {}
-    for driver, law, _ in _driving(a):
+    for driver, law, _ in _driving(a.compiled):
         jet = evaluate_jet(S.code, S.const, law, stack, t, W.sensed, BY_TIME)
         other, before = first.setdefault(driver.coordinate, (driver, jet))
         for what, x, y in zip(PARTS[:0:-1], before[:0:-1], jet[:0:-1], strict=True):
@@ -174,6 +190,18 @@ def _no_number(after: list[tuple]) -> str:
         for what, x in zip(PARTS, jet, strict=True):
             if not math.isfinite(x):
                 return f"has the {what} {x:g} just after. Give a law that is finite and smooth over the whole time"
+    return ""
+
+
+def _unbounded(near: list[tuple], when: str) -> str:
+    """What is wrong with a law that has these values and derivatives at times ever farther from one instant."""
+    for what, *sizes in zip(PARTS[1:], *(np.abs(jet[1:]) for jet in near), strict=True):
+        if all(x > GROWING * y for x, y in pairwise(sizes)):
+            return (
+                f"has a {what} that grows without bound just {when}, which asks for an infinite "
+                f"{'velocity' if what == PARTS[1] else 'acceleration'}. Give a law with finite derivatives (a power "
+                f"of what becomes zero: an exponent of 2 or more), or step5, which goes over smoothly"
+            )
     return ""
 
 
@@ -256,9 +284,7 @@ def broken_force(c: Compiled, t: float) -> str:
                     return f"what {e.title} presses with is no number"
                 continue
             F, M, par = load(W.FK, S.force_i[k, FORCE_F]), load(W.FK, S.force_i[k, FORCE_M]), wide(S.force_x, k)
-            along = isinstance(e, CoordinateForce)
-            m = S.force_i[k, FORCE_F]
-            x, y = W.sensed[VALUE : RATE + 1, m] if along else e.inputs(par, F, M)
+            x, y = inputs_of(c, k)
             if not math.isfinite(x) or not math.isfinite(y):
                 return f"what {e.title} measures is no number. {e.fails}"
             laws = [

@@ -7,14 +7,19 @@ from collections.abc import Callable
 import numpy as np
 
 from ...equations.engine import MOTION, evaluate
+from ...equations.rows import measured
+from ...equations.within import LAWS
+from ...laws.evaluation import evaluate as evaluate_law
 from ...model.force import Force
 from ...model.grammar import written
+from ...model.touch import Touch
 from ...model.words import brief, shortened
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import TABLEAUX, Tableau, tableau
 from ...tables.branches import laws
-from ...tables.system import VALUE
+from ...tables.system import FORCE_LAW, RATE, VALUE
 from ..assembly.start import Assembly
+from .undefined import inputs_of
 
 BOUNDLESS = 1e30  # times what it began with, or a unit, that nothing comes to that is meant
 ASTRAY = 1e3  # the same, of a motion that a fixed step may have led astray
@@ -60,13 +65,16 @@ def boundless(a: Assembly, clock: ex.Clock, named: Named) -> str:
 
 
 def escaping(a: Assembly, clock: ex.Clock, named: Named) -> str:
-    """The state of a controller that runs off to infinity, or faster and faster, within a finite time, if one does.
+    """What runs off to infinity, or faster and faster, within a finite time, if something does.
 
-    Where there are no rows, nothing can lock, and coordinates and velocities are looked at, too.
+    A force whose law does, the state of a controller, and where there are no rows, so that nothing can lock, a
+    coordinate or velocity.
     """
     s, t = a.compiled.structure, float(clock.real[ex.T])
     if not clock.real[ex.H] < NARROW * max(abs(t), clock.real[ex.LARGEST]):
         return ""
+    if text := _unbounded_law(a, clock):
+        return text
     y, rate, n = clock.y[ex.NOW], clock.K[0], _length(a)
     first = s.nq + s.nv if s.rows else 0
     with np.errstate(all="ignore"):
@@ -78,6 +86,42 @@ def escaping(a: Assembly, clock: ex.Clock, named: Named) -> str:
         f"at t = {t:.6g} s {_told(a, i, float(y[i]), named)} and changes by {rate[i]:.3g} in a second, faster and "
         f"faster: it has no value from there on. {_cause(a, i)}"
     )
+
+
+def _unbounded_law(a: Assembly, clock: ex.Clock) -> str:
+    """A force whose law has grown, and grows by more than `ESCAPING` of itself within such a step; else nothing."""
+    c, t, h, y = a.compiled, float(clock.real[ex.T]), float(clock.real[ex.H]), clock.y[ex.NOW]
+    if not np.isfinite(y).all():
+        return ""
+    s, S, begun, now = c.structure, c.values.system, c.again(), c.again()
+    for other, at, state in ((begun, a.t, a.y), (now, t, y)):
+        other.work.switch[:], other.z = c.work.switch, state[s.nq + s.nv :].copy()
+        other.at(at, state[: s.nq].copy(), state[s.nq : s.nq + s.nv].copy(), MOTION)
+    W, stack, n = now.work, np.zeros_like(c.work.stack), measured(S)
+    later = W.sensed.copy()
+    later[VALUE, :n] += h * W.sensed[RATE, :n]
+    for k, e in enumerate(s.forces):
+        if isinstance(e, Touch):
+            continue
+        x, rate = inputs_of(now, k)
+        for law in filter(lambda at: at >= 0, S.force_i[k, FORCE_LAW : FORCE_LAW + LAWS].tolist()):
+            before, here, then = (
+                abs(evaluate_law(S.code, S.const, law, stack, *of))
+                for of in (
+                    ((a.t, *inputs_of(begun, k)), begun.work.sensed),
+                    ((t, x, rate), W.sensed),
+                    ((t, x + h * rate, rate), later),
+                )
+            )
+            if here > ASTRAY * before and abs(then - here) > ESCAPING * here:
+                given = ", ".join(f"{name} = {z:.3g}" for name, z in zip(e.outputs, (x, rate), strict=False))
+                given = f" for {given}" if given else ""
+                return (
+                    f"at t = {t:.6g} s the law of {e.title} gives {here:.3g}{given} and grows without bound: the "
+                    f"motion has no continuation. Where parts meet that attract each other as 1/r**2, give the law a "
+                    f"bound, 1/(r**2 + a**2), or keep the parts apart by a stop (Limit, Touch)"
+                )
+    return ""
 
 
 def _cause(a: Assembly, i: int) -> str:

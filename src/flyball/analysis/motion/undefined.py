@@ -7,17 +7,30 @@ from typing import Any
 
 import numpy as np
 
+from ...equations.loads import wide
+from ...equations.records import load
 from ...errors import ModelError
 from ...model.element import Element
 from ...model.expressions import Expression
+from ...model.force import CoordinateForce
 from ...model.grammar import Node, written
 from ...model.table import Table
 from ...model.words import brief
 from ...tables.branches import laws
-from ...tables.system import VALUE
+from ...tables.system import FORCE_F, FORCE_M, RATE, VALUE
 from ..compiled import Compiled
 
 LONGEST = 100  # characters of a part of a law in a message
+
+
+def inputs_of(c: Compiled, k: int) -> tuple[float, float]:
+    """What the laws of force k may depend on besides time, at the kinematics in the scratch."""
+    S, W, e = c.values.system, c.work, c.structure.forces[k]
+    F, M = S.force_i[k, FORCE_F], S.force_i[k, FORCE_M]
+    if isinstance(e, CoordinateForce):
+        return float(W.sensed[VALUE, F]), float(W.sensed[RATE, F])
+    x, y = e.inputs(wide(S.force_x, k), load(W.FK, F), load(W.FK, M))
+    return float(x), float(y)
 
 
 def undefined_in(c: Compiled, element: Element, t: float, given: tuple[float, ...] = ()) -> str:

@@ -37,6 +37,7 @@ from ...progress import Tell
 from ..engines import FAILED, Engine
 from ..implicit.made import implicit
 from ..implicit.suited import IMPLICIT, explicit
+from ..later import unsolved
 from ..options import Integration
 from ..part import WEIGHT
 from ..stiff import EXPLICIT, NOT_STIFF, STIFF, STRUCK, Pace, on_corner
@@ -367,7 +368,9 @@ class Run:
         here, c = self.here, self.here.c
         status = here.clock.count[ex.STATUS]
         row, y = np.zeros((1, self.width)), here.y.copy()
-        motion_kernel(c.system, c.work, self.method, here.clock, row, REPORT)
+        if motion_kernel(c.system, c.work, self.method, here.clock, row, REPORT) != 0:
+            row[0, 1 + len(y) :] = np.nan  # what was found last at another state stands there
+            here.doubts.append(unsolved(c, row))
         here.y[:], here.clock.count[ex.STATUS] = y, status
         return row[0]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....constraints.modes import FRICTION, SLIP
-from ....equations.instant import FORCES
+from ....equations.instant import FORCES, NUDGE
 from ....equations.sharing import GRAIN
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, HOLDS, OUT, PUSHES, TURNS, WITH, Dense
 from ....numerics.cone.shares import CELLS, OPEN, best_kernel, room
@@ -21,6 +21,7 @@ from .instant import Instant, Part
 from .yielding import accelerations
 
 SINGULAR = 1e-9  # of the largest eigenvalue: nothing tells rows apart
+ROUNDED = 1e-13 / NUDGE  # of what friction holds: rounding of the differences that tell how it follows forces
 TOUCHED = 1e-9  # of its largest row: what a null vector does to another is rounding
 FIRST = 1e-6  # part of what friction holds that is taken from it to see what gives way
 CLEAR = 1e-3  # of the accelerations that this makes: none
@@ -56,21 +57,31 @@ def nulls(A: np.ndarray) -> np.ndarray:
         return np.asarray(V[:, size < SINGULAR * size[-1]] / d[:, None])
 
 
-def unloading(Z: np.ndarray, loads: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Of forces that move nothing those that do not press on what slides; ``loads``: how its friction follows them."""
+def rounding(A: np.ndarray, x: np.ndarray, reach: np.ndarray) -> float:
+    """How far, by rounding, it is known how friction that holds ``reach`` follows forces x; of rows as they compare."""
+    size = float(np.abs(x * roots(A)).max(initial=0.0))
+    return ROUNDED * float(np.abs(reach).max(initial=0.0)) / size if size > 0.0 else 0.0
+
+
+def unloading(Z: np.ndarray, loads: np.ndarray, d: np.ndarray, least: float) -> np.ndarray:
+    """Of forces that move nothing those that do not press on what slides.
+
+    ``loads``: how its friction follows them; of that ``least`` is nothing (`rounding`).
+    """
     if not loads.any() or not Z.shape[1]:
         return Z
     M = loads @ Z
     _, size, V = np.linalg.svd(M)
-    most = np.abs(loads / d).max() * np.abs(Z * d[:, None]).max()
-    rank = int((size > SINGULAR * most).sum())
+    nothing = max(SINGULAR * np.abs(loads / d).max(), least) * np.abs(Z * d[:, None]).max()
+    rank = int((size > nothing).sum())
     return np.asarray(Z @ V[rank:].T)
 
 
 def free_shares(P: Dense, rows: np.ndarray) -> np.ndarray:
     """How the forces of these rows, which hold, are left open, (rows, k)."""
     Z = nulls(P.A[np.ix_(rows, rows)])
-    return unloading(Z, P.gain[np.ix_(np.flatnonzero(P.rule == DRIVEN), rows)], roots(P.A)[rows])
+    driven = np.flatnonzero(P.rule == DRIVEN)
+    return unloading(Z, P.gain[np.ix_(driven, rows)], roots(P.A)[rows], rounding(P.A, P.x, P.reach[driven]))
 
 
 def slow(n: Instant, parts: list[Part], P: Dense) -> np.ndarray:
@@ -228,11 +239,11 @@ def sliding(n: Instant, parts: list[Part], P: Dense) -> dict[int, Part]:
 def write_group(n: Instant, parts: list[Part], found: tuple[np.ndarray, ...]) -> None:
     """What holds together and shares, into the motion: its guard is that of the group.
 
-    ``found`` are states, the matrix, and how what friction holds follows forces.
+    ``found`` are states, the matrix, how what friction holds follows forces, these, and what it holds.
     """
     if not n.shares:
         return
-    (state, A, gain), G, B = found, n.here.group, n.rooms[len(parts)].B
+    (state, A, gain, x, reach), G, B = found, n.here.group, n.rooms[len(parts)].B
     n.W.switch[SHARED], G.Q.count[OPEN] = 0.0, 0
     on = n.W.switch[MODE, [p.switch for p in parts]] != OFF  # slips of a gap that is let go are no rows
     rows = np.flatnonzero((state == EVEN) & on)
@@ -241,7 +252,7 @@ def write_group(n: Instant, parts: list[Part], found: tuple[np.ndarray, ...]) ->
         return
     d = roots(A)
     driven = np.flatnonzero((rules == DRIVEN) | ((state != EVEN) & np.isin(rules, (GRIPS, TURNS, WITH))))
-    Z = unloading(nulls(A[np.ix_(rows, rows)]), gain[np.ix_(driven, rows)], d[rows])
+    Z = unloading(nulls(A[np.ix_(rows, rows)]), gain[np.ix_(driven, rows)], d[rows], rounding(A, x, reach[driven]))
     if not Z.shape[1]:
         return
     every = np.zeros((len(parts), Z.shape[1]))
