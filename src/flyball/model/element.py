@@ -110,7 +110,7 @@ CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 def element(cls: T) -> T:
     """Make a class of frozen, validated fields; its own fields are keyword-only."""
-    made: Any = dataclass(frozen=True, kw_only=True)(cls)
+    made: Any = dataclass(init=False, frozen=True, kw_only=True)(cls)
     made.__pydantic_config__ = CONFIG
     signature = _signature(made)
 
