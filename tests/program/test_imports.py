@@ -71,7 +71,7 @@ def process(code: str, *arguments: object) -> list | dict:
 def test_a_simulation_imports_numpy_and_little_else(name: str, t_end: float) -> None:
     """Numba only where a kernel had to be compiled: that it is not needed for others is what the wheel is for."""
     found = process(STAGES, EXAMPLES / f"{name}.toml", t_end)
-    assert found == dict.fromkeys(("import", "describe", "simulate", "read", "print"), [])
+    assert found == {stage: [] for stage in ("import", "describe", "simulate", "read", "print")}
 
 
 def test_a_table_is_described_without_scipy() -> None:

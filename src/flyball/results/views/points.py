@@ -9,7 +9,7 @@ import numpy as np
 from ...math.lanes import over_time
 from ...math.scalar import atan2
 from ...model.body import Body, Frame
-from ...rotations.checks import quaternion_of
+from ...model.geometry import matrix_to_quaternion
 from .base import View, same_sign, stacked
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class PointView(View):
         if self._result.planar:
             half, zero = 0.5 * self.angle, self._result.records.zeros()
             return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=1)
-        return same_sign(quaternion_of(self.rotation))
+        return same_sign(matrix_to_quaternion(self.rotation))
 
     @property
     def angle(self) -> np.ndarray:
