@@ -41,15 +41,22 @@ def test_run_writes_everything_and_says_so(here: Path) -> None:
         assert words in said.out
     folder = here / "crank-result"
     assert said.out.splitlines()[-1].split() == ["open", "this", str(Path("crank-result/report.html"))]
-    files = ["animation.html", "plots", "report.html", "result.csv", "result.nc"]
+    files = ["animation.html", "report.html", "result.csv", "result.nc"]
     assert sorted(p.name for p in folder.iterdir()) == files
-    pictures = ["actuation.png", "coordinates.png", "energy.png", "paths.png", "reactions.png"]
-    assert sorted(p.name for p in (folder / "plots").iterdir()) == pictures
     r = fb.load_result(folder / "result.nc")
     assert len(r.t) == 21
     assert r.t[-1] == 0.2
     assert r.model.parameters == {"speed": "30 rpm", "k": 50.0}
     assert r["A"].angle[-1] == pytest.approx(0.2 * 3.14159265358979)
+
+
+@pytest.mark.parametrize("flag", ["--plots", "--no-animation"])
+def test_pictures_are_drawn_on_request_or_in_place_of_a_report(here: Path, flag: str) -> None:
+    said = Said("run", "crank.toml", "--t-end", "0.1", "--outputs", 5, flag)
+    assert said.code == 0, said.err
+    pictures = ["actuation.png", "coordinates.png", "energy.png", "paths.png", "reactions.png"]
+    assert sorted(p.name for p in (here / "crank-result" / "plots").iterdir()) == pictures
+    assert all(str(Path("crank-result/plots") / name) in said.out for name in pictures)
 
 
 def test_run_as_json_prints_one_object(here: Path) -> None:

@@ -123,7 +123,7 @@ class Compiled:
         if len(q) != s.nq or len(v) != s.nv:  # compiled code would read beyond them
             raise ValueError(f"the state has {len(q)} + {len(v)} numbers; these coordinates have {s.nq} + {s.nv}")
         y = np.concatenate([q, v, self.z])
-        out = evaluate(self.system, self.work, float(t), y, task)
+        out = evaluate(tables(s, self.system), self.scratch, float(t), y, task)  # type: ignore[arg-type]  # as buffers
         z = y[len(q) + len(v) :]
         if np.isfinite(z).all():
             self.z = z
@@ -228,9 +228,13 @@ class Compiled:
         """Kinetic energy [J] at velocities v (nv,) of absolute coordinates."""
         if not v.any():
             return 0.0
-        x = self.values
-        i, j, M = x.kept.get("mass", None, 1, lambda: self._entries(INERTIA, x.system.body_x[:, MASS]))
+        i, j, M = self.mass_entries()
         return float(0.5 * (v[i] * M * v[j]).sum())
+
+    def mass_entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows, columns and entries of the mass matrix of absolute coordinates."""
+        x = self.values
+        return x.kept.get("mass", None, 1, lambda: self._entries(INERTIA, x.system.body_x[:, MASS]))
 
     def inverse_mass_root(self, movable: np.ndarray, dense: bool = False):
         """R, sparse if not told, with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.

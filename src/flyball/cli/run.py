@@ -16,7 +16,6 @@ from .flags import Flag
 
 if TYPE_CHECKING:
     from ..results.result import Result
-    from ..view.beside import Artist
 
 CSV_NUMBERS = 5_000_000  # above, the table is left out: such a file is of no use
 
@@ -26,30 +25,30 @@ def run(
     asked: Asked,
     *,
     out: Out = None,
-    no_plots: Annotated[bool, typer.Option("--no-plots", help="Write no pictures.")] = False,
+    plots: Annotated[
+        bool | None, typer.Option(help="Write pictures (PNG); by default if there is no report, which has all curves.")
+    ] = None,
     no_animation: Annotated[bool, typer.Option("--no-animation", help="Write no animation page.")] = False,
     report: Annotated[
         bool | None, typer.Option(help="Write the report; by default unless there is to be no animation.")
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
-    """Write report.html, animation.html, plots, result.csv and result.nc."""
-    from ..view.beside import Artist
-
+    """Write report.html, animation.html, result.csv and result.nc; pictures into plots/ where they are wanted."""
     talk, error = not (asked.as_json or quiet), None
-    with Artist(beside=not no_plots) as artist:
-        try:
-            result = asked.answer(progress=talk)
-        except SimulationError as stopped:
-            if stopped.result is None:
-                raise
-            result, error = cast("Result", stopped.result), stopped
-        except Interrupted as ended:
-            result = ended.result
-        pages = {"report.html": not no_animation if report is None else report, "animation.html": not no_animation}
-        folder = out if out is not None else Path(f"{asked.source.stem}-result")
-        wanted = [name for name, asked_for in pages.items() if asked_for]
-        files, notes = _write(result, folder, None if no_plots else artist, wanted)
+    try:
+        result = asked.answer(progress=talk)
+    except SimulationError as stopped:
+        if stopped.result is None:
+            raise
+        result, error = cast("Result", stopped.result), stopped
+    except Interrupted as ended:
+        result = ended.result
+    reported = not no_animation if report is None else report
+    pages = {"report.html": reported, "animation.html": not no_animation}
+    folder = out if out is not None else Path(f"{asked.source.stem}-result")
+    wanted = [name for name, asked_for in pages.items() if asked_for]
+    files, notes = _write(result, folder, not reported if plots is None else plots, wanted)
     _conclude(result, error, files, notes, asked.as_json, talk)
 
 
@@ -84,7 +83,7 @@ def _conclude(
         raise typer.Exit(INTERRUPTED)
 
 
-def _write(result: Result, folder: Path, artist: Artist | None, pages: Sequence[str]) -> tuple[list[Path], list[str]]:
+def _write(result: Result, folder: Path, plots: bool, pages: Sequence[str]) -> tuple[list[Path], list[str]]:
     """Write all files of a result; returns them, and remarks on what was left out."""
     files, notes = [], []
     make_folder(folder)
@@ -93,11 +92,6 @@ def _write(result: Result, folder: Path, artist: Artist | None, pages: Sequence[
         write(folder / name)
         files.append(folder / name)
 
-    if artist is not None and len(result.t):
-        from ..view.pictures import standard_pictures
-
-        make_folder(folder / "plots")
-        artist.begin(standard_pictures(result), folder / "plots")
     keep("result.nc", result.save)
     curves = 8 * len(result.model.bodies) + 5 * len(result.model.joints)
     if curves * len(result.t) <= CSV_NUMBERS:
@@ -107,8 +101,11 @@ def _write(result: Result, folder: Path, artist: Artist | None, pages: Sequence[
     if not len(result.t):
         notes.append("no output time was reached: there is nothing to draw")
         return files, notes
-    before = len(files)
+    if plots:
+        from ..view.plots import standard_plots
+
+        make_folder(folder / "plots")
+        files += standard_plots(result, folder / "plots")
     for name in pages:
         keep(name, result.to_report if name == "report.html" else result.to_html)
-    files[before:before] = artist.finish() if artist is not None else []
     return files, notes

@@ -12,11 +12,12 @@ import re
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
+from functools import cache
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, TypeVar, dataclass_transform
 
-import pydantic
-from pydantic import BeforeValidator, ConfigDict, ValidationError
+from pydantic import BeforeValidator, ConfigDict, TypeAdapter, ValidationError
+from pydantic_core import ArgsKwargs
 
 from ..errors import ModelError
 from .expressions import number
@@ -103,30 +104,35 @@ Velocity = Annotated[Numbers, Unit("m/s"), Vector()]
 AngularVelocity = Annotated[float | str | tuple[float | str, ...], BeforeValidator(plain), Unit("rad/s")]
 
 
+CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+
+
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 def element(cls: T) -> T:
     """Make a class of frozen, validated fields; its own fields are keyword-only."""
-    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, defer_build=True)  # until one is made
-    made = pydantic.dataclasses.dataclass(frozen=True, kw_only=True, config=config)(cls)
-    original = made.__init__
+    made: Any = dataclass(init=False, frozen=True, kw_only=True)(cls)
+    made.__pydantic_config__ = CONFIG
+    signature = _signature(made)
 
     def __init__(self: Any, *args: Any, **kwargs: Any) -> None:
         try:
-            original(self, *args, **kwargs)
+            _validator(made).validate_python(ArgsKwargs(args, kwargs), self_instance=self)
         except ValidationError as error:
             raise ModelError(_explain(cls.__name__, made, args, kwargs, error)) from None
         except TypeError as error:
             raise ModelError(f"{cls.__name__}: {error}") from None
-        finally:
-            if made.__init__ is not __init__:  # the first one made: pydantic has put its own there
-                made.__init__, made.__signature__ = __init__, signature  # type: ignore[misc, method-assign, attr-defined]
 
     __init__.__doc__ = "The fields; those behind the star by name."
-    signature = _signature(made)
     own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
     __init__.__signature__ = signature.replace(parameters=[own, *signature.parameters.values()])  # type: ignore[attr-defined]
-    made.__init__, made.__signature__ = __init__, signature  # type: ignore[misc, method-assign, attr-defined]
+    made.__init__, made.__signature__ = __init__, signature
     return typing.cast(T, made)
+
+
+@cache
+def _validator(cls: Any) -> Any:
+    """Pydantic's validator of a class, made when its first instance is: many classes never have one."""
+    return TypeAdapter(cls).validator
 
 
 class _Type(str):
@@ -137,7 +143,7 @@ class _Type(str):
 
 
 def _signature(cls: Any) -> inspect.Signature:
-    """The fields, those without a name first: what editors and ``help`` show before pydantic has seen the class."""
+    """The fields, those that need no name first: what editors and ``help`` show."""
     parameters = []
     for f in dataclasses.fields(cls):
         kind = inspect.Parameter.KEYWORD_ONLY if f.kw_only else inspect.Parameter.POSITIONAL_OR_KEYWORD

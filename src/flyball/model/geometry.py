@@ -68,7 +68,7 @@ def quaternion_to_matrix(e: np.ndarray) -> np.ndarray:
 
 @per_lane
 def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion, scalar first and not negative, of a rotation matrix."""
+    """Unit quaternion, scalar first and not negative, of a rotation matrix; of many, (..., 3, 3), in one call."""
     return quaternion_of(R)
 
 

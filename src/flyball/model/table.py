@@ -61,7 +61,7 @@ class Table(Element):
             raise ModelError(f"{self.title}: expressions call a table by its name; use letters, digits and _ only")
         if self.name in FUNCTIONS or self.name in CONSTANTS or self.name == "t":
             raise ModelError(f"{self.title}: the name has a meaning in expressions; call it '{self.name}_curve'")
-        self.data()
+        self._points()
 
     def data(self) -> list[float]:
         """The curve in SI units as the flat list that `flyball.math.spline` reads.

@@ -1,9 +1,7 @@
-"""Draws pictures into files: for this process, or as one of its own that is told what to draw by `beside.Artist`."""
+"""Pictures drawn into files."""
 
 from __future__ import annotations
 
-import pickle
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +25,7 @@ def draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:
     ModelError
         If a file cannot be written.
     """
-    written = files(pictures, folder)
+    written = [folder / f"{p.name}.png" for p in pictures]
     with styled():
         for picture, path in zip(pictures, written, strict=True):
             shown = picture.shown
@@ -35,22 +33,6 @@ def draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:
             headed(drawing, picture.title)
             handed_out(drawing, path)
     return written
-
-
-def files(pictures: Sequence[Picture], folder: Path) -> list[Path]:
-    """Where pictures are written."""
-    return [folder / f"{p.name}.png" for p in pictures]
-
-
-def main() -> None:
-    """Draw what standard input says; end with 1, in silence, where that fails: who asked then draws it and is told."""
-    try:
-        import matplotlib.backends.backend_agg
-        import matplotlib.figure  # noqa: F401  (while the other process still computes)
-
-        draw(*pickle.load(sys.stdin.buffer))
-    except Exception:
-        sys.exit(1)
 
 
 def _over_time(picture: Picture, figure: Figure) -> Drawing:

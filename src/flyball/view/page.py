@@ -12,8 +12,6 @@ from .payload import payload
 from .recording import Recording
 from .static_files import filled, static
 
-LARGE = 4_000_000  # bytes before compression
-
 # The player's modules, each after those it imports.
 MODULES = (
     "data",
@@ -106,8 +104,8 @@ def document(recording: Recording, heading: str, before: str = "", after: str = 
 
 
 def _packed(data: bytes) -> str:
-    level = 9 if len(data) < LARGE else 6  # poses of very many bodies: a tenth of the time, a hundredth larger
-    return base64.b64encode(gzip.compress(data, level, mtime=0)).decode()
+    # level 9 would take twice the time, for very many bodies ten times, and save less than a hundredth
+    return base64.b64encode(gzip.compress(data, 6, mtime=0)).decode()
 
 
 @cache

@@ -1,4 +1,4 @@
-"""The standard pictures of a motion as data: what they show, ready to be drawn, here or by another process."""
+"""The standard pictures of a motion as data: what they show, ready to be drawn."""
 
 from __future__ import annotations
 

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...numerics.rank import svd
 from ...tables.system import G_VALUE, NV, V0
 from ..compiled import Compiled
 from .described import rotation
-
-if TYPE_CHECKING:
-    import scipy.sparse as sp
 
 CLOSED = 1e-10  # part of the mechanism's length, or radians, by which closed rows may be off
 OPEN = 1e-6  # the same, above which a position found on residuals that lead from far away is none
@@ -73,18 +68,17 @@ def _shifts(c: Compiled) -> np.ndarray:
     return out
 
 
-def _vectors(c: Compiled) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """Matrices (bodies, nv) that sum squared velocities: each body's translation, each one's turning.
+def _longest(c: Compiled, d: np.ndarray) -> tuple[float, float]:
+    """How far a step shifts a body at most, and how far it turns one.
 
     A step is as long as its vectors are, which is the same in whatever axes the world is described.
     """
-    import scipy.sparse as sp
-
     body_i, shifts = c.structure.tables["body_i"], _shifts(c)
     body = np.repeat(np.arange(len(body_i)), body_i[:, NV])
     place = np.concatenate([np.arange(v0, v0 + n) for v0, n in zip(body_i[:, V0], body_i[:, NV], strict=True)])
-    both = sp.csr_matrix((np.ones(len(place)), (body, place)), (len(body_i), c.structure.nv))
-    return both @ sp.diags(shifts.astype(float)), both @ sp.diags((~shifts).astype(float))
+    both = (np.bincount(body, (d**2 * kind)[place]) for kind in (shifts, ~shifts))
+    shifted, turned = (float(np.sqrt(x.max(initial=0.0))) for x in both)
+    return shifted, turned
 
 
 def row_scales(c: Compiled) -> np.ndarray:
@@ -95,30 +89,31 @@ def row_scales(c: Compiled) -> np.ndarray:
     return np.where(c.metric, 1.0 / c.values.length, 1.0)
 
 
-def _step(c: Compiled, r: np.ndarray, rows, R, damping: float) -> np.ndarray:
-    """Least step with (rows G) d = r, in the metric of the inverse weights R R^T (both sparse), damped.
+def _step(c: Compiled, r: np.ndarray, scale: np.ndarray, root: np.ndarray, damping: float) -> np.ndarray:
+    """Least step with diag(scale) G d = r, in the metric of the inverse weights root^2, damped.
 
     Near a singular position a combination of rows may speak of a motion by a part of 1e-8 only: where the size allows
-    it the singular values of G R are used, not their squares, which would drown in rounding.
+    it the singular values of G diag(root) are used, not their squares, which would drown in rounding.
     """
+    if len(r) <= DENSE:
+        G = c.jacobian()
+        used = np.flatnonzero(G.any(axis=0))
+        U, s, Vt = svd(scale[:, None] * G[:, used] * root[used])
+        largest = s.max(initial=0.0) or 1.0
+        keep = s > NO_PART * largest
+        x = np.zeros(len(root))
+        x[used] = Vt[keep].T @ (s[keep] / (s[keep] ** 2 + damping * largest**2) * (U[:, keep].T @ r))
+        return root * x
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
 
-    B = rows @ c.sparse_jacobian() @ R
-    if B.shape[0] <= DENSE:
-        used = np.unique(B.indices)
-        U, s, Vt = svd(B[:, used].toarray())
-        largest = s.max(initial=0.0) or 1.0
-        keep = s > NO_PART * largest
-        x = np.zeros(B.shape[1])
-        x[used] = Vt[keep].T @ (s[keep] / (s[keep] ** 2 + damping * largest**2) * (U[:, keep].T @ r))
-        return R @ x
     # [1 B^T; B -delta] with B of unit size: B B^T would square the spread of singular values here too
+    B = sp.diags(scale) @ c.sparse_jacobian() @ sp.diags(root)
     m, n = B.shape
     size = np.sqrt(B.multiply(B).sum(axis=1).max()) or 1.0
     B = B / size
     K = sp.bmat([[sp.identity(n), B.T], [B, -(damping + NO_PIVOT) * sp.identity(m)]], format="csc")
-    return R @ splu(K).solve(np.r_[np.zeros(n), r / size])[:n]
+    return root * splu(K).solve(np.r_[np.zeros(n), r / size])[:n]
 
 
 def _moved_by(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -131,11 +126,7 @@ def _moved_by(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
 
 def newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, int]:
     """Damped Gauss-Newton until closed or no better. Returns (q, iterations)."""
-    import scipy.sparse as sp
-
-    w, scale = inverse_weights(c), row_scales(c)
-    R, rows = sp.diags(np.sqrt(w)).tocsr(), sp.diags(scale).tocsr()
-    shifts, turns = _vectors(c)
+    root, scale = np.sqrt(inverse_weights(c)), row_scales(c)
     size = misfit(c, t, q, v)
     g = scale * c.work.row[G_VALUE]
     damping, wider, capped = 0.0, 1.0, 0
@@ -144,8 +135,8 @@ def newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
         if size < 1e-13:
             return q, k
         c.at(t, q, v)
-        d = _step(c, -g, rows, R, damping)
-        longest, farthest = (float(np.sqrt(x @ d**2).max(initial=0.0)) for x in (shifts, turns))
+        d = _step(c, -g, scale, root, damping)
+        longest, farthest = _longest(c, d)
         over = max(longest / (wider * LONGEST * c.values.length), farthest / LONGEST)
         d = d / over if over > 1.0 else d
         new = _moved_by(c, q, d)

@@ -34,7 +34,8 @@ def check_inertia(model: Model, a: Assembly, motions: np.ndarray) -> None:
     """
     if not motions.shape[1]:
         return
-    K = motions.T @ (a.compiled.mass() @ motions)
+    i, j, M = a.compiled.mass_entries()
+    K = motions[i].T @ (M[:, None] * motions[j])
     w, V = np.linalg.eigh(K)
     if w[0] > 1e-9 * max(w[-1], 1e-300):
         return

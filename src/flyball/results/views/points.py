@@ -67,7 +67,7 @@ class PointView(View):
         if self._result.planar:
             half, zero = 0.5 * self.angle, self._result.records.zeros()
             return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=1)
-        return same_sign(np.array([matrix_to_quaternion(R) for R in self.rotation]).reshape(-1, 4))
+        return same_sign(matrix_to_quaternion(self.rotation))
 
     @property
     def angle(self) -> np.ndarray:
