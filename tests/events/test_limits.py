@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
@@ -312,3 +313,28 @@ def test_a_buffer_that_is_caught_up_with_inside_of_it(side, coordinates):
     wanted = [0.1, y, *(rest + np.exp(-a * on) * swing)]
     assert -side * r["guide"].displacement == pytest.approx(wanted, abs=1e-8)
     assert times(r, "buffer") == pytest.approx([met], abs=1e-8)
+
+
+@pytest.mark.parametrize("coordinates", LAYERS)
+@pytest.mark.parametrize("second", [fb.Limit("S1", "x.displacement", lower=-0.2, stiffness=2e4),
+                                    fb.Event("out", "x.displacement + 0.2", do=fb.Impulse(on="b", impulse=(0, 0)))])  # fmt: skip
+def test_a_damped_stop_that_has_let_go_stays_open_where_something_else_happens(second, coordinates):
+    """A stop lets go inside, as its damper would pull; where it is left, another stop lets go or an event happens."""
+    m = fb.Mechanism("stops", planar=True, gravity=(0, 0))
+    m.add(fb.Body("b", mass=1, inertia=1, velocity=(-3.1, 0)))
+    m.add(
+        fb.Prismatic("x", "ground", "b", at=(0, 0), axis=(1, 0)), fb.Actuator("k", "x.displacement", force="-50*value")
+    )
+    m.add(fb.Limit("S0", "x.displacement", lower=-0.2, stiffness=657.6, damping=5.0), second)
+    stiffness = 2e4 if isinstance(second, fb.Limit) else 0.0
+
+    def rates(t, y):
+        depth = -0.2 - y[0]
+        stops = stiffness * depth + max(657.6 * depth - 5.0 * y[1], 0.0) if depth > 0 else 0.0
+        return [y[1], -50 * y[0] + stops]
+
+    exact = solve_ivp(rates, (0, 1), [0, -3.1], rtol=1e-10, atol=1e-12, max_step=1e-3).y
+    for rtol in (1e-5, 1e-7):
+        run = m.simulate(1.0, rtol=rtol, atol=1e-2 * rtol, outputs=51, coordinates=coordinates)
+        assert run["b"].x[-1] == pytest.approx(exact[0, -1], abs=100 * rtol)
+        assert run["S0"].force.min() >= 0.0

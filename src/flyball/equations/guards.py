@@ -260,9 +260,9 @@ def pressing(S, W, s, kind, way):
         return NOT_WATCHED
     if not told:  # it begins at the side, with nothing that tells where it goes
         return GRAZED * S.glob[UNIT + m] - depth
-    if depth > 0.0:  # where it goes out faster than it is pushed it is open
-        return max(-depth, -push / S.switch_x[s, SWITCH_STIFFNESS])
-    return -depth
+    # where it goes out faster than it is pushed it is open: without a jump as it leaves, so that nothing else that
+    # happens there takes it for a zero
+    return max(-depth, -push / S.switch_x[s, SWITCH_STIFFNESS])
 
 
 @formula
