@@ -1,4 +1,4 @@
-"""The same motion by other ways: coordinates, methods, units, axes, names, order, halves, parameters, files."""
+"""The same motion by other ways: coordinates, methods, tolerances, units, axes, names, order, halves, parameters, files."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ AGREE = 3e-6  # of the motion's size, times the growth: what runs at RTOL may di
 AGREE_STEPS = 1e-4  # of motions by impulses, whose solver stops at a residual
 SLOW = 0.1  # of its reach, or of a radian, over the whole motion: speeds are compared with no less
 STEPS = 20_000
+COARSE, COARSER = 1e-6, 1e3  # a common relative tolerance, and how much more a run at it may differ by
 
 Simulated = Callable[..., fb.Result]
 
@@ -171,6 +172,12 @@ def _method(name: str) -> Relation:
     return relation
 
 
+def common_tolerance(b: Base, dice: random.Random) -> tuple:
+    if isinstance(b.options.get("method"), fb.Stepping) or "step" in b.options:
+        raise Unsupported("steps have no tolerance")
+    return _again(b, b.mechanism, rtol=COARSE, atol=1e-2 * COARSE)
+
+
 def other_units(b: Base, dice: random.Random) -> tuple:
     s = Scale(*(10.0 ** dice.uniform(-2, 2) for _ in range(3)))
     m = scaled(b.mechanism, s)
@@ -287,8 +294,8 @@ class _Joined:
 
 RELATIONS: dict[str, Relation] = {
     "coordinates": other_coordinates, "dop853": _method("dop853"), "rk45": _method("rk45"), "radau": _method("radau"),
-    "units": other_units, "axes": other_axes, "mirror": mirror, "names": rename, "order": reorder, "swap": swap,
-    "halves": halves, "parameters": parameters, "file": file,
+    "tolerance": common_tolerance, "units": other_units, "axes": other_axes, "mirror": mirror, "names": rename,
+    "order": reorder, "swap": swap, "halves": halves, "parameters": parameters, "file": file,
 }  # fmt: skip
 
 
@@ -356,6 +363,7 @@ def _outcome(b: Base, run: Any, m: fb.Mechanism, back: Any, name: str, now: dict
     d, what = difference({k: v[:h] for k, v in now.items()}, {k: v[:h] for k, v in other.items()}, size)
     steps = isinstance(b.options.get("method"), fb.Stepping)
     allowed = (AGREE_STEPS if steps else AGREE) * np.maximum(1.0, b.growth[:h])
+    allowed *= COARSER if name == "tolerance" else 1.0
     ratio = d / allowed
     k = int(np.nanargmax(np.where(np.isfinite(ratio), ratio, np.inf)))
     if np.isfinite(ratio).all() and ratio.max() <= 1.0:
