@@ -1,4 +1,4 @@
-"""The same motion by other ways: coordinates, methods, tolerances, units, axes, names, order, halves, parameters, files."""
+"""The same motion by other ways: coordinates, methods, tolerances, units, axes, names, order, halves, files."""
 
 from __future__ import annotations
 
