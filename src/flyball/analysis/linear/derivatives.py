@@ -68,8 +68,7 @@ class State:
             If they give none.
         """
         if c.at(t, q, v, MOTION)[0] != 0:
-            name = c.structure.model.name
-            raise AnalysisError(f"{name!r} at t = {t:.6g} s has no accelerations: {no_solution(c, t, abs(t))}")
+            raise AnalysisError(f"{c.structure.model.name!r} at t = {t:.6g} s, {no_solution(c, t, abs(t))}")
         W = c.work
         return cls(c, t, q, v, c.z.copy(), W.vel[X_SOLVED].copy(), W.row[LAM].copy(), W.vel[EFFORT].copy())
 

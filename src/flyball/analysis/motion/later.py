@@ -71,5 +71,5 @@ def unsolved(c: Compiled, rows: np.ndarray) -> str:
     why = no_solution(again, float(t[0]), float(np.abs(rows[:, 0]).max()))
     return (
         f"at {len(missing)} of {len(rows)} output times, the first t = {t[0]:.6g} s, the equations of motion have no "
-        f"solution: accelerations and reactions are nan there. {why}"
+        f"solution: accelerations and reactions are nan there: {why}"
     )

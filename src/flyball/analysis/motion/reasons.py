@@ -134,15 +134,15 @@ def of_drivers(c: Compiled, t: float, span: float) -> str:
 
 
 def no_solution(c: Compiled, t: float, span: float) -> str:
-    """Why the equations of motion have no solution at the state evaluated last, as a sentence; ``span`` as above."""
+    """Why the equations of motion have no solution at the state evaluated last; ``span`` as above."""
     stack = c.work.stack
     found = fault(stack, c.structure.functions) or c.structure.missed(stack)
     text = found.message if found else of_drivers(c, t, span) or broken_force(c, t) or _broken_rate(c, t)
     if text:
-        return f"{text[0].upper()}{text[1:]}"
+        return text
     if c.work.info[STATUS] == motion.JAMMED:
         return f"{c.structure.forces[int(c.work.info[GUILTY])].title} jams there: it grows with the load that it makes"
-    return "The position is singular: constraints depend on one another, or a freedom moves no inertia"
+    return "the position is singular: constraints depend on one another, or a freedom moves no inertia"
 
 
 def _broken(a: Assembly, clock: ex.Clock) -> str:
