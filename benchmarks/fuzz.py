@@ -2,7 +2,7 @@
 
 Judges are formulas for poses and velocities (`fuzzing/physics.py`, `fuzzing/touching.py`), and the same motion by other
 ways (`fuzzing/relations.py`). A case comes from the name of its family and a seed alone.
-Usage: ``python fuzz.py``, or ``python fuzz.py --families loops dropped --first 1000 --count 50 --relations 13``.
+Usage: ``python fuzz.py``, or ``python fuzz.py --families loops dropped --first 1000 --count 50 --relations 15``.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="first seed (0)")
     parser.add_argument("--count", type=int, default=100, help="seeds of each family (100: 3000 mechanisms)")
     parser.add_argument(
-        "--relations", type=int, default=4, help="other ways in which each motion is computed (4; 13: all)"
+        "--relations", type=int, default=4, help="other ways in which each motion is computed (4; 15: all)"
     )
     parser.add_argument("--only", nargs="*", choices=list(RELATIONS), metavar="NAME", help="these ways and no others")
     parser.add_argument("--all", action="store_true", help="list what is refused and warned of, too")

@@ -1,7 +1,8 @@
-"""The same motion by other ways: coordinates, methods, tolerances, units, axes, names, order, halves, files."""
+"""The same motion by other ways: coordinates, methods, tolerances, units, axes, names, order, halves, files, bystanders."""
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import os
 import random
@@ -178,6 +179,22 @@ def common_tolerance(b: Base, dice: random.Random) -> tuple:
     return _again(b, b.mechanism, rtol=COARSE, atol=1e-2 * COARSE)
 
 
+def bystanders(b: Base, dice: random.Random) -> tuple:
+    """Events that do nothing, at the instants at which limits and other events happen."""
+    if isinstance(b.options.get("method"), fb.Stepping):
+        raise Unsupported("steps by impulses know no events")
+    m = copy.deepcopy(b.mechanism)
+    limits = [x for x in b.mechanism.elements() if isinstance(x, fb.Limit)]
+    bounds = [(x.coordinate, y) for x in limits for y in (x.lower, x.upper) if y is not None]
+    conditions = [f"{coordinate} - ({bound})" for coordinate, bound in bounds]
+    conditions += [x.when for x in b.mechanism.elements() if isinstance(x, fb.Event) and isinstance(x.when, str)]
+    if not conditions:
+        raise Unsupported("nothing happens")
+    for k, when in enumerate(conditions):
+        m.add(fb.Event(f"bystander {k}", when, do=[]))
+    return _again(b, m)
+
+
 def other_units(b: Base, dice: random.Random) -> tuple:
     s = Scale(*(10.0 ** dice.uniform(-2, 2) for _ in range(3)))
     m = scaled(b.mechanism, s)
@@ -295,7 +312,7 @@ class _Joined:
 RELATIONS: dict[str, Relation] = {
     "coordinates": other_coordinates, "dop853": _method("dop853"), "rk45": _method("rk45"), "radau": _method("radau"),
     "tolerance": common_tolerance, "units": other_units, "axes": other_axes, "mirror": mirror, "names": rename,
-    "order": reorder, "swap": swap, "halves": halves, "parameters": parameters, "file": file,
+    "order": reorder, "swap": swap, "halves": halves, "parameters": parameters, "file": file, "bystanders": bystanders,
 }  # fmt: skip
 
 
