@@ -1,4 +1,4 @@
-"""The same motion by other ways: coordinates, methods, tolerances, units, axes, names, order, halves, files, bystanders."""
+"""The same motion by other ways: `RELATIONS`."""
 
 from __future__ import annotations
 
