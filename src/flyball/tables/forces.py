@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..constraints.blocks import DISTANCE, turning
+from ..forces import formulas_of
 from ..model.carried import carried
 from ..model.controller import Controller
 from ..model.element import LawOf, fields_with
@@ -16,7 +17,7 @@ from ..model.force import CoordinateForce, Force
 from ..model.sensor import Sensor
 from ..model.touch import Touch
 from .specs import Structure, frame
-from .system import SLIDING
+from .system import OWN, SLIDING
 from .terms import coordinate_frames, coordinate_term, measured_term
 
 
@@ -97,10 +98,12 @@ def _sensed(s: Structure, e: Sensor | Event | Controller, kind: str, text: str) 
 
 def forces(s: Structure) -> None:
     """Force table, sorted by kind."""
-    s.forces = sorted((f for f in s.model.acting() if _acts(s, f)), key=lambda f: f.kind)
+    acting = [(f, formulas_of(type(f))) for f in s.model.acting() if _acts(s, f)]
+    acting.sort(key=lambda x: OWN if x[1] is not None else x[0].kind)
+    s.forces, s.own = [f for f, _ in acting], [x for _, x in acting]
     table = np.full((len(s.forces), 10), -1, np.int64)
     for k, e in enumerate(s.forces):
-        table[k, 7:9] = e.kind, isinstance(e, CoordinateForce)
+        table[k, 7:9] = e.kind if s.own[k] is None else OWN, isinstance(e, CoordinateForce)
         if isinstance(e, CoordinateForce):
             table[k, 0] = _along(s, e)
             if hasattr(e, "load"):
@@ -118,6 +121,11 @@ def forces(s: Structure) -> None:
         if not e.conservative() and e.name not in s.model.aside:
             table[k, 5] = s.state(f"{e.name}.work")
     s.tables["force_i"] = table
+
+
+def addresses(s: Structure) -> np.ndarray:
+    """Addresses of the code tables of forces: `System.own`."""
+    return np.array([0 if x is None else x.address for x in s.own], np.int64)
 
 
 def _acts(s: Structure, e: Force) -> bool:

@@ -67,7 +67,7 @@ def structure(model: Model, choices: Choices = PLAIN) -> Structure:
     model = model.snapshot()
     key = choices, single(model)
     found = model.kept.get("structure", key, MOST, lambda: _decided(model, choices))
-    if any(f.native.stale for f in found.functions):
+    if any(f.native.stale for f in found.functions) or any(x is not None and x.stale for x in found.own):
         model.kept.drop("structure", key)
         found = model.kept.get("structure", key, MOST, lambda: _decided(model, choices))
     return found
