@@ -229,6 +229,12 @@ class Element:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
+        other = Element.registry.get(cls.__name__)
+        if other is not None and _is_built_in(other) != _is_built_in(cls):
+            raise ModelError(
+                f"the class {cls.__name__} of {cls.__module__} and that of {other.__module__} have one name, by which "
+                f"model files know an element; give the class of your own another name"
+            )
         Element.registry[cls.__name__] = cls
 
     @property
@@ -261,6 +267,10 @@ class Element:
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
         """Weights of the coordinates whose sum such a row acts along; 1 each if none are given."""
         return ()
+
+
+def _is_built_in(cls: type) -> bool:
+    return cls.__module__.partition(".")[0] == "flyball"
 
 
 _MARKED: dict[tuple[Any, Any], dict[str, Any]] = {}
