@@ -11,6 +11,7 @@ import inspect
 import threading
 from collections.abc import Callable, Sequence
 from functools import update_wrapper
+from types import FunctionType
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -18,7 +19,7 @@ import numpy as np
 
 from ..errors import ModelError
 from .formulas import CODE_TABLES, LOCK
-from .sources import content
+from .sources import content, twin
 
 _made: WeakKeyDictionary[type, CodeTable] = WeakKeyDictionary()
 
@@ -99,6 +100,10 @@ class FormulaCode(CompiledCode):
 
     form: Form
 
+    def __init__(self, function: FunctionType, first_order: bool, form: Form) -> None:
+        super().__init__(twin(function, {}), first_order, form)
+        self._original = function
+
     @property
     def parameters(self) -> tuple[Any, ...]:  # type: ignore[override]
         """Lengths of its arguments."""
@@ -107,7 +112,7 @@ class FormulaCode(CompiledCode):
     @property
     def content(self) -> str:  # type: ignore[override]
         """Hash of the formula and all that it calls."""
-        return f"{self.form} {self.form.result} {content(self.function)}"
+        return f"{self.form} {self.form.result} {content(self._original)}"
 
 
 class CodeTable:
@@ -226,5 +231,5 @@ def _refusal(owner: type, form: Form, first_order: bool, error: Exception) -> st
     numbers = "complex numbers, which derivatives are computed with" if first_order else "floats"
     return (
         f"{owner.__name__}.{form.name} cannot be compiled for {numbers}: {short_reason(error)}. A formula uses "
-        f"numbers, tuples of these, functions of flyball.math, and functions of its own that are marked @formula"
+        f"numbers, tuples of these, and functions of flyball.math and of your own that do the same"
     )

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
+from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any
 
 from .formulas import formula, formula_at
@@ -95,6 +95,40 @@ def content(function: Callable[..., Any]) -> str:
     for part in _parts(function, []):
         digest.update(f"{part}\n".encode())
     return digest.hexdigest()
+
+
+def twin(function: FunctionType, made: dict[FunctionType, FunctionType]) -> FunctionType:
+    """The same function as another object, with what it takes from outside as that is now.
+
+    Numba keeps what it has made of a function, with the numbers that it took from outside then. Functions that are not
+    flyball's and that it calls by their names are replaced in the same way, and compiled code may call them.
+
+    Parameters
+    ----------
+    function : function
+    made : dict
+        Twins that were made already.
+    """
+
+    def known(value: Any) -> Any:
+        if not isinstance(value, FunctionType) or Path(value.__code__.co_filename).is_relative_to(PACKAGE):
+            return value
+        return twin(value, made)
+
+    if function in made:
+        return made[function]
+    scope: dict[str, Any] = {"__builtins__": __builtins__, "__name__": function.__module__}
+    cells = tuple(CellType() for _ in function.__closure__ or ())
+    new = FunctionType(function.__code__, scope, function.__name__, function.__defaults__, cells or None)
+    new.__kwdefaults__ = function.__kwdefaults__
+    new.__module__, new.__qualname__ = function.__module__, function.__qualname__
+    made[function] = formula(new)
+    for name in _names(function.__code__) & set(function.__globals__):
+        scope[name] = known(function.__globals__[name])
+    for cell, given in zip(cells, function.__closure__ or (), strict=True):
+        with suppress(ValueError):  # not filled yet
+            cell.cell_contents = known(given.cell_contents)
+    return new
 
 
 def _parts(x: Any, seen: list[Any]) -> Iterator[str]:

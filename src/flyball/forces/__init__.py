@@ -5,9 +5,8 @@ import pkgutil
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ..compiler.by_address import CodeTable, Form, code_table
-from ..errors import ModelError
-from ..model.force import CoordinateForce, Force
+from ..compiler.by_address import Form
+from ..model.force import Force
 
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"{__name__}.{_module.name}")
@@ -50,28 +49,6 @@ FORMS = (
 """The formulas of forces that kernels call, in the order of their code tables."""
 if set(WRENCHES) & set(EFFORTS):
     raise RuntimeError(f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}")
-
-
-def formulas_of(cls: type[Force]) -> CodeTable | None:
-    """The formulas of a class that is not flyball's own, by address; None where it has those of a built-in element.
-
-    Raises
-    ------
-    ModelError
-        If the class lacks a formula.
-    """
-    known = zip(FORMS, (INPUTS, WRENCHES, EFFORTS, BRANCHES), strict=True)
-    kind = getattr(cls, "kind", -1)
-    own = kind < 0 or any(getattr(cls, form.name, None) is not of.get(kind) for form, of in known)
-    if cls.__module__.startswith("flyball.") or not own:
-        return None
-    needed = FORMS[2:3] if issubclass(cls, CoordinateForce) else FORMS[:2]
-    for form in needed:
-        if not hasattr(cls, form.name):
-            raise ModelError(f"{cls.__name__} has no formula {form}; define it as a static method")
-    return code_table(cls, FORMS)
-
-
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .backlash import Backlash as Backlash
     from .bushing import Bushing as Bushing

@@ -132,6 +132,7 @@ class CoordinateForce(Force):
     """A force along a measured quantity: a joint's coordinate, or a sum of distances."""
 
     effort: ClassVar[Callable]
+    outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}  # value and rate first
     dimensions: ClassVar[dict[str, tuple[str, str]]] = {  # of fields, along a displacement and about an angle
         "stiffness": ("N/m", "N*m/rad"),
         "damping": ("N*s/m", "N*m*s/rad"),

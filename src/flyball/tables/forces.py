@@ -6,8 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..compiler.by_address import CodeTable, code_table
 from ..constraints.blocks import DISTANCE, turning
-from ..forces import formulas_of
+from ..errors import ModelError
+from ..forces import BRANCHES, EFFORTS, FORMS, INPUTS, WRENCHES
 from ..model.carried import carried
 from ..model.controller import Controller
 from ..model.element import LawOf, fields_with
@@ -121,6 +123,43 @@ def forces(s: Structure) -> None:
         if not e.conservative() and e.name not in s.model.aside:
             table[k, 5] = s.state(f"{e.name}.work")
     s.tables["force_i"] = table
+
+
+def formulas_of(cls: type[Force]) -> CodeTable | None:
+    """The formulas of a class that is not flyball's own, by address; None where it has those of a built-in element.
+
+    Raises
+    ------
+    ModelError
+        If the class lacks a formula.
+    """
+    known = zip(FORMS, (INPUTS, WRENCHES, EFFORTS, BRANCHES), strict=True)
+    kind = getattr(cls, "kind", -1)
+    own = kind < 0 or any(getattr(cls, form.name, None) is not of.get(kind) for form, of in known)
+    if cls.__module__.startswith("flyball.") or not own:
+        return None
+    needed = FORMS[2:3] if issubclass(cls, CoordinateForce) else FORMS[:2]
+    for form in needed:
+        if not hasattr(cls, form.name):
+            raise ModelError(f"{cls.__name__} has no formula {form}; define it as a static method")
+    _refuse_names(cls)
+    return code_table(cls, FORMS)
+
+
+def _refuse_names(cls: type[Force]) -> None:
+    """Refuse fields that have the names of what forces declare."""
+    for c in cls.__mro__:
+        if c.__module__.partition(".")[0] == "flyball":
+            continue
+        taken = {
+            name for name in vars(c).get("__annotations__", ()) if name in getattr(cls, "__dataclass_fields__", ())
+        }
+        taken &= {*dir(CoordinateForce), "load"} - set(CoordinateForce.__dataclass_fields__)
+        if taken or "load" in vars(c):
+            raise ModelError(
+                f"{c.__name__}: {', '.join(sorted(taken or {'load'}))} has a meaning for every force; give the field "
+                f"another name"
+            )
 
 
 def addresses(s: Structure) -> np.ndarray:

@@ -68,6 +68,7 @@ CHECKS: dict[str, Callable[[Subject], str]] = {
     "layers": motions.layers,
     "made": motions.made,
     "turned": motions.turned,
+    "linear": motions.linear,
 }
 """The parts of the contract, in the order in which they are checked. Each returns what is wrong; "" if nothing is."""
 
@@ -99,7 +100,8 @@ def check_element(
         - ``"units"``: if its formula holds a constant that has a unit, such as the density of air;
         - ``"file"``: if it has Python functions as laws;
         - ``"symbols"`` and ``"made"``: if its formula decides by what moves; symbolic equations are not for it then;
-        - ``"complex"``, ``"derivatives"``: the same for linearisation, sensitivities and implicit methods.
+        - ``"complex"``, ``"derivatives"`` and ``"linear"``: the same for linearisation, sensitivities and implicit
+          methods.
 
     Returns
     -------

@@ -85,3 +85,10 @@ def turned(s: Subject) -> str:
     r = s.make(Q, SHIFT).simulate(SPAN, outputs=OUTPUTS, specialize=False, **TIGHT)  # type: ignore[arg-type]
     wrong = _apart(_places(_motion(s)) @ Q.T + SHIFT, _places(r))
     return wrong and f"the whole mechanism turned and shifted moves otherwise: {wrong}. It depends on the world's axes"
+
+
+def linear(s: Subject) -> str:
+    """The equations of motion where it starts can be made linear."""
+    if np.isfinite(s.mechanism.linearize(frozen=True).eigenvalues).all():
+        return ""
+    return "linearize(frozen=True) gives eigenvalues that are not finite: the formula has no derivatives"

@@ -41,7 +41,7 @@ def sample_mechanism(
     for k, (body, joint, what) in enumerate(_needed(e)):
         arm, start = f"arm of {body}", np.array([1.5 * k, 0.3 * k, 0.2])
         hinge, ball, centre = (start + np.array(x) for x in ((0.0, 0.4, 0.1), (0.3, 0.1, -0.1), (0.5, -0.2, 0.0)))
-        for name, at, spin in ((arm, start, (0.2, 0.4, -0.1)), (body, centre, (0.6, -1.1, 0.9))):
+        for name, at, spin in ((arm, start, 0.4 * AXIS), (body, centre, np.array([0.6, -1.1, 0.9]))):
             given = {} if what and name == body else {"angular_velocity": _plain(Q @ spin)}
             place = {"position": _plain(Q @ at + d), "orientation": orientation}
             m.add(Body(name, mass=1.2, inertia=(0.05, 0.08, 0.11), **place, **given))  # type: ignore[arg-type]
@@ -67,11 +67,12 @@ def _needed(e: Force) -> list[tuple[str, str, str]]:
 
 def _turned(e: Force, Q: np.ndarray, d: np.ndarray) -> Force:
     """The element with its points and directions turned and its points shifted."""
-    units, new = fields_with(type(e), Unit), {}
-    for name in fields_with(type(e), Vector):
+    units, new = fields_with(type(e), Unit), dict[str, Any]()
+    points = {name for name, unit in units.items() if unit.dimension == "m" and isinstance(getattr(e, name), tuple)}
+    for name in points.union(fields_with(type(e), Vector)):
         value = getattr(e, name)
         if value is not None and (np.eye(3) != Q).any():
-            shift = d if name in units and units[name].dimension == "m" else np.zeros(3)
+            shift = d if name in points else np.zeros(3)
             x = np.array(value, float)
             new[name] = tuple(_plain(Q @ v + shift) for v in x) if x.ndim > 1 else _plain(Q @ x + shift)
     if (np.eye(3) != Q).any() and hasattr(e, "orientation"):  # of its axes as drawn; the world's if not given
