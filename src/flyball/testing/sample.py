@@ -42,11 +42,13 @@ def sample_mechanism(
         arm, start = f"arm of {body}", np.array([1.5 * k, 0.3 * k, 0.2])
         hinge, ball, centre = (start + np.array(x) for x in ((0.0, 0.4, 0.1), (0.3, 0.1, -0.1), (0.5, -0.2, 0.0)))
         for name, at, spin in ((arm, start, 0.4 * AXIS), (body, centre, np.array([0.6, -1.1, 0.9]))):
-            given = {} if what and name == body else {"angular_velocity": _plain(Q @ spin)}
-            place = {"position": _plain(Q @ at + d), "orientation": orientation}
-            m.add(Body(name, mass=1.2, inertia=(0.05, 0.08, 0.11), **place, **given))  # type: ignore[arg-type]
+            given: dict[str, Any] = {"position": _plain(Q @ at + d), "orientation": orientation}
+            if not (what and name == body):
+                given["angular_velocity"] = _plain(Q @ spin)
+            m.add(Body(name, mass=1.2, inertia=(0.05, 0.08, 0.11), **given))
         m.add(Revolute(f"hinge of {arm}", GROUND, arm, at=_plain(Q @ hinge + d), axis=_plain(Q @ AXIS)))
-        kind = {"angle": Revolute, "displacement": Prismatic}.get(what, Spherical)
+        kinds: dict[str, Any] = {"angle": Revolute, "displacement": Prismatic}
+        kind = kinds.get(what, Spherical)
         axis = {} if kind is Spherical else {"axis": _plain(Q @ ACROSS)}
         m.add(kind(joint, arm, body, at=_plain(Q @ ball + d), **axis))
     m.add(_turned(e, Q, d))

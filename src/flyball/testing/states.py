@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +23,7 @@ class State:
     """Arguments of a formula: nested tuples of numbers."""
 
     form: Form
-    function: Callable[..., Any]
+    function: Any
     arguments: tuple[Any, ...]
     frames: tuple[Frame, Frame] | None = None
 
