@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
+import sys
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
@@ -106,6 +107,11 @@ AngularVelocity = Annotated[float | str | tuple[float | str, ...], BeforeValidat
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 def element(cls: T) -> T:
     """Make a class of frozen, validated fields; its own fields are keyword-only."""
+    if not _is_built_in(cls):  # its names may be gone when a first one is made: of a file that was run, of a function
+        frame = sys._getframe(1)
+        cls.__annotations__ = inspect.get_annotations(
+            cls, globals=frame.f_globals, locals={**frame.f_locals, **vars(cls)}, eval_str=True
+        )
     config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, defer_build=True)  # until one is made
     made = pydantic.dataclasses.dataclass(frozen=True, kw_only=True, config=config)(cls)
     original = made.__init__

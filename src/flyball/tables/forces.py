@@ -19,7 +19,7 @@ from ..model.force import CoordinateForce, Force
 from ..model.sensor import Sensor
 from ..model.touch import Touch
 from .specs import Structure, frame
-from .system import OWN, SLIDING
+from .system import FORCE_LAW, FORCE_WORK, OWN, SLIDING
 from .terms import coordinate_frames, coordinate_term, measured_term
 
 
@@ -179,6 +179,8 @@ def _axis_frame(s: Structure, e: CoordinateForce) -> int:
 
 
 def _compile_laws(s: Structure, e: Force, row: np.ndarray) -> None:
+    if len(e.laws()) > FORCE_WORK - FORCE_LAW:
+        raise ModelError(f"{e.title}: laws() gives {len(e.laws())} laws; a force has up to {FORCE_WORK - FORCE_LAW}")
     for name, of in fields_with(e.__class__, LawOf).items():
         for slot, law in enumerate(e.laws()):
             if law is not None:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.registry import KINDS
+from ..errors import ModelError
 from ..math.lanes import has_lanes, over_lanes
 from ..math.scalar import real_parts, sqrt
 from ..model.body import GROUND
@@ -272,5 +273,7 @@ def _force_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarra
         if not new.asks(e):
             continue
         par = e.parameters(pose.numbers[e.name], pose.apart(e))
+        if len(par) > x.shape[1]:
+            raise ModelError(f"{e.title}: parameters() gives {len(par)} numbers; a force has up to {x.shape[1]}")
         x[k], x[k, : len(par)] = 0.0, par
     return x
