@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import runpy
+from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -281,6 +283,32 @@ def test_no_formula_at_all():
     m.add(fb.Body("b", mass=1, inertia=(1, 1, 1)), Empty("e", "b"))
     with pytest.raises(fb.ModelError, match=r"Empty has no formula wrench\(par, F, M, laws, values\)"):
         m.simulate(0.1)
+
+
+def test_a_ball_in_the_air_comes_to_rest_on_a_floor():
+    """In steps by impulses; before it touches by the closed form, at rest its floor carries its weight."""
+    m = fb.Mechanism("fall", gravity=(0, 0, -10), parameters={"c": C})
+    m.add(
+        fb.Body("ball", shape=fb.Sphere(radius=0.1), mass=1, position=(0, 0, 2)), fb.Ground("floor", shape=fb.Plane())
+    )
+    m.add(LinearDrag("air", "ball", coefficient="c"), fb.Contact(friction=0.3))
+    r = m.simulate(4.0, outputs=81, method=fb.Stepping(step="2 ms"))
+    t = r.t[:10]
+    fallen = 10 / C * (t - (1 - np.exp(-C * t)) / C)
+    np.testing.assert_allclose(r["ball.z"][:10], 2 - fallen, atol=5e-3)
+    assert r["ball.z"][-1] == pytest.approx(0.1, abs=1e-3)
+
+
+@pytest.mark.parametrize("block", [0, 1])
+def test_what_the_documentation_shows_runs(block, tmp_path):
+    text = (Path(__file__).parents[2] / "docs" / "own_elements.md").read_text(encoding="utf-8")
+    file = tmp_path / "shown.py"
+    file.write_text(text.split("```python\n")[1 + block].split("```")[0])
+    names = runpy.run_path(str(file))
+    if block == 0:
+        run = names["run"]
+        assert run["ball.y"][-1] > 1.0
+        assert run.energy.work["air"][-1] < 0.0
 
 
 # -- the contract
