@@ -178,7 +178,7 @@ def test_the_engine_of_edited_sources_is_not_in_the_cache(runs):
 OWN = """
 import json, sys
 import flyball as fb
-from flyball.elements import BodyForce, Damping, element
+from flyball.elements import BodyForce, Damping, Joint, blocks, element
 from flyball.math.vec import scale
 from flyball.compiler.notice import TIMES
 
@@ -196,15 +196,22 @@ class Wind(BodyForce):
     def parameters(self, n, separation):
         return (n.coefficient,)
 
-m = fb.Mechanism("thrown")
+@element
+class Plate(Joint):
+    blocks = (blocks.SLIDE,)
+    needs_axis = True
+    planar_normal = ""
+
+m = fb.Mechanism("thrown", gravity=(0, 0, -10))
 m.add(fb.Body("puck", mass=1, inertia=(1, 1, 1), velocity=(1, 0, 0)), Wind("wind", "puck", coefficient=1))
+m.add(Plate("plate", "ground", "puck", at=(0, 0, 0), axis=(0, 0, 1)))
 r = m.simulate(1.0, outputs=2, specialize=False)
 print(json.dumps({"v": r["puck.vx"][-1], "compiled": sorted(TIMES), "numba": "numba" in sys.modules}))
 """
 
 
 def test_an_edited_file_of_a_users_own_compiles_its_formula_alone(tmp_path):
-    """An edit of a number that the formula takes from outside; then nothing is compiled, then the formula by itself."""
+    """Nothing where nothing was edited; the formula where a number that it takes from outside was. A joint needs none."""
     script = tmp_path / "wind.py"
 
     def run(share):
