@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import runpy
 from pathlib import Path
+from types import ModuleType
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -225,6 +226,17 @@ def test_a_number_from_outside_that_changes_changes_the_code(monkeypatch):
     assert (first, second) == (pytest.approx(way(1.0), abs=1e-5), pytest.approx(way(1.0, 2 * C), abs=1e-5))
 
 
+def test_so_does_one_in_a_module_that_the_formula_calls(monkeypatch):
+    helpers = ModuleType("helpers")
+    exec("K = 1.0\ndef share(x):\n    return K * x", vars(helpers))
+    scope = {"helpers": helpers, "scale": scale}
+    exec("def wrench(par, F, M, laws, values):\n    return scale(-helpers.share(par[0]), M[3]), (0.0, 0.0, 0.0)", scope)
+    m = thrown(variant(wrench=staticmethod(scope["wrench"])))
+    for k in (1.0, 3.0):
+        helpers.K = k
+        assert m.simulate(1.0, outputs=2)["puck.x"][-1] == pytest.approx(way(1.0, k * C), abs=1e-5)
+
+
 def test_prepared_and_sent_it_computes_the_same():
     p = thrown().prepare()
     again = pickle.loads(pickle.dumps(p))
@@ -241,6 +253,16 @@ def test_a_file_holds_it(tmp_path):
     (tmp_path / "wrong.toml").write_text(text)
     with pytest.raises(fb.ModelError, match=r"unknown type 'LinearDrug' .*LinearDrag.*is known once the Python file"):
         fb.load(tmp_path / "wrong.toml")
+
+
+def test_a_type_that_two_modules_define_is_no_type_of_a_file(tmp_path):
+    """Which of them was meant, nobody knows; in Python both work."""
+    for module in ("one", "two"):
+        element(type("Breeze", (LinearDrag,), {"__module__": module, "__annotations__": {}}))
+    m = thrown(LinearDrag.registry["Breeze"])
+    m.save(tmp_path / "breeze.toml")
+    with pytest.raises(fb.ModelError, match=r"type 'Breeze' is defined by several modules, one, two; a file knows"):
+        fb.load(tmp_path / "breeze.toml")
 
 
 def test_a_name_of_flyballs_own_is_refused():
@@ -390,7 +412,7 @@ def test_a_wrong_class_is_caught_by_the_part_that_it_breaks(part):
 
 
 @element
-class Sheet(Joint):
+class Layer(Joint):
     """A point of ``body_j`` stays in the plane of ``body_i`` through ``at`` whose normal is ``axis``."""
 
     blocks: ClassVar = (blocks.SLIDE,)
@@ -403,7 +425,7 @@ def test_a_joint_of_ones_own_needs_no_formula(tmp_path):
     """A puck slides down a plane: an acceleration of g sin(angle) along it, m g cos(angle) on it."""
     m = fb.Mechanism("slope", gravity=(0, 0, -10))
     m.add(fb.Body("puck", mass=2, inertia=(1, 1, 1), position=(1, 0, 0)))
-    m.add(Sheet("table", "ground", "puck", at=(1, 0, 0), axis=(0, 3, 4)))
+    m.add(Layer("table", "ground", "puck", at=(1, 0, 0), axis=(0, 3, 4)))
     n, g = np.array([0, 0.6, 0.8]), np.array([0, 0, -10.0])
     assert m.check().freedoms == 5
     r = m.simulate(1.0, outputs=3)

@@ -101,7 +101,7 @@ def twin(function: FunctionType, made: dict[FunctionType, FunctionType]) -> Func
     """The same function as another object, with what it takes from outside as that is now.
 
     Numba keeps what it has made of a function, with the numbers that it took from outside then. Functions that are not
-    flyball's and that it calls by their names are replaced in the same way, and compiled code may call them.
+    flyball's and that it calls are replaced in the same way, and compiled code may call them.
 
     Parameters
     ----------
@@ -109,8 +109,17 @@ def twin(function: FunctionType, made: dict[FunctionType, FunctionType]) -> Func
     made : dict
         Twins that were made already.
     """
+    names = _names(function.__code__)
 
     def known(value: Any) -> Any:
+        if isinstance(value, ModuleType):
+            inner = {name: vars(value)[name] for name in names & set(vars(value))}
+            new = {name: known(x) for name, x in inner.items() if not isinstance(x, ModuleType)}
+            if all(x is inner[name] for name, x in new.items()):
+                return value
+            module = ModuleType(value.__name__)
+            vars(module).update(vars(value) | new)
+            return module
         if not isinstance(value, FunctionType) or Path(value.__code__.co_filename).is_relative_to(PACKAGE):
             return value
         return twin(value, made)
@@ -123,7 +132,7 @@ def twin(function: FunctionType, made: dict[FunctionType, FunctionType]) -> Func
     new.__kwdefaults__ = function.__kwdefaults__
     new.__module__, new.__qualname__ = function.__module__, function.__qualname__
     made[function] = formula(new)
-    for name in _names(function.__code__) & set(function.__globals__):
+    for name in names & set(function.__globals__):
         scope[name] = known(function.__globals__[name])
     for cell, given in zip(cells, function.__closure__ or (), strict=True):
         with suppress(ValueError):  # not filled yet

@@ -232,6 +232,7 @@ class Element:
 
     category: ClassVar[str] = "elements"
     registry: ClassVar[dict[str, type[Element]]] = {}
+    modules: ClassVar[dict[str, set[str]]] = {}  # name of a class -> modules that have defined one of that name
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -242,6 +243,7 @@ class Element:
                 f"model files know an element; give the class of your own another name"
             )
         Element.registry[cls.__name__] = cls
+        Element.modules.setdefault(cls.__name__, set()).add(cls.__module__)
 
     @property
     def title(self) -> str:
