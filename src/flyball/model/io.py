@@ -331,7 +331,7 @@ def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
         importlib.import_module(f"..{room}", __package__)
         kinds = {k: c for k, c in Element.registry.items() if issubclass(c, base) and c.category == category}
         own = [k for k, c in kinds.items() if not c.__module__.startswith("flyball.")]
-        known = sorted(own + [k for k, c in kinds.items() if c.__module__.count(f".{room}.")])
+        known = [*sorted(k for k, c in kinds.items() if c.__module__.count(f".{room}.")), *sorted(own)]
     name = fields.pop("type", None)
     if category == "forces" and name == Touch.__name__:  # of a motion with contact, in its result file
         return Touch
