@@ -75,7 +75,8 @@ When something is wrong
     Interrupted has what was computed until the user ended it. StartWarning tells what of a
     described start could not be kept.
 
-Orientations by themselves: ``help(fb.rotations)``. From a shell: ``flyball --help``.
+Elements of your own: ``help(fb.elements)``; ``fb.testing.check_element(e)`` tests one. Orientations by themselves:
+``help(fb.rotations)``. From a shell: ``flyball --help``.
 """
 
 from __future__ import annotations
@@ -84,7 +85,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
+    from . import elements as elements
     from . import rotations as rotations
+    from . import testing as testing
     from .analysis.assembly.start import Assembly as Assembly
     from .analysis.motion.impulse.settings import Stepping as Stepping
     from .analysis.prepared import Prepared as Prepared
@@ -232,7 +235,7 @@ _HOME = {
     "TransferFunction": "symbolic.linear.transfer",
 }
 _ROOMS = ("model.shapes", "joints", "forces", "control")
-_MODULES = ("rotations",)
+_MODULES = ("elements", "rotations", "testing")
 
 
 def __getattr__(name: str) -> Any:

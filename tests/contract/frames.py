@@ -21,6 +21,7 @@ from flyball.constraints import (
 )
 from flyball.constraints.registry import KINDS
 from flyball.model.element import resolve
+from flyball.testing.frames import random_motion, record, turned
 
 OVAL = [(2.0 * np.cos(u), 1.2 * np.sin(u)) for u in np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)]
 PROFILE = fb.Cam("c", "a", "b", points=OVAL, axis=(0, 0, 1))
@@ -68,13 +69,6 @@ def has_value(case) -> bool:
     return kind not in (blade.KIND, spin.KIND) and not (kind == rolling.KIND and par[5] == 0.0)
 
 
-def random_motion(seed: int) -> list[dict]:
-    """Two frames with random poses, velocities and accelerations."""
-    rng = np.random.default_rng(seed)
-    keys = ("p", "w", "v", "alpha", "a")
-    return [{"R": Rotation.random(random_state=rng).as_matrix()} | {k: rng.normal(size=3) for k in keys} for _ in "FM"]
-
-
 def frames(case, seed: int) -> tuple[dict, dict, float]:
     """F, M and what the row leans on: a whole turn too far for an angle, a place near the nearest one for a curve."""
     F, M = random_motion(seed)
@@ -89,33 +83,10 @@ def frames(case, seed: int) -> tuple[dict, dict, float]:
     return F, M, hint
 
 
-def record(m: dict, dtype=float) -> tuple:
-    """The kinematic record of a frame."""
-    return tuple(tuple(np.asarray(m[k], dtype).ravel().tolist()) for k in ("p", "R", "w", "v", "alpha", "a"))
-
-
 def evaluated(case, F: dict, M: dict, hint: float, dtype=float) -> tuple:
     """The row's value, wrench and bias."""
     kind, name = case
     return KINDS[kind].row(PARAMETERS[kind][name], record(F, dtype), record(M, dtype), hint, DATA)
-
-
-def moved(m: dict, t: float) -> dict:
-    """The frame after a time t of its motion, exact to second order."""
-    turn = m["w"] * t + 0.5 * m["alpha"] * t * t
-    return m | {
-        "p": m["p"] + m["v"] * t + 0.5 * m["a"] * t * t,
-        "R": Rotation.from_rotvec(turn).as_matrix() @ m["R"],
-        "w": m["w"] + m["alpha"] * t,
-        "v": m["v"] + m["a"] * t,
-    }
-
-
-def stepped(m: dict, e: float) -> dict:
-    """The frame after an imaginary time of its motion."""
-    w = m["w"]
-    turn = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-    return m | {"p": m["p"] + 1j * e * m["v"], "R": (np.eye(3) + 1j * e * turn) @ m["R"]}
 
 
 def rate(out: tuple, F: dict, M: dict, w: str = "w", v: str = "v") -> float:
@@ -127,7 +98,7 @@ def rate(out: tuple, F: dict, M: dict, w: str = "w", v: str = "v") -> float:
 def elsewhere(case, F: dict, M: dict) -> tuple[dict, dict, tuple]:
     """Both frames after the world has been turned and put 10 km away; the row's parameters there."""
     Q, d = Rotation.random(random_state=3).as_matrix(), np.array([1e4, -2e3, 5e2])
-    new = [m | {"p": Q @ m["p"] + d, "R": Q @ m["R"]} | {k: Q @ m[k] for k in ("w", "v", "alpha", "a")} for m in (F, M)]
+    new = [turned(m, Q, d) for m in (F, M)]
     par = PARAMETERS[case[0]][case[1]]
     if case[0] in WORLD:
         par = (*(Q @ par[:3]).tolist(), *par[3:])

@@ -9,7 +9,7 @@ from flyball import forces
 from flyball.constraints.registry import KINDS, RARE, Kind, ordered
 from flyball.equations import dispatch
 from flyball.model.force import CoordinateForce
-from tests.contract.frames import random_motion, record
+from flyball.testing.frames import random_motion, record
 from tests.contract.test_forces import LAWS, full
 
 UNKNOWN = 1000

@@ -9,7 +9,7 @@ from flyball import forces
 from flyball.constraints.modes import FROZEN, STATIC
 from flyball.math.rotation import log_gradient, rotation_vector
 from flyball.model.force import CoordinateForce
-from tests.contract.frames import moved, random_motion, record, stepped
+from flyball.testing.frames import moved, power, random_motion, record, stepped, turned
 
 BETWEEN = [k for k in forces.ALL if not issubclass(k, CoordinateForce)]
 ALONG = [k for k in (*forces.ALL, *forces.LIMITS) if issubclass(k, CoordinateForce) and hasattr(k, "effort")]
@@ -61,13 +61,6 @@ def undamped(kind):
 def wrench(kind, par, F, M, laws=NO_LAWS, dtype=float):
     f, m = record(F, dtype), record(M, dtype)
     return kind.wrench(par, f, m, laws, kind.inputs(par, f, m))
-
-
-def power(out, F, M):
-    """Of a wrench on M and of its reverse on F's body at the same point."""
-    f, t = (np.array(x) for x in out)
-    d = M["p"] - F["p"]
-    return f @ (M["v"] - F["v"] - np.cross(F["w"], d)) + t @ (M["w"] - F["w"])
 
 
 def test_every_kind_has_its_cases():
@@ -134,9 +127,7 @@ def test_nothing_depends_on_the_world(kind, seed):
     """The world turned and put 10 km away: the wrench turned with it, but for a force given in the world's axes."""
     F, M = random_motion(seed)
     Q, d = Rotation.random(random_state=3).as_matrix(), np.array([1e4, -2e3, 5e2])
-    f, m = (
-        x | {"p": Q @ x["p"] + d, "R": Q @ x["R"]} | {k: Q @ x[k] for k in ("w", "v", "alpha", "a")} for x in (F, M)
-    )
+    f, m = (turned(x, Q, d) for x in (F, M))
     for here, there in zip(wrench(kind, full(kind), F, M, LAWS), wrench(kind, full(kind), f, m, LAWS), strict=True):
         assert np.array(there) == pytest.approx(Q @ np.array(here), rel=1e-9, abs=1e-9)
 

@@ -7,7 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from flyball.constraints import angle, blade, rolling, spin
 from flyball.constraints.registry import KINDS
-from tests.contract.frames import AXES, DATA, PARAMETERS, evaluated, frames, moved, random_motion, rate, record
+from flyball.testing.frames import moved, random_motion, record
+from tests.contract.frames import AXES, DATA, PARAMETERS, evaluated, frames, rate
 
 H = 1e-5
 

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from flyball.constraints import alignment, skew
 from flyball.constraints import angle as angle_row
 from flyball.constraints.registry import KINDS
+from flyball.testing.frames import moved, random_motion, record, stepped
 from tests.contract.frames import (
     ASSEMBLY,
     CASES,
@@ -18,11 +19,7 @@ from tests.contract.frames import (
     frames,
     has_value,
     label,
-    moved,
-    random_motion,
     rate,
-    record,
-    stepped,
 )
 
 PLACES = ("flyball.constraints.corner", "flyball.constraints.touch")

@@ -3,6 +3,10 @@
 The first compiles all of it, the second finds it. After an edit of a formula nothing of that is served.
 """
 
+import json
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -169,3 +173,55 @@ def test_the_engine_of_edited_sources_is_not_in_the_cache(runs):
     assert copy.run(ask)["cold"]
     copy.edit("equations/loads.py", "sub(neg(gravity), load3", "sub(gravity, load3")
     assert not copy.run(ask)["cold"]
+
+
+OWN = """
+import json, sys
+import flyball as fb
+from flyball.elements import BodyForce, Damping, Joint, blocks, element
+from flyball.math.vec import scale
+from flyball.compiler.notice import TIMES
+
+SHARE = 1.0
+
+@element
+class Wind(BodyForce):
+    coefficient: Damping = 0.0
+
+    @staticmethod
+    def wrench(par, F, M, laws, values):
+        o = 0.0 * par[0]
+        return scale(-SHARE * par[0], M[3]), (o, o, o)
+
+    def parameters(self, n, separation):
+        return (n.coefficient,)
+
+@element
+class Plate(Joint):
+    blocks = (blocks.SLIDE,)
+    needs_axis = True
+    planar_normal = ""
+
+m = fb.Mechanism("thrown", gravity=(0, 0, -10))
+m.add(fb.Body("puck", mass=1, inertia=(1, 1, 1), velocity=(1, 0, 0)), Wind("wind", "puck", coefficient=1))
+m.add(Plate("plate", "ground", "puck", at=(0, 0, 0), axis=(0, 0, 1)))
+r = m.simulate(1.0, outputs=2, specialize=False)
+print(json.dumps({"v": r["puck.vx"][-1], "compiled": sorted(TIMES), "numba": "numba" in sys.modules}))
+"""
+
+
+def test_an_edited_file_of_a_users_own_compiles_its_formula_alone(tmp_path):
+    """Nothing where nothing was edited; the formula where a number that it takes from outside was. A joint needs none."""
+    script = tmp_path / "wind.py"
+
+    def run(share):
+        script.write_text(OWN.replace("SHARE = 1.0", f"SHARE = {share}"))
+        out = subprocess.run([sys.executable, "-W", "ignore", script], capture_output=True, text=True, check=True)
+        found = json.loads(out.stdout)
+        assert found["v"] == pytest.approx(np.exp(-share), rel=1e-5)
+        return found
+
+    run(1.0)
+    again = run(1.0)
+    assert (again["compiled"], again["numba"]) == ([], False)
+    assert run(0.1 + 0.2 * np.random.default_rng().random())["compiled"] == ["__main__.Wind.wrench"]

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from .layout import DATA, DIMENSION, HEAD, Array, Struct, struct
+from .by_address import make_ready
+from .layout import DATA, DIMENSION, HEAD, Array, CodeTables, Struct, struct
 
 EVEN = 64  # bytes at whose multiples arrays begin in a block
 _ORDER = 0x1 | 0x100  # flags of an array: C order, aligned
@@ -77,6 +78,8 @@ def _describe(fields: Any, layout: Struct, known: dict[int, StructBuffer], words
                 _describe(x, of, known, words)
         else:
             words += described(x, of, f"{layout.of.__name__}.{name}")
+            if isinstance(of, CodeTables) and x.any():
+                make_ready(x, layout.complex)
 
 
 def described(x: np.ndarray, of: Array, name: str) -> tuple[int, ...]:

@@ -61,7 +61,8 @@ def _linked(kernel: Any) -> bytes:
     finally:
         if collecting:
             gc.enable()
-    module = llvm().parse_assembly(_entry(context, description))
+    entry = _entry(context, description) if kernel.form is None else _formula_entry(context, description, kernel)
+    module = llvm().parse_assembly(entry)
     for text in library.modules():
         part = llvm().parse_assembly(text)
         for function in part.functions:
@@ -77,8 +78,10 @@ def _linked(kernel: Any) -> bytes:
 def _types(kernel: Any) -> tuple[Any, ...]:
     from numba import types
 
-    from .references import reference
+    from .references import numbers, reference
 
+    if kernel.form is not None:
+        return tuple(numbers(x, kernel.first_order) for x in kernel.parameters)
     return tuple(
         reference(x) if isinstance(x, Struct | Array) else types.int64 if x is int else types.float64
         for x in kernel.parameters
@@ -106,6 +109,42 @@ def _entry(context: Any, description: Any) -> str:
         found = context.cast(builder, found, description.restype, types.int64)
     failed = returns(float("nan") if returns == ir.DoubleType() else FAILED)
     builder.ret(builder.select(status.is_error, failed, found))
+    return str(module)
+
+
+def _formula_entry(context: Any, description: Any, code: Any) -> str:
+    """A function that calls a formula on numbers in memory: see `references`; nan where that ended in an error.
+
+    Raises
+    ------
+    TypeError
+        If its result is not nested as that of its form.
+    """
+    from llvmlite import ir
+
+    from .references import leaves, loaded, nested, numbers, shape_of, stored
+
+    if (found := shape_of(description.restype)) != code.form.result:
+        raise TypeError(f"its result is {found or description.restype}, and must be {code.form.result}")
+    module = context.create_module("entry")
+    of = context.call_conv.get_function_type(description.restype, description.argtypes)
+    callee = ir.Function(module, of, description.llvm_func_name)
+    number = numbers(0, code.first_order)
+    address = context.get_data_type(number).as_pointer()
+    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [address, address]), ENTRY)
+    builder = ir.IRBuilder(entry.append_basic_block("entry"))
+    given = [x for t in description.argtypes for x in leaves(builder, t, ir.Constant(context.get_value_type(t), None))]
+    taken = loaded(builder, number, entry.args[0], len(given))
+    args = [nested(context, builder, t, taken) for t in description.argtypes]
+    status, found = context.call_conv.call_function(builder, callee, description.restype, description.argtypes, args)
+    results = list(leaves(builder, description.restype, found))
+    nan = context.get_constant(number, float("nan"))
+    with builder.if_else(status.is_error) as (failed, well):
+        with failed:
+            stored(context, builder, number, ((number, nan) for _ in results), entry.args[1])
+        with well:
+            stored(context, builder, number, iter(results), entry.args[1])
+    builder.ret_void()
     return str(module)
 
 

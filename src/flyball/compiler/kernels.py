@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from functools import cached_property, update_wrapper
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from .buffers import StructBuffer, described
-from .formulas import KERNELS, LOCK
+from .by_address import CompiledCode
+from .formulas import KERNELS
 from .layout import Array, Struct, parameters
+from .sources import source_hash
 
 
 def kernel(function: Callable[..., Any]) -> Kernel:
@@ -28,7 +30,7 @@ def first_order_kernel(function: Callable[..., Any]) -> Kernel:
     return Kernel(function, first_order=True)
 
 
-class Kernel:
+class Kernel(CompiledCode):
     """A compiled entry point, found in the store or compiled when it is first needed.
 
     Attributes
@@ -38,9 +40,7 @@ class Kernel:
     """
 
     def __init__(self, function: Callable[..., Any], first_order: bool = False) -> None:
-        self.function, self.first_order = function, first_order
-        self._loaded: Any = None
-        update_wrapper(self, function)
+        super().__init__(function, first_order)
         KERNELS.append(self)
 
     @cached_property
@@ -58,30 +58,9 @@ class Kernel:
         return self._signature[1]
 
     @property
-    def name(self) -> str:
-        """By which it is known: module and function."""
-        return f"{self.function.__module__}.{self.function.__qualname__}"
-
-    @property
-    def used(self) -> bool:
-        """Whether this process has its code."""
-        return self._loaded is not None
-
-    @property
-    def origin(self) -> str:
-        """Where its code is from: "shipped", "cache", "compiled"; empty if this process has not needed it."""
-        return self._loaded.origin if self._loaded is not None else ""
-
-    @property
-    def address(self) -> int:
-        """Where its code is."""
-        if self._loaded is None:
-            with LOCK:
-                if self._loaded is None:
-                    from .store import code_of
-
-                    self._loaded = code_of(self)
-        return int(self._loaded.address)
+    def content(self) -> str:
+        """Hash of all sources that it is made of."""
+        return source_hash(self.function)
 
     @cached_property
     def call(self) -> Any:

@@ -25,10 +25,11 @@ Int2 = Annotated[np.ndarray, "Int2"]
 Short2 = Annotated[np.ndarray, "Short2"]
 Number1 = Annotated[np.ndarray, "Number1"]  # of floats; of complex numbers where a structure is annotated as COMPLEX
 Number2 = Annotated[np.ndarray, "Number2"]
+CodeTables1 = Annotated[np.ndarray, "CodeTables1"]  # addresses of code tables, 0 for none (`by_address`)
 COMPLEX = "complex"
 """``ComplexSystem = Annotated[System, COMPLEX]``: the structure whose numbers are complex."""
 
-_TYPES = {"Float": "f8", "Complex": "c16", "Int": "i8", "Short": "i4"}
+_TYPES = {"Float": "f8", "Complex": "c16", "Int": "i8", "Short": "i4", "CodeTables": "i8"}
 HEAD, DATA, DIMENSION = 40, 32, 16
 """Bytes of an array's description without its shape, those before the address of its numbers, those of a dimension."""
 
@@ -46,6 +47,10 @@ class Array(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.dtype}x{self.ndim}"
+
+
+class CodeTables(Array):
+    """The same of addresses of code tables, which are made ready before a kernel is given the array."""
 
 
 class Struct(NamedTuple):
@@ -128,7 +133,7 @@ def _of(text: Any, scope: dict[str, Any], is_complex: bool) -> Any:
     if kind == "Number":
         kind = "Complex" if is_complex else "Float"
     if kind in _TYPES and ndim.isdigit():
-        return Array(_TYPES[kind], int(ndim))
+        return (CodeTables if kind == "CodeTables" else Array)(_TYPES[kind], int(ndim))
     made = scope[text]
     if hasattr(made, "__metadata__"):  # Annotated[System, COMPLEX]
         return struct(made.__origin__, COMPLEX in made.__metadata__)

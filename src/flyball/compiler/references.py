@@ -10,9 +10,10 @@ part once and keep it (`invariant.load`). Views and whole arrays are Numba's own
 from __future__ import annotations
 
 import operator
+from collections.abc import Iterator
 from typing import Any
 
-from .formulas import KERNELS, by_address, call, call_bound
+from .formulas import FIRST_ADDRESS, KERNELS, by_address, call, call_bound, formula_at, has_formula
 from .layout import DATA, HEAD, Array, Struct, struct
 
 _MADE: dict[str, Any] = {}
@@ -306,6 +307,121 @@ def _calls(types: Any) -> None:
         return lambda words, task: leap(words[0], words[1], words[2], words[3], words[4], words[5], types.int64(task))
 
 
+def numbers(shape: Any, is_complex: bool) -> Any:
+    """Numba's type of nested tuples of numbers: lengths, nested as the tuples are; 0 is a number."""
+    from numba.core import types
+
+    if isinstance(shape, tuple):
+        return types.BaseTuple.from_types([numbers(x, is_complex) for x in shape])
+    number = types.complex128 if is_complex else types.float64
+    return types.UniTuple(number, shape) if shape else number
+
+
+def shape_of(typ: Any) -> Any:
+    """The lengths of nested tuples of numbers, as in `numbers`; None if there is anything else in them."""
+    from numba.core import types
+
+    if isinstance(typ, types.Number | types.Boolean):
+        return 0
+    if not isinstance(typ, types.BaseTuple):
+        return None
+    inner = [shape_of(x) for x in typ]
+    return len(inner) if not any(x != 0 for x in inner) else None if None in inner else tuple(inner)
+
+
+def leaves(builder: Any, typ: Any, value: Any) -> Iterator[tuple[Any, Any]]:
+    """Types and values of the numbers in nested tuples."""
+    from numba.core import types
+
+    if isinstance(typ, types.BaseTuple):
+        for k, x in enumerate(typ):
+            yield from leaves(builder, x, builder.extract_value(value, k))
+    else:
+        yield typ, value
+
+
+def nested(context: Any, builder: Any, typ: Any, given: Iterator[tuple[Any, Any]]) -> Any:
+    """A value of nested tuples, of types and values of numbers."""
+    from numba.core import types
+
+    if isinstance(typ, types.BaseTuple):
+        return context.make_tuple(builder, typ, [nested(context, builder, x, given) for x in typ])
+    of, value = next(given)
+    return context.cast(builder, value, of, typ)
+
+
+def loaded(builder: Any, number: Any, start: Any, count: int) -> Iterator[tuple[Any, Any]]:
+    """Types and values of numbers that stand one after the other in memory."""
+    from llvmlite import ir
+
+    for k in range(count):
+        yield number, builder.load(builder.gep(start, [ir.IntType(64)(k)]))
+
+
+def stored(context: Any, builder: Any, number: Any, given: Iterator[tuple[Any, Any]], start: Any) -> None:
+    """Put numbers into memory one after the other, as numbers of one type."""
+    from llvmlite import ir
+
+    for k, (of, value) in enumerate(given):
+        builder.store(context.cast(builder, value, of, number), builder.gep(start, [ir.IntType(64)(k)]))
+
+
+def _tables_of_code(types: Any) -> None:
+    """Calls of formulas by the address of a code table: two words a formula, its code for floats and complex numbers.
+
+    The code takes two addresses: where the numbers of the arguments stand one after the other, and where those of the
+    result are to be put.
+    """
+    from llvmlite import ir
+    from numba.core import cgutils
+    from numba.extending import intrinsic
+
+    from .target import overload
+
+    @intrinsic
+    def word(typing, address):  # type: ignore[no-untyped-def]
+        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+            return builder.load(builder.inttoptr(args[0], ir.IntType(64).as_pointer()))
+
+        return types.int64(types.int64), generate
+
+    @intrinsic
+    def run(typing, code, arguments, like):  # type: ignore[no-untyped-def]
+        first = like
+        while isinstance(first, types.BaseTuple):
+            first = first[0]
+        number = types.complex128 if isinstance(first, types.Complex) else types.float64
+
+        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+            given = list(leaves(builder, arguments, args[1]))
+            count = len(list(leaves(builder, like, args[2])))
+            of = context.get_data_type(number)
+            begin, end = (cgutils.alloca_once(builder, of, ir.IntType(64)(n)) for n in (len(given), count))
+            stored(context, builder, number, iter(given), begin)
+            function = ir.FunctionType(ir.VoidType(), [of.as_pointer()] * 2)
+            builder.call(builder.inttoptr(args[0], function.as_pointer()), [begin, end])
+            return nested(context, builder, like, loaded(builder, number, end, count))
+
+        return like(types.int64, arguments, like), generate
+
+    @overload(formula_at)
+    def choose(table, k, arguments, like):  # type: ignore[no-untyped-def]
+        first = like
+        while isinstance(first, types.BaseTuple):
+            first = first[0]
+        if isinstance(first, types.Complex):
+            return lambda table, k, arguments, like: (
+                run(word(table + 16 * k + 8), arguments, like) if table >= FIRST_ADDRESS else like
+            )
+        return lambda table, k, arguments, like: (
+            run(word(table + 16 * k), arguments, like) if table >= FIRST_ADDRESS else like
+        )
+
+    @overload(has_formula)
+    def look(table, k):  # type: ignore[no-untyped-def]
+        return lambda table, k: word(table + 16 * k) != 0 if table >= FIRST_ADDRESS else False
+
+
 def register() -> None:
     """Tell Numba of these types, and of calls."""
     from numba.core import types
@@ -313,3 +429,4 @@ def register() -> None:
     _structures(types)
     _arrays(types)
     _calls(types)
+    _tables_of_code(types)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import sys
 import tempfile
 from functools import lru_cache
@@ -18,7 +19,7 @@ from typing import Any, NamedTuple
 from ..errors import PerformanceNotice, warn
 from .machine import LoadedCode, baseline, triple
 from .notice import announce, note_compiled
-from .sources import PACKAGE, source_hash
+from .sources import PACKAGE
 
 MARK = b"flyball object code 1\n"
 SHIPPED = PACKAGE / "objects"
@@ -94,13 +95,14 @@ def cache_folder() -> Path | None:
 
 def file_name(kernel: Any, cpu: str) -> str:
     """Name of the file of a kernel's code."""
-    return f"{kernel.function.__qualname__}-{content_key(kernel, cpu)}.o"
+    name = re.sub(r"\W+", "_", kernel.function.__qualname__)
+    return f"{name}-{content_key(kernel, cpu)}.o"
 
 
 def content_key(kernel: Any, cpu: str) -> str:
     """A hash of all that a kernel's code depends on."""
     layouts = ", ".join(str(x) for x in kernel.parameters)
-    text = f"{kernel.name} {kernel.first_order} ({layouts}) {triple()} {cpu} {source_hash(kernel.function)}"
+    text = f"{kernel.name} {kernel.first_order} ({layouts}) {triple()} {cpu} {kernel.content}"
     return hashlib.sha256(text.encode()).hexdigest()[:24]
 
 

@@ -1,14 +1,16 @@
 """Loops over elements of every kind. The lists of kinds are written from the registries, so no kind is named here.
 
-An unknown kind gives nan, which a run tells of; it is never answered by another element's formula.
+An unknown kind gives nan, which a run tells of; it is never answered by another element's formula. The formulas of a
+user's own class are no part of these lists: they are called by address (`compiler/by_address.py`).
 """
 
 from __future__ import annotations
 
+from ..compiler.formulas import formula, has_formula
 from ..compiler.sources import generated, ladder
 from ..constraints.registry import KINDS, RARE
-from ..forces import BRANCHES, EFFORTS, INPUTS, WRENCHES
-from ..tables.system import TERM_KINDS
+from ..forces import BRANCHES, EFFORTS, FORMS, INPUTS, WRENCHES
+from ..tables.system import FORCE_KIND, TERM_KINDS
 from . import rows, turns
 
 NAN = "nan + 0.0 * par[0]"
@@ -24,26 +26,35 @@ rare = ladder(
 )
 """The formula of a kind that has no loop of its own."""
 
-inputs = ladder(__name__, "inputs", "par, F, M", INPUTS, f"({NAN}, {NAN})")
+INPUT, WRENCH, EFFORT, BRANCH = range(len(FORMS))
+
+inputs = ladder(__name__, "inputs", FORMS[INPUT].arguments, INPUTS, f"({NAN}, {NAN})", INPUT)
 """What the laws of a force between frames may depend on."""
 
-wrench = ladder(__name__, "wrench", "par, F, M, laws, values", WRENCHES, f"({NONE}, {NONE})")
+wrench = ladder(__name__, "wrench", FORMS[WRENCH].arguments, WRENCHES, f"({NONE}, {NONE})", WRENCH)
 """Wrench of a force between frames on M."""
 
-branch = ladder(__name__, "branch", "par, F, M", BRANCHES, f"({NAN}, {NAN}, {NAN}, {NAN}, {NAN})")
+branch = ladder(__name__, "branch", FORMS[BRANCH].arguments, BRANCHES, f"({NAN}, {NAN}, {NAN}, {NAN}, {NAN})", BRANCH)
 """On which branch of its formula a force between frames is, for kinds whose formula breaks; see `forces.BRANCHES`."""
 
 breaks = generated(
     __name__,
     "breaks",
     "kind",
-    [*(f"if kind == {k}:\n        return True" for k in sorted(BRANCHES)), "return False"],
-    {},
+    [*(f"if kind == {k}:\n        return True" for k in sorted(BRANCHES)), f"return has_formula(kind, {BRANCH})"],
+    {"has_formula": has_formula},
 )
 """Whether the formula of a kind of force breaks somewhere."""
 
-effort = ladder(__name__, "effort", "par, x, rate, laws, load", EFFORTS, NAN)
+effort = ladder(__name__, "effort", FORMS[EFFORT].arguments, EFFORTS, NAN, EFFORT)
 """Force along a measured quantity."""
+
+
+@formula
+def kind_of(S, k):
+    """What the formulas above know force k by: the number of its kind, or the address of its class's code table."""
+    return S.own[k] if S.own[k] != 0 else S.force_i[k, FORCE_KIND]
+
 
 _LOOPS = {name: getattr(rows, name) for name in ("begin", "end", "begin_biases", "end_biases")}
 _ROWS = {"rare": rare} | {f"row_{k.number}": k.row for k in OFTEN}

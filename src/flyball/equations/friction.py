@@ -18,7 +18,6 @@ from ..tables.system import (
     F_APPLIED,
     FORCE_ALONG,
     FORCE_F,
-    FORCE_KIND,
     FORCE_LOAD,
     FORCE_M,
     FORCE_SWITCH,
@@ -38,7 +37,7 @@ from ..tables.system import (
     TOLD,
     VALUE,
 )
-from .dispatch import effort
+from .dispatch import effort, kind_of
 from .loads import law, wide
 from .records import load
 from .rows import measured, on_second
@@ -97,7 +96,7 @@ def dry(S, W, k, t, rate, arm, load):
 @formula
 def dry_part(S, W, k, x, arm, load, way):
     """What the arm adds to the effort of force k for the inputs x = (t, value, rate) of its law."""
-    par, kind = wide(S.force_x, k), S.force_i[k, FORCE_KIND]
+    par, kind = wide(S.force_x, k), kind_of(S, k)
     laws = (law(S, W, k, 0, x), 0.0, way)
     whole = effort(kind, (arm, *par[1:]), x[1], x[2], laws, load)
     return abs(whole - effort(kind, (0.0, *par[1:]), x[1], x[2], laws, load))

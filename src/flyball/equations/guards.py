@@ -24,7 +24,6 @@ from ..laws.opcodes import BY_TIME, SENSOR
 from ..math.scalar import magnitude
 from ..tables.system import (
     FORCE_F,
-    FORCE_KIND,
     FORCE_LOAD,
     G_BACK,
     G_CONE,
@@ -61,7 +60,7 @@ from ..tables.system import (
     VALUE,
 )
 from .control import column_of
-from .dispatch import effort
+from .dispatch import effort, kind_of
 from .friction import loads_end
 from .loads import law, wide
 from .pace import pace, quickest
@@ -271,7 +270,7 @@ def most(S, W, t, k):
     x = W.sensed[VALUE, S.force_i[k, FORCE_F]]
     load = W.sensed[RETURNED, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
     laws = (law(S, W, k, 0, (t, x, 0.0)), 0.0, STATIC)
-    return magnitude(effort(S.force_i[k, FORCE_KIND], wide(S.force_x, k), x, 0.0, laws, load))
+    return magnitude(effort(kind_of(S, k), wide(S.force_x, k), x, 0.0, laws, load))
 
 
 @formula

@@ -25,7 +25,6 @@ from ..tables.system import (
     COORDINATES,
     EFFORT,
     FORCE_F,
-    FORCE_KIND,
     FORCE_LOAD,
     LAM,
     RATE,
@@ -37,7 +36,7 @@ from ..tables.system import (
     System,
     Work,
 )
-from .dispatch import effort
+from .dispatch import effort, kind_of
 from .friction import reaction_loads
 from .loads import law, wide
 from .tasks import MOTION, SOLVE, Sheet
@@ -154,7 +153,7 @@ def held_by(S, W, t, B, i, load):
     k = S.switch_i[B.which[i], SWITCH_FORCE]
     x = W.sensed[VALUE, S.force_i[k, FORCE_F]]
     first = law(S, W, k, 0, (t, x, B.rate[i]))
-    kind, par = S.force_i[k, FORCE_KIND], wide(S.force_x, k)
+    kind, par = kind_of(S, k), wide(S.force_x, k)
     if B.asks[IMPULSES] == OF_A_STEP:
         load = load / B.step[0]
     elif B.asks[IMPULSES] != 0:

@@ -16,7 +16,6 @@ from ..tables.system import (
     BETWEEN,
     FORCE_ALONG,
     FORCE_F,
-    FORCE_KIND,
     FORCE_LAW,
     FORCE_LOAD,
     FORCE_M,
@@ -32,7 +31,7 @@ from ..tables.system import (
     V0,
     VALUE,
 )
-from .dispatch import effort, inputs, wrench
+from .dispatch import effort, inputs, kind_of, wrench
 from .pace import own_speed
 from .records import load
 from .rows import way_of
@@ -109,7 +108,7 @@ def wide(T, k):
 @formula
 def acting(S, W, t, k):
     """Records of frames F and M of force k between frames, and its wrench on M about M's origin."""
-    kind = S.force_i[k, FORCE_KIND]
+    kind = kind_of(S, k)
     F = load(W.FK, S.force_i[k, FORCE_F])
     M = load(W.FK, S.force_i[k, FORCE_M])
     par = wide(S.force_x, k)
@@ -170,7 +169,7 @@ def effort_of(S, W, t, k):
     o = 0.0 * x
     pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else o
     laws = (law(S, W, k, 0, (t + o, x, rate)), o, way(S, W, k, rate))
-    return effort(S.force_i[k, FORCE_KIND], wide(S.force_x, k), x, rate, laws, pressed), rate
+    return effort(kind_of(S, k), wide(S.force_x, k), x, rate, laws, pressed), rate
 
 
 @formula

@@ -14,7 +14,6 @@ from collections.abc import Collection
 import numpy as np
 
 from ..compiler.formulas import formula
-from ..forces import BRANCHES
 from ..laws.evaluation import evaluate, evaluate_jet
 from ..laws.manner import brief
 from ..math.scalar import cos
@@ -25,7 +24,6 @@ from ..tables.system import (
     BODY_LAW,
     FORCE_ALONG,
     FORCE_F,
-    FORCE_KIND,
     FORCE_LAW,
     FORCE_LOAD,
     FORCE_M,
@@ -36,7 +34,7 @@ from ..tables.system import (
     SLIDING,
     VALUE,
 )
-from .dispatch import branch, breaks, inputs
+from .dispatch import branch, breaks, inputs, kind_of
 from .loads import wide
 from .made import run
 from .records import load
@@ -68,7 +66,7 @@ def noted(S) -> int:
 
 def breaking(S) -> bool:
     """Whether the formula of some force breaks somewhere."""
-    return any(kind in BRANCHES for kind in S.force_i[:, FORCE_KIND].tolist())
+    return any(breaks(kind_of(S, k)) for k in range(len(S.force_i)))
 
 
 def kept(S, sampled: Collection[int] | None = None) -> np.ndarray:
@@ -149,9 +147,9 @@ def take_note(S, W, seen, row):
         else:
             F = load(W.FK, S.force_i[f, FORCE_F])
             M = load(W.FK, S.force_i[f, FORCE_M])
-            a, b = inputs(S.force_i[f, FORCE_KIND], wide(S.force_x, f), F, M)
-            if S.force_i[f, FORCE_ALONG] == BETWEEN and breaks(S.force_i[f, FORCE_KIND]):
-                side = branch(S.force_i[f, FORCE_KIND], wide(S.force_x, f), F, M)
+            a, b = inputs(kind_of(S, f), wide(S.force_x, f), F, M)
+            if S.force_i[f, FORCE_ALONG] == BETWEEN and breaks(kind_of(S, f)):
+                side = branch(kind_of(S, f), wide(S.force_x, f), F, M)
                 for i in range(PARTS):
                     seen[row, nm + S.force_i.shape[0] + PARTS * f + i] = side[i]
         seen[row, nm + f] = a
@@ -163,7 +161,7 @@ def parted(S, seen, h):
     """Whether some force is on another branch of its formula at the end of the step than at its begin, or may be."""
     nf = S.force_i.shape[0]
     for f in range(nf):
-        if S.force_i[f, FORCE_ALONG] == BETWEEN and breaks(S.force_i[f, FORCE_KIND]):
+        if S.force_i[f, FORCE_ALONG] == BETWEEN and breaks(kind_of(S, f)):
             at = measured(S) + nf + PARTS * f
             s = 0.0
             for i in range(PARTS - 1):

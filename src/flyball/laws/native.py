@@ -18,6 +18,7 @@ from weakref import WeakKeyDictionary, WeakValueDictionary, ref
 
 import numpy as np
 
+from ..compiler.by_address import short_reason
 from ..compiler.formulas import LOCK
 from ..errors import PerformanceNotice, warn
 from ..model.function import MOST, Call, function_name
@@ -50,7 +51,7 @@ class Native:
             try:
                 self._code = self.equal._code if self.equal else _compiled(python, count)
             except Exception as error:  # Numba gives up in many ways
-                self.reason = _short(error)
+                self.reason = short_reason(error)
         else:
             self.reason = f"it is no plain function but a {type(python).__name__}"
         if self.reason:
@@ -231,13 +232,6 @@ def _same(a: Any, b: Any) -> bool:
         return bool(a == b)
     except Exception:  # things that do not compare
         return False
-
-
-def _short(error: Exception) -> str:
-    """The line of an error of Numba that says what is wrong."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    lines = [line for line in lines if not line.startswith(("Failed in", "During:"))] or [type(error).__name__]
-    return lines[0][:200]
 
 
 def _tell(asked: Call, function: Any, reason: str) -> None:

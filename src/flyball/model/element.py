@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
+import sys
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
@@ -110,6 +111,11 @@ CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 def element(cls: T) -> T:
     """Make a class of frozen, validated fields; its own fields are keyword-only."""
+    if not _is_built_in(cls):  # its names may be gone when a first one is made: of a file that was run, of a function
+        frame = sys._getframe(1)
+        cls.__annotations__ = inspect.get_annotations(
+            cls, globals=frame.f_globals, locals={**frame.f_locals, **vars(cls)}, eval_str=True
+        )
     made: Any = dataclass(init=False, frozen=True, kw_only=True)(cls)
     made.__pydantic_config__ = CONFIG
     signature = _signature(made)
@@ -232,10 +238,18 @@ class Element:
 
     category: ClassVar[str] = "elements"
     registry: ClassVar[dict[str, type[Element]]] = {}
+    modules: ClassVar[dict[str, set[str]]] = {}  # name of a class -> modules that have defined one of that name
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
+        other = Element.registry.get(cls.__name__)
+        if other is not None and _is_built_in(other) != _is_built_in(cls):
+            raise ModelError(
+                f"the class {cls.__name__} of {cls.__module__} and that of {other.__module__} have one name, by which "
+                f"model files know an element; give the class of your own another name"
+            )
         Element.registry[cls.__name__] = cls
+        Element.modules.setdefault(cls.__name__, set()).add(cls.__module__)
 
     @property
     def title(self) -> str:
@@ -267,6 +281,10 @@ class Element:
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
         """Weights of the coordinates whose sum such a row acts along; 1 each if none are given."""
         return ()
+
+
+def _is_built_in(cls: type) -> bool:
+    return cls.__module__.partition(".")[0] == "flyball"
 
 
 _MARKED: dict[tuple[Any, Any], dict[str, Any]] = {}

@@ -69,6 +69,11 @@ class Force(Element):
         return False
 
 
+def no_inputs(par, F, M):  # type: ignore[no-untyped-def]
+    """Nothing that laws may depend on."""
+    return 0.0 * M[0][0], 0.0 * M[0][0]
+
+
 @dataclass(frozen=True)
 class TwoPointForce(Force):
     """A force along the line between two points."""
@@ -77,6 +82,7 @@ class TwoPointForce(Force):
     body_j: str
     _: KW_ONLY
     at: PointPair | None = None
+    inputs: ClassVar[Callable] = staticmethod(no_inputs)
 
     def ends(self) -> dict[str, str]:
         """F on ``body_i``, M on ``body_j``."""
@@ -102,6 +108,7 @@ class TwoFrameForce(Force):
     body_j: str
     _: KW_ONLY
     at: Point | None = None
+    inputs: ClassVar[Callable] = staticmethod(no_inputs)
 
     def ends(self) -> dict[str, str]:
         """F on ``body_i``, M on ``body_j``."""
@@ -113,6 +120,7 @@ class BodyForce(Force):
     """A force or torque on one body, from outside."""
 
     body: str
+    inputs: ClassVar[Callable] = staticmethod(no_inputs)
 
     def ends(self) -> dict[str, str]:
         """M on the body."""
@@ -124,6 +132,7 @@ class CoordinateForce(Force):
     """A force along a measured quantity: a joint's coordinate, or a sum of distances."""
 
     effort: ClassVar[Callable]
+    outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}  # value and rate first
     dimensions: ClassVar[dict[str, tuple[str, str]]] = {  # of fields, along a displacement and about an angle
         "stiffness": ("N/m", "N*m/rad"),
         "damping": ("N*s/m", "N*m*s/rad"),

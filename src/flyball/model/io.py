@@ -330,13 +330,20 @@ def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
         base, room = MANY_KINDS[category]
         importlib.import_module(f"..{room}", __package__)
         kinds = {k: c for k, c in Element.registry.items() if issubclass(c, base) and c.category == category}
-        known = sorted(k for k, c in kinds.items() if c.__module__.count(f".{room}."))
+        own = [k for k, c in kinds.items() if not c.__module__.startswith("flyball.")]
+        known = [*sorted(k for k, c in kinds.items() if c.__module__.count(f".{room}.")), *sorted(own)]
     name = fields.pop("type", None)
     if category == "forces" and name == Touch.__name__:  # of a motion with contact, in its result file
         return Touch
     if name not in known:
         problem = "it has no type" if name is None else f"unknown type {name!r}{suggest(str(name), known)}"
-        raise ModelError(f"{where}: {_elsewhere(name) or problem}; {category} are {', '.join(known)}")
+        hint = "" if name is None else ". A type of your own is known once the Python file that defines it is imported"
+        raise ModelError(f"{where}: {_elsewhere(name) or problem}; {category} are {', '.join(known)}{hint}")
+    if len(modules := Element.modules[name]) > 1:
+        raise ModelError(
+            f"{where}: type {name!r} is defined by several modules, {', '.join(sorted(modules))}; a file knows a type "
+            f"by its name: give the classes different names, or import one of the modules only"
+        )
     return Element.registry[name]
 
 

@@ -99,7 +99,7 @@ def _none(of: type, dimensions: str, **parts: Any) -> Any:
 
 def no_mechanism() -> Joined:
     """Tables of no mechanism, of the types of all others: what the loop of steps is compiled for."""
-    S = _none(System, "b2a2b2bbaabb2bbb2bbaa11bbba", ldl=_none(Pattern, "aaaaaaaa"))
+    S = _none(System, "b2a2b2bbaabb2abbb2bbaa11bbba", ldl=_none(Pattern, "aaaaaaaa"))
     W = _none(Work, "22222211122222112221a1")
     clock, R = _none(Clock, "1a122a2"), _none(Tableau, "21222a")
     sheet = Sheet(np.zeros((0, 0)))

@@ -6,7 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..compiler.by_address import CodeTable, code_table
 from ..constraints.blocks import DISTANCE, turning
+from ..errors import ModelError
+from ..forces import BRANCHES, EFFORTS, FORMS, INPUTS, WRENCHES
 from ..model.carried import carried
 from ..model.controller import Controller
 from ..model.element import LawOf, fields_with
@@ -16,7 +19,7 @@ from ..model.force import CoordinateForce, Force
 from ..model.sensor import Sensor
 from ..model.touch import Touch
 from .specs import Structure, frame
-from .system import SLIDING
+from .system import FORCE_LAW, FORCE_WORK, OWN, SLIDING
 from .terms import coordinate_frames, coordinate_term, measured_term
 
 
@@ -97,10 +100,12 @@ def _sensed(s: Structure, e: Sensor | Event | Controller, kind: str, text: str) 
 
 def forces(s: Structure) -> None:
     """Force table, sorted by kind."""
-    s.forces = sorted((f for f in s.model.acting() if _acts(s, f)), key=lambda f: f.kind)
+    acting = [(f, formulas_of(type(f))) for f in s.model.acting() if _acts(s, f)]
+    acting.sort(key=lambda x: OWN if x[1] is not None else x[0].kind)
+    s.forces, s.own = [f for f, _ in acting], [x for _, x in acting]
     table = np.full((len(s.forces), 10), -1, np.int64)
     for k, e in enumerate(s.forces):
-        table[k, 7:9] = e.kind, isinstance(e, CoordinateForce)
+        table[k, 7:9] = e.kind if s.own[k] is None else OWN, isinstance(e, CoordinateForce)
         if isinstance(e, CoordinateForce):
             table[k, 0] = _along(s, e)
             if hasattr(e, "load"):
@@ -120,6 +125,48 @@ def forces(s: Structure) -> None:
     s.tables["force_i"] = table
 
 
+def formulas_of(cls: type[Force]) -> CodeTable | None:
+    """The formulas of a class that is not flyball's own, by address; None where it has those of a built-in element.
+
+    Raises
+    ------
+    ModelError
+        If the class lacks a formula.
+    """
+    known = zip(FORMS, (INPUTS, WRENCHES, EFFORTS, BRANCHES), strict=True)
+    kind = getattr(cls, "kind", -1)
+    own = kind < 0 or any(getattr(cls, form.name, None) is not of.get(kind) for form, of in known)
+    if cls.__module__.startswith("flyball.") or not own:
+        return None
+    needed = FORMS[2:3] if issubclass(cls, CoordinateForce) else FORMS[:2]
+    for form in needed:
+        if not hasattr(cls, form.name):
+            raise ModelError(f"{cls.__name__} has no formula {form}; define it as a static method")
+    _refuse_names(cls)
+    return code_table(cls, FORMS)
+
+
+def _refuse_names(cls: type[Force]) -> None:
+    """Refuse fields that have the names of what forces declare."""
+    for c in cls.__mro__:
+        if c.__module__.partition(".")[0] == "flyball":
+            continue
+        taken = {
+            name for name in vars(c).get("__annotations__", ()) if name in getattr(cls, "__dataclass_fields__", ())
+        }
+        taken &= {*dir(CoordinateForce), "load"} - set(CoordinateForce.__dataclass_fields__)
+        if taken or "load" in vars(c):
+            raise ModelError(
+                f"{c.__name__}: {', '.join(sorted(taken or {'load'}))} has a meaning for every force; give the field "
+                f"another name"
+            )
+
+
+def addresses(s: Structure) -> np.ndarray:
+    """Addresses of the code tables of forces: `System.own`."""
+    return np.array([0 if x is None else x.address for x in s.own], np.int64)
+
+
 def _acts(s: Structure, e: Force) -> bool:
     """Whether there is a force: of a place of contact if it has modes here, and friction."""
     return not isinstance(e, Touch) or (bool(s.switches) and e.acts())
@@ -132,6 +179,8 @@ def _axis_frame(s: Structure, e: CoordinateForce) -> int:
 
 
 def _compile_laws(s: Structure, e: Force, row: np.ndarray) -> None:
+    if len(e.laws()) > FORCE_WORK - FORCE_LAW:
+        raise ModelError(f"{e.title}: laws() gives {len(e.laws())} laws; a force has up to {FORCE_WORK - FORCE_LAW}")
     for name, of in fields_with(e.__class__, LawOf).items():
         for slot, law in enumerate(e.laws()):
             if law is not None:

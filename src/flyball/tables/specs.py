@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..compiler.by_address import CodeTable
 from ..constraints.blocks import Row
 from ..laws.functions import Missed, missed
 from ..laws.program import compile_law
@@ -86,6 +87,7 @@ class Structure:
     slots: dict[str, int] = field(default_factory=dict)  # sensor -> slot that laws read (rates come after all values)
     angles: list[tuple[int, int, int]] = field(default_factory=list)  # frame F, frame M, state
     forces: list[Force] = field(default_factory=list)
+    own: list[CodeTable | None] = field(default_factory=list)  # formulas of each force that are not flyball's
     switches: list[Any] = field(default_factory=list)  # rows with modes (`switches.SwitchSpec`)
     branches: Any = None  # what finds the sides of laws' corners (`branches.Branches`); None: laws decide themselves
     guards: list[tuple[int, int, int]] = field(default_factory=list)  # what is watched: kind, of what, which way

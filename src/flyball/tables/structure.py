@@ -67,10 +67,15 @@ def structure(model: Model, choices: Choices = PLAIN) -> Structure:
     model = model.snapshot()
     key = choices, single(model)
     found = model.kept.get("structure", key, MOST, lambda: _decided(model, choices))
-    if any(f.native.stale for f in found.functions):
+    if outdated(found):
         model.kept.drop("structure", key)
         found = model.kept.get("structure", key, MOST, lambda: _decided(model, choices))
     return found
+
+
+def outdated(s: Structure) -> bool:
+    """Whether a Python function that it was made of is no longer what it was: a law, or a formula of a user's class."""
+    return any(f.native.stale for f in s.functions) or any(x is not None and x.stale for x in s.own)
 
 
 def _decided(model: Model, choices: Choices) -> Structure:

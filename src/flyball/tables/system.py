@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from ..compiler.layout import COMPLEX, Float1, Int1, Int2, Number1, Number2
+from ..compiler.layout import COMPLEX, CodeTables1, Float1, Int1, Int2, Number1, Number2
 from ..constraints.registry import KINDS
 from ..numerics.ldl import Pattern
 
@@ -33,6 +33,7 @@ MIX_ROW, MIX_SLOT, MIX_TO, MIX_FROM, MIX_COUNT = range(5)
 # columns of System.force_i; forces along a measured quantity have its slot in place of frame F
 BETWEEN, ALONG, SLIDING = range(3)  # families of forces: FORCE_ALONG
 FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD, FORCE_KIND, FORCE_ALONG, FORCE_SWITCH = 0, 1, 2, 5, 6, 7, 8, 9
+OWN = 1000  # the kind of forces that have a code table: no built-in element's number
 # columns of System.switch_i, and of switch_x; kinds of switches: see `model/switch.py`
 SWITCH_ROW, SWITCH_MEASURED, SWITCH_KIND, SWITCH_FORCE, SWITCH_LAW, SWITCH_OTHER = range(6)
 SWITCH_PARTNER = SWITCH_LAW  # of a slip: that along the other tangent, or -1
@@ -103,6 +104,7 @@ class System(NamedTuple):
     mix_i: Int2  # (nx, 5): drivers that follow sensors: row, slot, entries of G to and from, count
     force_i: Int2  # (nk, 10): F, M, three laws, state of its work, its load (or -1), kind, family, switch or -1
     force_x: Number2  # (nk, 16): parameters of the formula
+    own: CodeTables1  # (nk,): code table of a force whose class is not flyball's; 0 of others
     angle_i: Int2  # (na, 3): frame F, frame M, state that counts its turns
     load_i: Int2  # (nj, 2): terms that make up the reaction behind a load: load, term; see `reads` too
     switch_i: Int2  # (nw, 6): rows with modes: row, measured quantity, kind, force that slides, law, another

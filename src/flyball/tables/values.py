@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.registry import KINDS
+from ..errors import ModelError
 from ..math.lanes import has_lanes, over_lanes
 from ..math.scalar import real_parts, sqrt
 from ..model.body import GROUND
@@ -24,6 +25,7 @@ from ..model.kept import Kept, bits
 from . import switches
 from .afresh import Afresh
 from .coordinates import BodyState, free_velocities, positions
+from .forces import addresses
 from .hinges import tree_frames
 from .masses import mass_table
 from .numbers import Numbers, kind_of, numbers
@@ -71,6 +73,11 @@ class Values:
         """Values of the parameters that it was made with."""
         names = list(self.structure.model.parameters)
         return dict(zip(names, self.system.const[: len(names)].real.tolist(), strict=True))
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """In another process code has other addresses."""
+        vars(self).update(state)
+        self.system = self.system._replace(own=addresses(self.structure))
 
 
 def values(
@@ -127,7 +134,7 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     t = s.tables
     system = System(
         t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
-        t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], force_x, t["angle_i"], t["load_i"],
+        t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], force_x, addresses(s), t["angle_i"], t["load_i"],
         t["switch_i"], switch_x, t["guard_i"], t["control_i"],
          t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl, np.zeros(FLAT, np.int64),
     )  # fmt: skip
@@ -266,5 +273,7 @@ def _force_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarra
         if not new.asks(e):
             continue
         par = e.parameters(pose.numbers[e.name], pose.apart(e))
+        if len(par) > x.shape[1]:
+            raise ModelError(f"{e.title}: parameters() gives {len(par)} numbers; a force has up to {x.shape[1]}")
         x[k], x[k, : len(par)] = 0.0, par
     return x

@@ -18,6 +18,7 @@ from ...results.result import Result
 from ...tables.branches import bent_laws
 from ...tables.numbers import files
 from ...tables.specs import Structure
+from ...tables.structure import outdated
 from ...tables.switches import declared
 from ...tables.system import HOLD, MODE, Q0, SEMIDEFINITE, VALUE
 from ..assemble import assemble
@@ -106,6 +107,9 @@ def begin(
         return _worked_out(model, t, parameters, before, coordinates, switches, part)
     key = float(t).hex(), coordinates, switches
     known: Start | None = model.kept.known("begun", key)
+    if known is not None and outdated(known.base.compiled.structure):
+        model.kept.drop("begun", key)
+        known = None
     if known is None:
         found = _worked_out(model, t, None, None, coordinates, switches, part)
         if _lasting(found.base.compiled.structure):

@@ -1,0 +1,42 @@
+"""What elements of a user's own are made of: base classes, types of fields, and the mark of formulas.
+
+A force is a class with `element` above it that derives from one of the base classes. Its formula is a static method:
+``wrench(par, F, M, laws, values)`` of a `BodyForce`, `TwoPointForce` or `TwoFrameForce`, ``effort(par, x, rate, laws,
+load)`` of a `CoordinateForce` or `JointForce`. A joint derives from `Joint` and names its `blocks`; it needs no
+formula. `flyball.math.vec` and `flyball.math.scalar` hold the functions that formulas may use. ``flyball.testing``
+tests an element.
+"""
+
+from __future__ import annotations
+
+from .compiler.formulas import formula as formula
+from .constraints import blocks as blocks
+from .model.element import Angle as Angle
+from .model.element import Damping as Damping
+from .model.element import Direction as Direction
+from .model.element import Flag as Flag
+from .model.element import Law as Law
+from .model.element import LawOf as LawOf
+from .model.element import Laws as Laws
+from .model.element import Length as Length
+from .model.element import Mass as Mass
+from .model.element import Name as Name
+from .model.element import Number as Number
+from .model.element import Numbers as Numbers
+from .model.element import Point as Point
+from .model.element import PointPair as PointPair
+from .model.element import Ratio as Ratio
+from .model.element import Stiffness as Stiffness
+from .model.element import Unit as Unit
+from .model.element import Vector as Vector
+from .model.element import Velocity as Velocity
+from .model.element import element as element
+from .model.element import nonnegative as nonnegative
+from .model.element import positive as positive
+from .model.force import BodyForce as BodyForce
+from .model.force import CoordinateForce as CoordinateForce
+from .model.force import JointForce as JointForce
+from .model.force import TwoFrameForce as TwoFrameForce
+from .model.force import TwoPointForce as TwoPointForce
+from .model.joint import Coordinate as Coordinate
+from .model.joint import Joint as Joint

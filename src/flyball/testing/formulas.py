@@ -1,0 +1,266 @@
+"""Checks of an element's formulas: on every kind of number, their derivatives, and what they must not depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..graph.node import Graph, Symbol, Undecided
+from ..graph.values import evaluate
+from ..model.element import LawOf, Unit, fields_with
+from ..model.force import CoordinateForce
+from ..model.units import powers_in_si
+from .frames import power, random_rotation, record, stepped, turned
+from .states import INPUTS, WRENCH, State, flat, nest
+
+if TYPE_CHECKING:
+    from .contract import Subject
+
+ROUNDING = 1e-11  # of the largest result: the same operations, by other functions of the C library at most
+STEP = 1e-30  # imaginary: its square is nothing beside 1
+STEPS = (1e-3, 1e-4, 1e-5, 1e-6)  # of differences; one of them must do
+SLOPE = 1e-6  # relative error of differences of fourth order with the best step
+WORLD = 1e-9  # relative: what is left of a shift by SHIFT, which takes three digits
+SHIFT = np.array([1e3, -2e2, 5e2])
+SCALES = {"meter": 3.0, "kilogram": 0.7, "second": 1.7}
+"""Other units of length, mass and time, in those of the SI."""
+
+
+def _differ(a: Any, b: Any, tolerance: float, size: float = 0.0) -> bool:
+    """Whether numbers differ by more than a part of the largest; nan equals nan."""
+    a, b = np.asarray(a), np.asarray(b)
+    if a.shape != b.shape or (np.isnan(a) != np.isnan(b)).any():
+        return True
+    known = ~np.isnan(a)
+    largest = max(size, np.abs(a[known]).max(initial=0.0), np.abs(b[known]).max(initial=0.0))
+    return bool((np.abs(a - b)[known] > tolerance * largest).any())
+
+
+def _shown(x: Any) -> str:
+    return np.array2string(np.asarray(x), precision=6)
+
+
+def finite(s: Subject) -> str:
+    """The formulas give the right count of finite numbers at ordinary states."""
+    for state in s.states:
+        try:
+            found = state.function(*state.arguments)
+        except Exception as error:
+            return f"{state.form} raises {type(error).__name__}: {error}"
+        lengths = _lengths(found)
+        if lengths != state.form.result:
+            return f"{state.form} returns {found!r}; it must return {_wanted(state)}"
+        if not np.isfinite(list(flat(found))).all():
+            return f"{state.form} returns {found!r} at an ordinary state"
+    return ""
+
+
+def _lengths(x: Any) -> Any:
+    if not isinstance(x, tuple):
+        return 0
+    inner = [_lengths(part) for part in x]
+    return tuple(inner) if any(n != 0 for n in inner) else len(inner)
+
+
+def _wanted(state: State) -> str:
+    if state.form.name == "wrench":
+        return "(force, torque), each a tuple of three numbers"
+    return "a number" if state.form.result == 0 else f"a tuple of {state.form.result} numbers"
+
+
+def compiled(s: Subject) -> str:
+    """Compiled code gives what the Python formula gives."""
+    for state in s.states:
+        x = state.numbers
+        plain, fast = state.at(x.tolist()), state.compiled(x, False)
+        if _differ(plain, fast, ROUNDING):
+            return f"{state.form} is {_shown(plain)} in Python and {_shown(fast)} compiled"
+    return ""
+
+
+def complex_numbers(s: Subject) -> str:
+    """Complex numbers change nothing, in Python and compiled; the imaginary parts of both are the same."""
+    for state in s.states:
+        x = state.numbers
+        for way in (np.zeros(len(x)), _way(x)):
+            given = x + 1j * STEP * way
+            real, plain, fast = state.at(x.tolist()), state.at(given.tolist()), state.compiled(given, True)
+            for found, how in ((plain, "in Python"), (fast, "compiled")):
+                if _differ(real, np.real(found), ROUNDING):
+                    return f"{state.form} is {_shown(real)} on floats and {_shown(found)} on complex numbers {how}"
+            if _differ(np.imag(plain) / STEP, np.imag(fast) / STEP, ROUNDING, np.abs(real).max()):
+                return f"{state.form}: derivatives by complex numbers differ between Python and compiled code"
+    return ""
+
+
+def _way(x: np.ndarray) -> np.ndarray:
+    """A direction in which all arguments change by a part of their size; those that are zero, such as no laws, stay."""
+    return np.random.default_rng(1).normal(size=len(x)) * np.abs(x)
+
+
+def derivatives(s: Subject) -> str:
+    """A complex step gives the derivatives that differences give."""
+    for state in s.states:
+        x = state.numbers
+        for seed in range(3):
+            way = np.random.default_rng(seed).normal(size=len(x)) * np.abs(x)
+            exact = np.imag(state.at((x + 1j * STEP * way).tolist())) / STEP
+            near = [_difference(state, x, h * way) / h for h in STEPS]
+            size = np.abs(state.at(x.tolist())).max()
+            if all(_differ(exact, d, SLOPE, size) for d in near):
+                return (
+                    f"the derivatives of {state.form} by a complex step are {_shown(exact)}, and "
+                    f"{_shown(near[1])} by differences; abs(), max(), math.sqrt() and the like lose imaginary parts: "
+                    f"use functions of flyball.math.scalar"
+                )
+    return ""
+
+
+def _difference(state: State, x: np.ndarray, h: np.ndarray) -> np.ndarray:
+    f = {k: state.at((x + k * h).tolist()) for k in (-2, -1, 1, 2)}
+    return (8.0 * (f[1] - f[-1]) - (f[2] - f[-2])) / 12.0
+
+
+def symbols(s: Subject) -> str:
+    """The formulas run on symbols, and the expressions have the values that floats give."""
+    for state in s.states:
+        graph, x = Graph(), state.numbers
+        given: list[Any] = []
+        for k, value in enumerate(x.tolist()):
+            symbol = Symbol(f"x{k}", "parameter" if k < state.form.shapes[0] else "coordinate")
+            given.append(graph.symbol(symbol, value if k < state.form.shapes[0] else None) if value else 0.0)
+        try:
+            found = state.at(given)
+        except Undecided as error:
+            return f"{state.form} cannot be written in symbols: {error}"
+        got = np.array(evaluate(list(found), {f"x{k}": value for k, value in enumerate(x.tolist())}), float)
+        if _differ(state.at(x.tolist()), got, ROUNDING):
+            return f"{state.form} is {_shown(state.at(x.tolist()))} on floats and {_shown(got)} in symbols"
+    return ""
+
+
+def rates(s: Subject) -> str:
+    """The second input is the rate of the first."""
+    for state in s.states:
+        if state.form == INPUTS and state.frames is not None:
+            F, M = (record(stepped(x, STEP), complex) for x in state.frames)
+            rate = np.imag(state.function(state.arguments[0], F, M)[0]) / STEP
+            found = state.function(*state.arguments)[1]
+            if _differ(rate, found, ROUNDING, 1e-3):
+                return f"{state.form}: the second input is {found:.6g}; the rate of the first is {rate:.6g}"
+    return ""
+
+
+def energy(s: Subject) -> str:
+    """What a conservative element gives it loses of its energy."""
+    e = s.element
+    if not e.conservative():
+        return ""
+    cls: Any = type(e)
+    for state in s.states:
+        if isinstance(e, CoordinateForce):
+            par, x, rate, laws, load = state.arguments
+            lost = -np.imag(cls.energy(par, complex(x, STEP))) / STEP if cls.energy is not None else 0.0
+            found = cls.effort(par, x, rate, laws, load)
+            if _differ(lost, found, ROUNDING, abs(found)):
+                return f"it is conservative; effort is {found:.6g}, minus the slope of its energy is {lost:.6g}"
+        elif state.form == WRENCH and state.frames is not None:
+            F, M = state.frames
+            lost = 0.0
+            if cls.energy is not None:
+                f, m = (record(stepped(x, STEP), complex) for x in (F, M))
+                lost = -np.imag(cls.energy(state.arguments[0], f, m)) / STEP
+            given = power(state.function(*state.arguments), F, M)
+            size = np.abs(np.array(list(flat(state.function(*state.arguments))))).max()
+            if _differ(lost, given, 10.0 * ROUNDING, size):
+                return f"it is conservative; its power is {given:.6g} W, and it loses {lost:.6g} W of its energy"
+    return ""
+
+
+def axes(s: Subject) -> str:
+    """Frames turned and shifted in the world: what is measured stays, the wrench turns with them."""
+    Q = random_rotation(3)
+    for state in s.states:
+        if state.frames is None:
+            continue
+        F, M = (record(turned(x, Q, SHIFT)) for x in state.frames)
+        here = state.function(*state.arguments)
+        there = state.function(state.arguments[0], F, M, *state.arguments[3:])
+        wanted = here if state.form == INPUTS else tuple(tuple(Q @ np.array(x)) for x in here)
+        if _differ(list(flat(wanted)), list(flat(there)), WORLD, 1e-3):
+            return (
+                f"{state.form} depends on the axes or the origin of the world: frames turned and shifted together "
+                f"give {_shown(list(flat(there)))}, and must give {_shown(list(flat(wanted)))}. For a force that is "
+                f"given in the world's axes skip the checks 'axes' and 'turned'"
+            )
+    return ""
+
+
+def units(s: Subject) -> str:
+    """In other units of length, mass and time the same: no constant of the formula has a unit."""
+    e = s.element
+    along = _along(e) if isinstance(e, CoordinateForce) else 0
+    new = SimpleNamespace(**vars(s.numbers))
+    for name, unit in fields_with(type(e), Unit).items():
+        value, dimension = getattr(new, name), unit.dimension
+        if dimension is None and isinstance(e, CoordinateForce):
+            dimension = e.dimensions.get(name, (None, None))[along]
+        if value is not None:
+            if dimension is None:
+                return ""  # a field of any dimension: nothing is known of how it changes
+            setattr(new, name, _scaled(value, _factor(dimension)))
+    laws = [of.dimension for of in fields_with(type(e), LawOf).values()]
+    length, force = (1.0 if along else _factor("m")), (_factor("N*m") if along else _factor("N"))
+    effort = force if not laws or laws[0] is None else _factor(laws[0])
+    par = (*e.parameters(new, s.separation * _factor("m")), *(0.0,) * 16)[:16]
+    for state in s.states:
+        function, arguments = state.function, state.arguments
+        if state.frames is None:
+            _, x, rate, told, load = arguments
+            slower = length * _factor("1/s")
+            given = par, x * length, rate * slower, (told[0] * effort, *told[1:]), load * _factor("N")
+            wanted = np.array([function(*arguments) * force])
+        else:
+            F, M = (_frame(f) for f in arguments[1:3])
+            if state.form == INPUTS:
+                continue
+            given = par, F, M, tuple(x * effort for x in arguments[3]), e.inputs(par, F, M)
+            wanted = np.array(list(flat(function(*arguments)))) * np.repeat([_factor("N"), _factor("N*m")], 3)
+        found = np.array(list(flat(function(*given))))
+        if _differ(wanted, found, WORLD):
+            return (
+                f"{state.form} in other units of length, mass and time is {_shown(found)}, and must be "
+                f"{_shown(wanted)}: a constant in it has a unit, or a field has another unit than its formula needs"
+            )
+    return ""
+
+
+def _along(e: CoordinateForce) -> int:
+    """1 if it acts about an angle, 0 along a length."""
+    return int(any(text.partition(".")[2].startswith("angle") for text in e.along()))
+
+
+def _factor(unit: str) -> float:
+    """How many of the unit in which numbers are given are one of the same made of `SCALES`."""
+    out = 1.0
+    for base, exponent in powers_in_si(unit).items() if unit not in ("", "1") else ():
+        out *= SCALES.get(base, 1.0) ** -exponent
+    return out
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    return tuple(_scaled(x, factor) for x in value) if isinstance(value, tuple | list) else value * factor
+
+
+def _frame(x: Sequence[Any]) -> Any:
+    m, s = _factor("m"), _factor("1/s")
+    scales = (m, 1.0, s, m * s, s * s, m * s * s)
+    return nest((3, 9, 3, 3, 3, 3), _each(x, scales))
+
+
+def _each(parts: Sequence[Any], scales: Sequence[float]) -> Iterator[float]:
+    for part, scale in zip(parts, scales, strict=True):
+        yield from (x * scale for x in part)
