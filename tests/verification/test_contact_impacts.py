@@ -191,3 +191,23 @@ def test_impacts_that_do_not_end_within_a_step_are_told():
     assert long.energy.kinetic[-1] < 0.1 and long.health.contact.endless > 0
     assert any("the sequence of impacts did not end" in text for text in long.health.doubtful)
     assert abs(short.energy.kinetic[-1] - 0.5) < 1e-6 and not short.health.warnings
+
+
+@pytest.mark.parametrize("step", [1e-2, 1e-3])
+@pytest.mark.parametrize("planar", [False, True])
+def test_smooth_balls_that_meet_off_centre_keep_their_spins(planar, step):
+    """However far they go in the step: the impulse acts through both middles, along the line on which they touch."""
+    m = fb.Mechanism("balls", planar=planar, gravity=(0, 0) if planar else (0, 0, 0))
+    for name, side, r, w in (("a", -1, 0.16, -0.557), ("b", 1, 0.147, 0.653)):
+        p, v = (0.5 * side, -0.019 * side), (-1.5 * side, 0.0)
+        if planar:
+            m.add(fb.Body(name, shape=fb.Sphere(radius=r), density=1000, position=p, velocity=v, angular_velocity=w))
+        else:
+            m.add(fb.Body(name, shape=fb.Sphere(radius=r), density=1000, position=(*p, 0.01 * side), velocity=(*v, 0.0),
+                          angular_velocity=(1.0, 2.0, w)))  # fmt: skip
+    m.add(fb.Contact(friction=0.0, restitution=1.0))
+    run = stepped(m, 1.0, step)
+    for name in "ab":
+        w = run[name].angular_velocity
+        assert np.abs(run[name].velocity[-1] - run[name].velocity[0]).max() > 0.5
+        assert w[-1] == pytest.approx(w[0], abs=1e-12)

@@ -52,7 +52,7 @@ THICK = 0.1  # skins, in radii
 
 def no_contacts(capacity: int) -> Contacts:
     """An empty table of contacts."""
-    return Contacts(np.zeros(8, np.int64), np.full((capacity, 4), -1, np.int64), np.zeros((capacity, 8)))
+    return Contacts(np.zeros(8, np.int64), np.full((capacity, 4), -1, np.int64), np.zeros((capacity, 10)))
 
 
 def no_movers(count: int) -> Movers:

@@ -18,7 +18,7 @@ PLACE, AXES, PAR, RADIUS = 0, 3, 12, 20
 # columns of Contacts.at
 SHAPE_1, SHAPE_2, FEATURE, BEFORE = range(4)
 # columns of Contacts.x
-POINT, NORMAL, GAP = 0, 3, 6
+POINT, NORMAL, GAP, APART = 0, 3, 6, 7
 # entries of Contacts.count
 FOUND, STATUS, REBUILT, PAIRS, NUMBER = range(5)
 # what a search may return: FULL_* says what to enlarge before it is called again at the same state
@@ -55,5 +55,5 @@ class Contacts(NamedTuple):
     # many pairs there are, number of the search
     at: Int2  # (capacity, 4): shape 1, shape 2, feature (tells the contacts of a pair apart, and lasts from step
     # to step), place of the same contact in the contacts before or -1. Those of a pair stand together.
-    x: Float2  # (capacity, 8): point [m] midway between the surfaces, unit normal from 1 to 2, gap [m] (< 0:
-    # overlap), all in the world
+    x: Float2  # (capacity, 10): point [m] midway between the surfaces, unit normal from 1 to 2, gap [m] (< 0:
+    # overlap), half of what that point is apart on the two shapes until they touch (less on 1), all in the world

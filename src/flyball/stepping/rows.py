@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..contact.surfaces import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
-from ..contact.tables import BEFORE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
+from ..contact.tables import APART, BEFORE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
-from ..math.vec import axes_across, cross, dot, load3, load9, mv, put3, scale, sub
+from ..math.vec import add, axes_across, cross, dot, load3, load9, mv, put3, scale, sub
 from ..numerics.cone.operator import along, seen
 from .motion import speed_of_fall
 from .tables import IMPULSE, SLIDES, STEP, TORQUE
@@ -24,8 +24,9 @@ def fill_rows(G, M, C, P, L, pace):
         a, b = P.at[c, 0], P.at[c, 1] = sides(G, C, c)
         point = load3(C.x, c, POINT)
         put3(P.frame, c, 0, load3(C.x, c, NORMAL))
-        put3(P.arm, c, 0, arm(M, a, point))
-        put3(P.arm, c, 3, arm(M, b, point))
+        apart = load3(C.x, c, APART)
+        put3(P.arm, c, 0, arm(M, a, sub(point, apart)))
+        put3(P.arm, c, 3, arm(M, b, add(point, apart)))
         law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
         tangents(G, M, C, P, L, c)
         gap = C.x[c, GAP]

@@ -143,7 +143,7 @@ def _unsound(c: Compiled, a: Assembly) -> str | None:
     while its neighbour keeps its place. The factorisation then divides by rounding errors, or by zero.
     """
     s, S = c.structure, c.values.system
-    if S.glob[SEMIDEFINITE] == 0.0 or S.kinds[SOLVER] != COUPLED:
+    if S.glob[SEMIDEFINITE] == 0.0 or S.kinds[SOLVER] != COUPLED or not s.nv:
         return None
     q, v = c.take(a.compiled, a.t, a.q, a.v)
     c.at(a.t, q, v, MOTION)

@@ -55,6 +55,19 @@ def above(M, B, w, s):
 
 
 @formula
+def taken_back(M, p, a, b, time):
+    """A point at which movers a and b will touch after some time, before it, and half of what it is apart on them.
+
+    Each mover has it where it will be from its origin when they touch.
+    """
+    v = load3(M.twist, a, 0) if a >= 0 else (0.0, 0.0, 0.0)
+    u = load3(M.twist, b, 0) if b >= 0 else (0.0, 0.0, 0.0)
+    if a < 0 or b < 0:
+        return sub(p, scale(time, add(v, u))), (0.0, 0.0, 0.0)
+    return sub(p, scale(0.5 * time, add(v, u))), scale(0.5 * time, sub(v, u))
+
+
+@formula
 def take(M, C, O, B, pair, rows, time, found):
     """Of the contacts in ``room``, after some time of motion, those that may touch: into C, as they are before it.
 
@@ -73,11 +86,11 @@ def take(M, C, O, B, pair, rows, time, found):
         if s < B.count[BOUNDED] and t < B.count[BOUNDED]:  # something else may stop one of them
             closing = max(closing, dot(e, sub(v, D)), dot(e, sub(D, u)))
         if gap < B.real[MARGIN] + ahead * max(0.0, closing):
-            p = sub(p, scale(0.5 * time, add(v, u)))
+            p, apart = taken_back(M, p, B.slot[s, MOVES], B.slot[t, MOVES], time)
             feature = int(B.room[k, 7])
             c, bit = before(O, (i, j), rows[0], feature, sub(p, scale(ahead, v)), size, used)
             used |= bit
-            write(C, rows[1] + many, p, e, gap)
+            write(C, rows[1] + many, p, e, gap, apart)
             sign(C, rows[1] + many, i, j, feature, c)
             many += 1
     return many

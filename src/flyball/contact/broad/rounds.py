@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from ...compiler.formulas import formula
 from ...math.scalar import sqrt
-from ...math.vec import dot, load3, scale, sub
+from ...math.vec import add, dot, load3, scale, sub
 from ..tables import AHEAD, MARGIN
-from .desk import AT, BOUNDED, DRIFT, GOES, ORIGIN, SIZE, SPEED, TURNS, UP
+from .desk import AT, BOUNDED, DRIFT, GOES, MOVES, ORIGIN, SIZE, SPEED, TURNS, UP
 from .rows import write
 
 
@@ -67,7 +67,14 @@ def balls(C, B, s, t, n):
         now[s, AT + 1] + 0.5 * y + p * b,
         now[s, AT + 2] + 0.5 * z + p * c,
     )
-    write(C, n, point, (a, b, c), gap)
+    # half of what the middles are apart across the normal: each sphere is touched on the line through its own middle
+    along = 0.5 * (a * x + b * y + c * z)
+    apart = 0.5 * x - along * a, 0.5 * y - along * b, 0.5 * z - along * c
+    if B.slot[t, MOVES] < 0:
+        point, apart = sub(point, apart), (0.0, 0.0, 0.0)
+    elif B.slot[s, MOVES] < 0:
+        point, apart = add(point, apart), (0.0, 0.0, 0.0)
+    write(C, n, point, (a, b, c), gap, apart)
     return 1
 
 
@@ -88,5 +95,5 @@ def flat_ball(C, B, w, s, side, n):
             return 0
     p = B.now[s, SIZE] + 0.5 * gap
     point = (B.now[s, AT] - p * a, B.now[s, AT + 1] - p * b, B.now[s, AT + 2] - p * c)
-    write(C, n, point, (side * a, side * b, side * c), gap)
+    write(C, n, point, (side * a, side * b, side * c), gap, (0.0, 0.0, 0.0))
     return 1
