@@ -286,3 +286,13 @@ def test_a_deep_tree_with_many_loops_is_not_made_to_see_that_it_costs_more():
     assert 0.2 * cost(joint) < least(small, joint.tree) <= cost(joint)
     assert cost(small.simulate(1e-4, outputs=2).values.structure) < cost(joint)
     assert "the mass matrix alone" in large.simulate(1e-4, outputs=2).health.coordinates
+
+
+def test_a_thin_rod_that_is_welded_to_the_ground():
+    """It has no inertia about its axis, and no freedom in any coordinates."""
+    m = fb.Mechanism("welded", gravity=(0, 0, -9.81))
+    m.add(fb.Body("rod", mass=2, inertia=(0, 0.1, 0.1), com=(0.2, 0, 0)), fb.PointOnLine("slot", "ground", "rod", at=(0, 0, 0), axis=(0, 1, 0)))  # fmt: skip
+    m.add(fb.Fixed("weld", "rod", "ground", at=(0.1, 0, 0)))
+    for coordinates in ("auto", "joint", "absolute"):
+        run = m.simulate(0.1, outputs=2, coordinates=coordinates)
+        assert run["rod"].position[-1] == pytest.approx([0, 0, 0], abs=1e-12)
