@@ -293,6 +293,6 @@ def test_a_thin_rod_that_is_welded_to_the_ground():
     m = fb.Mechanism("welded", gravity=(0, 0, -9.81))
     m.add(fb.Body("rod", mass=2, inertia=(0, 0.1, 0.1), com=(0.2, 0, 0)), fb.PointOnLine("slot", "ground", "rod", at=(0, 0, 0), axis=(0, 1, 0)))  # fmt: skip
     m.add(fb.Fixed("weld", "rod", "ground", at=(0.1, 0, 0)))
-    for coordinates in ("auto", "joint", "absolute"):
-        run = m.simulate(0.1, outputs=2, coordinates=coordinates)
+    for layer in ("auto", "joint", "absolute"):
+        run = m.simulate(0.1, outputs=2, coordinates=layer)
         assert run["rod"].position[-1] == pytest.approx([0, 0, 0], abs=1e-12)
