@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import PerformanceNotice, warn
 
 BEGINS = "compiling for this machine, once: "
-IMPORT = 0.55
+IMPORT = 0.25
 """Seconds that importing Numba takes the machine on which `COSTS` were measured."""
 COSTS: dict[str, tuple[str, float]] = {
     "engine": ("the equations of motion", 22.0),
