@@ -269,6 +269,8 @@ def reorder(b: Base, dice: random.Random) -> tuple:
 
 
 def swap(b: Base, dice: random.Random) -> tuple:
+    if b.mechanism.assemble().moved:  # it closes near the drawing; frames on the other body close as near, elsewhere
+        raise Unsupported("a start that is not closed as drawn")
     return _again(b, changes.swapped(b.mechanism))
 
 
