@@ -20,15 +20,15 @@ from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-sys.path.insert(0, str(ROOT / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import numpy as np
 from fuzzing import content, scenes, verdicts
 
 import flyball as fb
 
+ROOT = Path(__file__).resolve().parents[1]
 Answer = dict[str, Any]
 LAYERS = ("joint", "absolute")
 OUTPUTS = 20
