@@ -230,7 +230,7 @@ def _start(job: _Task, way: Way) -> Start:
         return job.base
     if not rows:
         raise AnalysisError("there are no constraint rows, so that there is nothing to couple")
-    if a.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
+    if a.compiled.values.system.semidefinite[0] > 0.0:
         raise AnalysisError(
             "some body has no inertia about some axis, so that M has no inverse; the coupled matrix is factored in an "
             "order that needs one"

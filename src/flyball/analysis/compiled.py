@@ -205,7 +205,7 @@ class Compiled:
     def jacobian(self) -> np.ndarray:
         """Dense copy of the constraint Jacobian last evaluated, (nr, nv)."""
         S = self.values.system
-        nr, row_p = len(S.row_i), S.row_p[: len(S.row_i) + 1]
+        nr, row_p = len(S.rows.law), S.row_p[: len(S.rows.law) + 1]
         n = row_p[-1]
         out = np.zeros((nr, self.structure.nv))
         np.add.at(out, (np.repeat(np.arange(nr), np.diff(row_p)), S.col_i[:n]), self.work.G[:n])
@@ -216,13 +216,13 @@ class Compiled:
         import scipy.sparse as sp
 
         S = self.values.system
-        row_p = S.row_p[: len(S.row_i) + 1]
+        row_p = S.row_p[: len(S.rows.law) + 1]
         n = row_p[-1]
-        return sp.csr_matrix((self.work.G[:n].copy(), S.col_i[:n], row_p), shape=(len(S.row_i), self.structure.nv))
+        return sp.csr_matrix((self.work.G[:n].copy(), S.col_i[:n], row_p), shape=(len(S.rows.law), self.structure.nv))
 
     def mass(self):
         """Sparse mass matrix of absolute coordinates, (nv, nv)."""
-        return self._blocks(INERTIA, self.values.system.body_x[:, MASS])
+        return self._blocks(INERTIA, self.values.system.bodies.mass)
 
     def kinetic_energy(self, v: np.ndarray) -> float:
         """Kinetic energy [J] at velocities v (nv,) of absolute coordinates."""
@@ -234,14 +234,14 @@ class Compiled:
     def mass_entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows, columns and entries of the mass matrix of absolute coordinates."""
         x = self.values
-        return x.kept.get("mass", None, 1, lambda: self._entries(INERTIA, x.system.body_x[:, MASS]))
+        return x.kept.get("mass", None, 1, lambda: self._entries(INERTIA, x.system.bodies.mass))
 
     def inverse_mass_root(self, movable: np.ndarray, dense: bool = False):
         """R, sparse if not told, with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.
 
         Missing inertias have stand-ins.
         """
-        return self._blocks(INVERSE, self.values.system.body_x[:, PER_MASS], movable, dense)
+        return self._blocks(INVERSE, self.values.system.bodies.inverse_mass, movable, dense)
 
     def _blocks(self, column: int, translation: np.ndarray, root: np.ndarray | None = None, dense: bool = False):
         """The matrix of `_entries`, sparse if not told. With ``root`` its square root, rows times these numbers."""
@@ -275,9 +275,9 @@ class Compiled:
         i, j, x = [none], [none], [np.zeros(0)]
         plane = self.structure.model.planar
         used = slice(2, 3) if plane else slice(0, 3)
-        for n in np.unique(S.body_i[:, NV]):
-            b = np.flatnonzero(S.body_i[:, NV] == n)
-            v0 = S.body_i[b, V0]
+        for n in np.unique(S.tree.nv):
+            b = np.flatnonzero(S.tree.nv == n)
+            v0 = S.tree.v[b]
             shifts, turns = np.split(np.arange(n), [2 if plane else 3])
             at = v0[:, None] + shifts
             i += [at.ravel(), np.repeat(v0[:, None] + turns, len(turns), axis=1).ravel()]

@@ -182,11 +182,11 @@ class Prepared:
         J = np.zeros((6, len(self.v)))
         point = W.BK[b, :3] + W.BK[b, 3:12].reshape(3, 3) @ offset
         while b >= 0:
-            for k in range(int(S.body_i[b, NV])):
+            for k in range(int(S.tree.nv[b])):
                 turn, shift = (np.array(x) for x in column(S, W, b, k))
-                at = int(S.body_i[b, V0]) + k
+                at = int(S.tree.v[b]) + k
                 J[:3, at], J[3:, at] = shift + np.cross(turn, point - W.O[b]), turn
-            b = int(S.body_i[b, PARENT])
+            b = int(S.tree.parent[b])
         return J
 
     def __getstate__(self) -> dict[str, Any]:
@@ -256,13 +256,13 @@ class Prepared:
     def _count_turns(self, c: Compiled, t: float, q: np.ndarray) -> None:
         """Turned angles as the coordinates have them: whole turns from the start to q count, where q knows them."""
         S = c.values.system
-        if not len(S.angle_i):
+        if not len(S.angles.F):
             return
         way = q - self.q
-        for b in np.flatnonzero(S.body_i[:, BODY_LAW] >= 0).tolist():  # a driver says where these are
-            law = evaluate_jet(S.code, S.const, int(S.body_i[b, BODY_LAW]), c.work.stack, t, c.work.sensed, BY_TIME)
-            way[S.body_i[b, Q0]] = law[0] - S.body_x[b, OFFSET] - self.q[S.body_i[b, Q0]]
-        at = S.angle_i[:, 2]
+        for b in np.flatnonzero(S.tree.law >= 0).tolist():  # a driver says where these are
+            law = evaluate_jet(S.code, S.const, int(S.tree.law[b]), c.work.stack, t, c.work.sensed, BY_TIME)
+            way[S.tree.q[b]] = law[0] - S.bodies.offset[b] - self.q[S.tree.q[b]]
+        at = S.angles.state
         c.z[at] = self._start.compiled.z[at] + self._by_coordinates @ way
 
     @property
@@ -284,7 +284,7 @@ class Prepared:
         s, S = c.structure, c.values.system
         if not s.model.planar:
             known = {s.state_at[name]: angle for name, angle in c.turned(q).items() if name in s.state_at}
-            return np.array([known.get(state, 0.0) for state in S.angle_i[:, 2].tolist()])
+            return np.array([known.get(state, 0.0) for state in S.angles.state.tolist()])
         c.at(0.0, q, np.zeros(s.nv))
         angles = turned_angles(c.values, c.work, q)
         of = {-1: 0.0} | {s.place[name]: float(angle) for name, angle in angles.items()}

@@ -205,8 +205,8 @@ def watched(begun: Start) -> bool:
 
 def _refuse_idle(begun: Start, stabilization: str) -> None:
     """Refuse to keep states on constraints where there are none."""
-    if not len(begun.assembly.compiled.values.system.row_i):
-        joint = len(begun.base.compiled.values.system.row_i) > 0
+    if not len(begun.assembly.compiled.values.system.rows.law):
+        joint = len(begun.base.compiled.values.system.rows.law) > 0
         where, remedy = ("in joint coordinates ", ", or give coordinates='absolute'") if joint else ("", "")
         raise ModelError(
             f"stabilization={stabilization!r} does nothing: {where}no constraint is left to be kept; leave it out"
@@ -283,7 +283,7 @@ def energy_size(a: Assembly, span: float) -> float:
 
 def _weight(S: System) -> tuple[float, float]:
     """Mass of all bodies [kg], and gravity [m/s^2]."""
-    return float(S.body_x[:, MASS].sum()), float(np.sqrt((S.glob[:3] ** 2).sum()))
+    return float(S.bodies.mass.sum()), float(np.sqrt((S.gravity ** 2).sum()))
 
 
 def lifted(weight: tuple[float, float], length: float, span: float) -> float:
@@ -296,7 +296,7 @@ def lifted(weight: tuple[float, float], length: float, span: float) -> float:
 def width(a: Assembly) -> int:
     """How many numbers are kept of each output time."""
     s = a.compiled.structure
-    return 1 + s.nq + s.nv + len(a.compiled.z) + s.nv + len(a.compiled.values.system.row_i) + len(s.prescribed)
+    return 1 + s.nq + s.nv + len(a.compiled.z) + s.nv + len(a.compiled.values.system.rows.law) + len(s.prescribed)
 
 
 def run_clock(

@@ -15,8 +15,8 @@ def tangent_rate(c: Compiled, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
     """The change along the velocities that changes of the coordinates are, (nv,)."""
     S = c.values.system
     out = np.zeros(c.structure.nv)
-    for b in range(len(S.body_i)):
-        q0, v0 = int(S.body_i[b, Q0]), int(S.body_i[b, V0])
+    for b in range(len(S.tree.parent)):
+        q0, v0 = int(S.tree.q[b]), int(S.tree.v[b])
         n = lengths(S, b)
         out[v0 : v0 + n] = dq[q0 : q0 + n]
         k, w = quaternion_at(S, b)
@@ -34,8 +34,8 @@ def tangent_step(c: Compiled, q: np.ndarray, other: np.ndarray) -> np.ndarray:
     """
     S = c.values.system
     out = np.zeros(c.structure.nv)
-    for b in range(len(S.body_i)):
-        q0, v0 = int(S.body_i[b, Q0]), int(S.body_i[b, V0])
+    for b in range(len(S.tree.parent)):
+        q0, v0 = int(S.tree.q[b]), int(S.tree.v[b])
         n = lengths(S, b)
         out[v0 : v0 + n] = other[q0 : q0 + n] - q[q0 : q0 + n]
         k, w = quaternion_at(S, b)

@@ -118,7 +118,7 @@ def _peaks(t: np.ndarray, seen: Seen) -> np.ndarray:
 def _rate(c, spec: SwitchSpec, v: np.ndarray) -> float:
     """Rate of a switch's quantity."""
     S = c.values.system
-    row = len(S.row_i) + spec.measured
+    row = len(S.rows.law) + spec.measured
     entries = slice(S.row_p[row], S.row_p[row + 1])
     return float(c.work.G[entries] @ v[S.col_i[entries]])
 

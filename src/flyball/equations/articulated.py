@@ -41,7 +41,7 @@ def articulate(S, W):
         0, or 1 + the velocity that moves no inertia.
     """
     A = W.IC
-    n = S.body_i.shape[0]
+    n = S.tree.parent.shape[0]
     o = 0.0 * W.O[0, 0]
     for b in range(n):
         A[b, WAITING] = o
@@ -52,7 +52,7 @@ def articulate(S, W):
         status, I = eliminate(S, W, b, I)
         if status != 0:
             return status
-        a = S.body_i[b, PARENT]
+        a = S.tree.parent[b]
         if a >= 0:
             I = moved(I, sub(load3(W.O, b, 0), load3(W.O, a, 0)))
         if a != b - 1:
@@ -117,8 +117,8 @@ def eliminate(S, W, b, I):
     """
     J, H, K, lost, mass = I
     size = J[0] + J[3] + J[5] + lost
-    v0 = S.body_i[b, V0]
-    for d in range(v0 + S.body_i[b, NV] - 1, v0 - 1, -1):
+    v0 = S.tree.v[b]
+    for d in range(v0 + S.tree.nv[b] - 1, v0 - 1, -1):
         w, v = load3(W.X, d, 0), load3(W.X, d, 3)
         t, f = symmetric(J, w), mtv(H, w)
         D = dot(w, t)
@@ -130,7 +130,7 @@ def eliminate(S, W, b, I):
         put3(W.X, d, RESPONSE, t)
         put3(W.X, d, RESPONSE + 3, f)
         W.X[d, STIFF] = D
-        if S.body_i[b, BODY_LAW] < 0:
+        if S.tree.law[b] < 0:
             if not positive(D - ROUNDING * least):
                 return 1 + d, (J, H, K, lost, mass)
             r = 1.0 / D
@@ -199,7 +199,7 @@ def articulated_solve(S, W, f, x, effort):
         entries are left alone.
     """
     A = W.IC
-    n = S.body_i.shape[0]
+    n = S.tree.parent.shape[0]
     o = 0.0 * W.O[0, 0]
     zero = (o, o, o)
     for b in range(n):
@@ -209,7 +209,7 @@ def articulated_solve(S, W, f, x, effort):
     moment, force = zero, zero
     for b in range(n - 1, -1, -1):
         moment, force = collect(S, W, b, (moment, force), f, x, effort)
-        a = S.body_i[b, PARENT]
+        a = S.tree.parent[b]
         if a >= 0:
             moment = add(moment, cross(sub(load3(W.O, b, 0), load3(W.O, a, 0)), force))
         if a != b - 1:
@@ -219,7 +219,7 @@ def articulated_solve(S, W, f, x, effort):
             moment, force = zero, zero
     turn, shift = zero, zero
     for b in range(n):
-        a = S.body_i[b, PARENT]
+        a = S.tree.parent[b]
         if a < 0:
             turn, shift = zero, zero
         else:
@@ -241,10 +241,10 @@ def collect(S, W, b, wrench, f, x, effort):
     t, p = wrench
     if W.IC[b, WAITING].real > 0.0:
         t, p = add(t, load3(W.IC, b, PASSED)), add(p, load3(W.IC, b, PASSED + 3))
-    v0 = S.body_i[b, V0]
-    for d in range(v0 + S.body_i[b, NV] - 1, v0 - 1, -1):
+    v0 = S.tree.v[b]
+    for d in range(v0 + S.tree.nv[b] - 1, v0 - 1, -1):
         u = f[d] - (dot(load3(W.X, d, 0), t) + dot(load3(W.X, d, 3), p))
-        if S.body_i[b, BODY_LAW] < 0:
+        if S.tree.law[b] < 0:
             x[d] = u
             s = u * W.X[d, SOFT]
         else:
@@ -259,9 +259,9 @@ def collect(S, W, b, wrench, f, x, effort):
 def spread(S, W, b, carried, x, effort):
     """Accelerations of body b's velocities into x, and of the body, from the one at which its parent carries it."""
     w, v = carried
-    for d in range(S.body_i[b, V0], S.body_i[b, V0] + S.body_i[b, NV]):
+    for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
         s = dot(load3(W.X, d, RESPONSE), w) + dot(load3(W.X, d, RESPONSE + 3), v)
-        if S.body_i[b, BODY_LAW] < 0:
+        if S.tree.law[b] < 0:
             x[d] = (x[d] - s) * W.X[d, SOFT]
         else:
             effort[d] = W.X[d, STIFF] * x[d] + s - effort[d]

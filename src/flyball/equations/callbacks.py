@@ -49,7 +49,7 @@ def meet(A, K, j):
     S, last = A[S_], K.way.shape[0] - 1
     for i in range(last + 1):
         K.met_g[j, i] = A[SHEET].rows[0, i]
-    if S.guard_i[last, GUARD_KIND] == G_SHARED:
+    if S.guards.kind[last] == G_SHARED:
         guard_of_group(S, A[W_], A[OWN].real[T], A[GROUP], K, -1 - j)
     for k in range(K.stages.shape[0]):
         if K.stages[k] == K.met[j]:

@@ -102,14 +102,14 @@ def respond(A):
 def closed(A, P, k, dq, dv):
     """Put changes of positions and velocities on the linearised constraints, in place."""
     S, WC, B, rows = A[S_], A[WC_], A[BENCH], A[SHEET].rows
-    nv, nr, nq = dq.shape[0], S.row_i.shape[0], P.size[NQ]
+    nv, nr, nq = dq.shape[0], S.rows.law.shape[0], P.size[NQ]
     stamp(P, k, True)
     for what in range(2):
         step_along(A, dq, dv, GAPS)
-        for b in range(S.body_i.shape[0]):
-            if S.body_i[b, BODY_LAW] >= 0:
-                dq[S.body_i[b, V0]] = WC.y[0, S.body_i[b, Q0]].imag / STEP
-                dv[S.body_i[b, V0]] = WC.y[0, nq + S.body_i[b, V0]].imag / STEP
+        for b in range(S.tree.parent.shape[0]):
+            if S.tree.law[b] >= 0:
+                dq[S.tree.v[b]] = WC.y[0, S.tree.q[b]].imag / STEP
+                dv[S.tree.v[b]] = WC.y[0, nq + S.tree.v[b]].imag / STEP
         if nr > 0:
             for d in range(nv):
                 rows[0, d] = 0.0
@@ -131,7 +131,7 @@ def change(A, P, k, dq, dv, rate, powers):
     Changes of accelerations, multipliers and efforts go to ``P.found[k]``.
     """
     S, W, WC = A[S_], A[W_], A[WC_]
-    nv, nr = dq.shape[0], S.row_i.shape[0]
+    nv, nr = dq.shape[0], S.rows.law.shape[0]
     found = P.found[k]
     stamp(P, k, True)
     step_along(A, dq, dv, ALONG)
@@ -139,20 +139,20 @@ def change(A, P, k, dq, dv, rate, powers):
     solved(A, P, found, 1.0)
     for i in range(powers.shape[0]):
         powers[i] = 0.0
-    for f in range(S.force_i.shape[0]):
-        if S.force_i[f, FORCE_WORK] >= 0:
-            powers[S.force_i[f, FORCE_WORK]] = WC.y[1, S.force_i[f, FORCE_WORK]].imag / STEP
+    for f in range(S.forces.F.shape[0]):
+        if S.forces.work[f] >= 0:
+            powers[S.forces.work[f]] = WC.y[1, S.forces.work[f]].imag / STEP
     if P.pressing.shape[0] > 0:
         shared(P, found, powers, nv)
     for r in range(nr):
-        if S.row_i[r, ROW_WORK] >= 0:
+        if S.rows.work[r] >= 0:
             nu = WC.row[NU, r]
-            powers[S.row_i[r, ROW_WORK]] = found[nv + r] * nu.real + W.row[LAM, r] * nu.imag / STEP
-    for b in range(S.body_i.shape[0]):
-        if S.body_i[b, BODY_LAW] >= 0:
-            d = S.body_i[b, V0]
+            powers[S.rows.work[r]] = found[nv + r] * nu.real + W.row[LAM, r] * nu.imag / STEP
+    for b in range(S.tree.parent.shape[0]):
+        if S.tree.law[b] >= 0:
+            d = S.tree.v[b]
             found[d] = WC.vel[GIVEN, d].imag / STEP
-            powers[S.body_i[b, BODY_WORK]] = (
+            powers[S.tree.work[b]] = (
                 found[nv + nr + d] * A[BENCH].state[P.size[NQ] + d].real + P.effort[d] * dv[d]
             )
     for d in range(nv):
@@ -165,7 +165,7 @@ def change(A, P, k, dq, dv, rate, powers):
 def solved(A, P, found, sign):
     """Accelerations, multipliers and efforts that take away what the residuals miss along the last complex step."""
     S, W, B, rows = A[S_], A[W_], A[BENCH], A[SHEET].rows
-    nv, nr = P.zero.shape[0], S.row_i.shape[0]
+    nv, nr = P.zero.shape[0], S.rows.law.shape[0]
     for d in range(nv):
         rows[0, d] = -B.out[0, d].imag / STEP
     for r in range(nr):
@@ -181,7 +181,7 @@ def solved(A, P, found, sign):
 @formula
 def turned(S, state, nq, dq, rate):
     """Add N dq: changes of rotations have components along axes that turn."""
-    for b in range(S.body_i.shape[0]):
+    for b in range(S.tree.parent.shape[0]):
         _, w = quaternion_at(S, b)
         if w >= 0:
             x, y, z = state[nq + w].real, state[nq + w + 1].real, state[nq + w + 2].real
@@ -204,8 +204,8 @@ def press(A, P):
         solved(A, P, P.by_press[j], 0.0)
         for i in range(P.by_power.shape[1]):
             P.by_power[j, i] = 0.0
-        for f in range(S.force_i.shape[0]):
-            i = S.force_i[f, FORCE_WORK]
+        for f in range(S.forces.F.shape[0]):
+            i = S.forces.work[f]
             if i >= 0:
                 P.by_power[j, i] = WC.y[1, i].imag / STEP
 

@@ -25,7 +25,7 @@ ADDED = 1e-13  # to the diagonal, where rows of unit length have 1
 @formula
 def unit_rows(S, W, scale):
     """Rows of unit size in W.H, of velocities counted in lengths; what they were divided by in W.row[DIAGONAL]."""
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         s = 0.0
         for e in range(S.row_p[k], S.row_p[k + 1]):
             W.H[e] = W.G[e] * scale[S.col_i[e]]
@@ -41,11 +41,11 @@ def factor_square(S, W):
     """Factor H H^T and a little on its diagonal; as `ldl_factor`."""
     for e in range(W.A.shape[0]):
         W.A[e] = 0.0
-    for e in range(S.pair_i.shape[0]):
-        i, j = S.pair_i[e, 0], S.pair_i[e, 1]
-        for k in range(S.pair_i[e, 2]):
-            W.A[S.pair_i[e, 3]] += W.H[i + k] * W.H[j + k]
-    for k in range(S.row_i.shape[0]):
+    for e in range(S.pairs.first.shape[0]):
+        i, j = S.pairs.first[e], S.pairs.second[e]
+        for k in range(S.pairs.length[e]):
+            W.A[S.pairs.place[e]] += W.H[i + k] * W.H[j + k]
+    for k in range(S.rows.law.shape[0]):
         W.A[S.ldl.Ap[S.ldl.perm[k] + 1] - 1] += ADDED
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
 
@@ -69,7 +69,7 @@ def each(address, S, W, R, clock, sheet, states, scale, block, kept, out):
         X = block[: last + 1]
         out[n, 1], out[n, 2] = weakest(S.ldl, W.L, W.D[0], S.row_p, S.col_i, W.H, X, W.vel[V1], W.D[2])
         for i in range(last):
-            for k in range(S.row_i.shape[0]):
+            for k in range(S.rows.law.shape[0]):
                 kept[n, k, i] = X[i, k] / W.row[DIAGONAL, k]
 
 
@@ -114,7 +114,7 @@ def dependencies(
         The largest singular value of the rows of unit size; the least of those that are not to be dependencies; the
         largest of those that are. nan where the rows are.
     """
-    n, nr = len(states), len(S.row_i)
+    n, nr = len(states), len(S.rows.law)
     ny = states.shape[1] - 1
     real, y = np.zeros(REALS), np.zeros((1, ny))
     clock = Clock(real, np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, ny)), np.zeros(0, np.int64))

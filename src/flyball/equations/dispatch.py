@@ -53,7 +53,7 @@ effort = ladder(__name__, "effort", FORMS[EFFORT].arguments, EFFORTS, NAN, EFFOR
 @formula
 def kind_of(S, k):
     """What the formulas above know force k by: the number of its kind, or the address of its class's code table."""
-    return S.own[k] if S.own[k] != 0 else S.force_i[k, FORCE_KIND]
+    return S.own[k] if S.own[k] != 0 else S.forces.kind[k]
 
 
 _LOOPS = {name: getattr(rows, name) for name in ("begin", "end", "begin_biases", "end_biases")}

@@ -49,7 +49,7 @@ def perform(S, W, R, clock, out, task):
     y = clock.y[0]
     choose_code(S, W, task)
     if task == POSITION:
-        nq = S.kinds[COORDINATES]
+        nq = S.coordinates[0]
         z = y[nq + W.vel.shape[1] :]
         place(S, W, t, y[:nq], z)
         move(S, W, t, y[nq : nq + W.vel.shape[1]], z)
@@ -87,7 +87,7 @@ def perform(S, W, R, clock, out, task):
         return 0
     if task == SOLVE:
         nv = W.vel.shape[1]
-        nr = S.row_i.shape[0]
+        nr = S.rows.law.shape[0]
         respond(S, W, out[0, :nv], out[1, :nr], out[2, :nv], out[3, :nr])
         return 0
     if task == TANGENT:

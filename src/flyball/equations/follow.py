@@ -100,13 +100,13 @@ def follow(S, W, c, out):
 @formula
 def broken(S, W, t, h, span):
     """Whether a driver's law does more over a step than its derivatives say: it may jump there, or have a kink."""
-    for b in range(S.body_i.shape[0]):
-        law = S.body_i[b, BODY_LAW]
-        if law >= 0 and leaps(S, W, law, t, h, span, S.body_i[b, TREE] == REVOLUTE):
+    for b in range(S.tree.parent.shape[0]):
+        law = S.tree.law[b]
+        if law >= 0 and leaps(S, W, law, t, h, span, S.tree.joint[b] == REVOLUTE):
             return True
-    for k in range(S.row_i.shape[0]):
-        law = S.row_i[k, ROW_LAW]
-        if law >= 0 and leaps(S, W, law, t, h, span, S.row_i[k, ROW_WRAP] == 1):
+    for k in range(S.rows.law.shape[0]):
+        law = S.rows.law[k]
+        if law >= 0 and leaps(S, W, law, t, h, span, S.rows.wrapped[k] == 1):
             return True
     return False
 
@@ -123,7 +123,7 @@ def leaps(S, W, law, t, h, span, turns):
     _, vm, am = evaluate_jet(S.code, S.const, law, W.stack, t + 0.5 * h, W.sensed, BY_TIME)
     f1, v1, a1 = evaluate_jet(S.code, S.const, law, W.stack, t + h, W.sensed, BY_TIME)
     way = f1 - f0 - h / 30.0 * (7.0 * v0 + 16.0 * vm + 7.0 * v1) - h * h / 60.0 * (a0 - a1)
-    size = S.glob[LENGTH]
+    size = S.length[0]
     if turns:
         way = atan2(sin(way), cos(way))
         size = 0.0 * size + 1.0
@@ -138,13 +138,13 @@ def leaps(S, W, law, t, h, span, turns):
 @formula
 def predict(S, c, h):
     """State after h into c.y[1]: velocities by the cubic that fits the last two, positions by its integral."""
-    nq = S.kinds[COORDINATES]
+    nq = S.coordinates[0]
     y, new, now, before = c.y[0], c.y[1], c.K[0], c.K[1]
     last = c.real[H]
     way = c.y[2]
     for i in range(y.shape[0]):
         new[i] = y[i]
-    nv = S.body_i[-1, V0] + S.body_i[-1, NV]
+    nv = S.tree.v[-1] + S.tree.nv[-1]
     u = 1.0 + h / last if last > 0.0 else 1.0
     a, b, d = u * u, u * u * u, u * u * u * u
     for i in range(nv):

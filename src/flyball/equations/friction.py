@@ -61,36 +61,36 @@ def loads_end(S, W):
 @formula
 def reaction_loads(S, W):
     """Loads that follow from the reactions now in W, into row RETURNED."""
-    for k in range(S.force_i.shape[0]):
-        n = S.force_i[k, FORCE_LOAD]
+    for k in range(S.forces.F.shape[0]):
+        n = S.forces.load[k]
         if n < 0:
             continue
-        if S.force_i[k, FORCE_ALONG] == SLIDING:
-            s = S.force_i[k, FORCE_SWITCH]
-            W.sensed[RETURNED, n] = W.row[LAM, S.switch_i[S.switch_i[s, SWITCH_OTHER], SWITCH_ROW]]
+        if S.forces.family[k] == SLIDING:
+            s = S.forces.switch[k]
+            W.sensed[RETURNED, n] = W.row[LAM, S.switches.row[S.switches.other[s]]]
             if not slides(S, W, s):  # nothing follows from it
                 W.sensed[LOAD, n] = W.sensed[RETURNED, n]
             continue
         o = 0.0 * W.row[LAM, 0]
         force = (o, o, o)
         torque = (o, o, o)
-        for x in range(S.load_i.shape[0]):
-            if S.load_i[x, 0] == n:
-                f, m = on_second(S, W, S.load_i[x, 1])
+        for x in range(S.load_terms.load.shape[0]):
+            if S.load_terms.load[x] == n:
+                f, m = on_second(S, W, S.load_terms.term[x])
                 force, torque = add(force, f), add(torque, m)
-        W.sensed[RETURNED, n] = pressed(wide(S.force_x, k), load(W.FK, S.force_i[k, FORCE_M]), force, torque)
+        W.sensed[RETURNED, n] = pressed(wide(S.force_x, k), load(W.FK, S.forces.M[k]), force, torque)
 
 
 @formula
 def held_at_rest(S, W, k, t, arm, load):
     """The most that friction of force k, with this arm and load, holds along its quantity at rest."""
-    return dry_part(S, W, k, (t, W.sensed[VALUE, S.force_i[k, FORCE_F]], 0.0), arm, load, STATIC)
+    return dry_part(S, W, k, (t, W.sensed[VALUE, S.forces.F[k]], 0.0), arm, load, STATIC)
 
 
 @formula
 def dry(S, W, k, t, rate, arm, load):
     """How much of it there is while it slides, without what is viscous."""
-    return dry_part(S, W, k, (t, W.sensed[VALUE, S.force_i[k, FORCE_F]], rate), arm, load, sign(rate))
+    return dry_part(S, W, k, (t, W.sensed[VALUE, S.forces.F[k]], rate), arm, load, sign(rate))
 
 
 @formula
@@ -105,9 +105,9 @@ def dry_part(S, W, k, x, arm, load, way):
 @formula
 def pulled(S, n):
     """Whether load n may be negative: a place of contact pulls from where it opens to the end of the step."""
-    for x in range(S.load_i.shape[0]):
-        if S.load_i[x, 0] == n:
-            return S.load_i[x, 1] < 0
+    for x in range(S.load_terms.load.shape[0]):
+        if S.load_terms.load[x] == n:
+            return S.load_terms.term[x] < 0
     return False
 
 
@@ -117,8 +117,8 @@ def returned(S, W):
     reaction_loads(S, W)
     worst = 0.0
     small = NOTHING * force_scale(S, W)
-    for k in range(S.force_i.shape[0]):
-        n = S.force_i[k, FORCE_LOAD]
+    for k in range(S.forces.F.shape[0]):
+        n = S.forces.load[k]
         if n < 0:
             continue
         new = W.sensed[RETURNED, n]
@@ -135,7 +135,7 @@ def force_scale(S, W):
     size = 1e-300
     for d in range(W.vel.shape[1]):
         size = max(size, abs(W.vel[F_APPLIED, d]))
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         if W.row[DIAGONAL, k] > 0.0:
             size = max(size, abs(W.row[GAMMA, k]) / W.row[DIAGONAL, k])
     return size

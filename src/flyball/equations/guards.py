@@ -90,8 +90,8 @@ OTHER = 1e-9  # of what decides a law's side: it is on the other one
 @formula
 def watch(S, W, t, out):
     """Value of every guard into ``out`` (ng,), kinematics, rows and solution at t being in W."""
-    for g in range(S.guard_i.shape[0]):
-        kind, of = S.guard_i[g, GUARD_KIND], S.guard_i[g, GUARD_OF]
+    for g in range(S.guards.kind.shape[0]):
+        kind, of = S.guards.kind[g], S.guards.of[g]
         if kind == G_LAW:
             out[g] = evaluate(S.code, S.const, of, W.stack, (t, 0.0, 0.0), W.sensed)
         else:
@@ -108,12 +108,12 @@ def watched(S, W, t, kind, s):
         return way * corner(S, W, t, s) if W.switch[MODE, s] == OFF else 1.0 - magnitude(way)
     if kind == G_PRESS_LOWER or kind == G_PRESS_UPPER:
         return pressing(S, W, s, kind, way - FROZEN)
-    if kind == G_TURNS and S.switch_i[s, SWITCH_PARTNER] < 0 and slides(S, W, s):
-        m = S.switch_i[s, SWITCH_MEASURED]
+    if kind == G_TURNS and S.switches.partner[s] < 0 and slides(S, W, s):
+        m = S.switches.measured[s]
         return way * moving(S, m, W.sensed[RATE, m])
     if kind >= G_CONE:
         return watched_place(S, W, W.sensed, W.row[LAM], kind, s)
-    m, k = S.switch_i[s, SWITCH_MEASURED], S.switch_i[s, SWITCH_ROW]
+    m, k = S.switches.measured[s], S.switches.row[s]
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
     if W.switch[MODE, s] == OFF:
         if kind == G_LOWER:
@@ -123,7 +123,7 @@ def watched(S, W, t, kind, s):
         if kind == G_SLIDES:
             if way == BY_RATE:
                 return NOT_WATCHED
-            late = TURN * pace(S, m) if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0
+            late = TURN * pace(S, m) if S.switches.kind[s] == RATCHET else 0.0
             return way * moving(S, m, rate) + late
         if kind == G_BACK:
             return moving(S, m, rate)
@@ -131,7 +131,7 @@ def watched(S, W, t, kind, s):
     if kind == G_PULL:
         return way * W.row[LAM, k]
     if kind == G_HOLDS:
-        return most(S, W, t, S.switch_i[s, SWITCH_FORCE]) - magnitude(W.row[LAM, k])
+        return most(S, W, t, S.switches.force[s]) - magnitude(W.row[LAM, k])
     return NOT_WATCHED
 
 
@@ -144,7 +144,7 @@ def moving(S, m, rate):
 @formula
 def distance(S, m, x, rate):
     """How far quantity m is from a stop; none where that is rounding, as where it parts with no speed."""
-    return 0.0 if magnitude(x) <= GRAIN * S.glob[UNIT + m] and rate >= -RESTING * pace(S, m) else x
+    return 0.0 if magnitude(x) <= GRAIN * S.units[m] and rate >= -RESTING * pace(S, m) else x
 
 
 @formula
@@ -154,20 +154,20 @@ def grains(S, W, t, trial, so_far, out):
     ``trial`` is scratch of the shape of ``W.sensed``, ``so_far`` the fastest rate: what was rounded of that is kept.
     """
     fastest, strongest = quickest(S, W), 0.0
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         strongest = max(strongest, magnitude(W.row[LAM, k]))
-    for g in range(S.guard_i.shape[0]):
-        kind, of = S.guard_i[g, GUARD_KIND], S.guard_i[g, GUARD_OF]
+    for g in range(S.guards.kind.shape[0]):
+        kind, of = S.guards.kind[g], S.guards.of[g]
         out[g] = 0.0
         if kind == G_LOWER or kind == G_UPPER:
-            m = S.switch_i[of, SWITCH_MEASURED]
-            out[g] = GRAIN * max(S.glob[UNIT + m], magnitude(W.sensed[VALUE, m]))
-        elif kind == G_SLIDES or kind == G_BACK or (kind == G_TURNS and S.switch_i[of, SWITCH_PARTNER] < 0):
-            out[g] = max(NOISE * fastest, GRAIN * pace(S, S.switch_i[of, SWITCH_MEASURED]))
+            m = S.switches.measured[of]
+            out[g] = GRAIN * max(S.units[m], magnitude(W.sensed[VALUE, m]))
+        elif kind == G_SLIDES or kind == G_BACK or (kind == G_TURNS and S.switches.partner[of] < 0):
+            out[g] = max(NOISE * fastest, GRAIN * pace(S, S.switches.measured[of]))
         elif kind == G_PULL or kind == G_HOLDS or kind == G_CONE:
             out[g] = NOISE * strongest
         elif kind == G_LAW or kind == G_CORNER:
-            at = of if kind == G_LAW else S.switch_i[of, SWITCH_LAW]
+            at = of if kind == G_LAW else S.switches.law[of]
             most_of = (so_far, 1.0, strongest) if kind == G_LAW else (fastest, 0.0, strongest)
             out[g] = law_grain(S, W, t, at, trial, most_of)
 
@@ -190,7 +190,7 @@ def law_grain(S, W, t, at, trial, most_of):
             continue
         x, dx = W.sensed[VALUE, m], 0.0
         if m < 2 * nm:
-            least = S.glob[UNIT + m] if m < nm else max(most_of[0], most_of[1] * pace(S, m - nm))
+            least = S.units[m] if m < nm else max(most_of[0], most_of[1] * pace(S, m - nm))
             dx = GRAIN * max(magnitude(x), least)
         elif m >= first and m < last:
             dx = NOISE * most_of[2]
@@ -221,24 +221,24 @@ def astray(S, W, t, out):
     Less is rounding of velocities that something holds. Farther off the side is wrong, whatever it was taken by.
     """
     fastest = -1.0
-    for g in range(S.guard_i.shape[0]):
-        if S.guard_i[g, GUARD_KIND] == G_CORNER:
+    for g in range(S.guards.kind.shape[0]):
+        if S.guards.kind[g] == G_CORNER:
             fastest = quickest(S, W) if fastest < 0.0 else fastest
-            s = S.guard_i[g, GUARD_OF]
+            s = S.guards.of[g]
             out[g] = OTHER * (terms(S, W, t, s, fastest) if W.switch[MODE, s] == OFF else 1.0)
 
 
 @formula
 def terms(S, W, t, s, fastest):
     """Size of what the function u of a corner is the sum of: no input less than what it is told from."""
-    nm, at = measured(S), S.switch_i[s, SWITCH_LAW]
+    nm, at = measured(S), S.switches.law[s]
     size = magnitude(t * evaluate_jet(S.code, S.const, at, W.stack, t, W.sensed, BY_TIME)[1])
     for i in range(at + 2, at + 2 + 2 * S.code[at], 2):
         if S.code[i] == SENSOR:
             m = S.code[i + 1]
             x = magnitude(W.sensed[VALUE, m])
             if m < nm:
-                x = max(x, S.glob[UNIT + m])
+                x = max(x, S.units[m])
             elif m < 2 * nm:
                 x = max(x, fastest, pace(S, m - nm))
             size += x * magnitude(evaluate_jet(S.code, S.const, at, W.stack, t, W.sensed, m)[1])
@@ -248,27 +248,27 @@ def terms(S, W, t, s, fastest):
 @formula
 def pressing(S, W, s, kind, way):
     """Of an elastic switch that is pressed at a side: what it pushes with there; of an open side: how far that is."""
-    m, side = S.switch_i[s, SWITCH_MEASURED], 1.0 if kind == G_PRESS_LOWER else -1.0
+    m, side = S.switches.measured[s], 1.0 if kind == G_PRESS_LOWER else -1.0
     bound = W.switch[LOWER, s] if kind == G_PRESS_LOWER else W.switch[UPPER, s]
     depth = side * (bound - W.sensed[VALUE, m])
-    push = S.switch_x[s, SWITCH_STIFFNESS] * depth - S.switch_x[s, SWITCH_DAMPING] * side * W.sensed[RATE, m]
+    push = S.switch_values.stiffness[s] * depth - S.switch_values.damping[s] * side * W.sensed[RATE, m]
     told = way > -1.5  # an interpolated one is not exact; one that looks where it is by itself is far below
     if told and way * side > 0.5:
         return push
     if told and way * side < -0.5:
         return NOT_WATCHED
     if not told:  # it begins at the side, with nothing that tells where it goes
-        return GRAZED * S.glob[UNIT + m] - depth
+        return GRAZED * S.units[m] - depth
     # where it goes out faster than it is pushed it is open: without a jump as it leaves, so that nothing else that
     # happens there takes it for a zero
-    return max(-depth, -push / S.switch_x[s, SWITCH_STIFFNESS])
+    return max(-depth, -push / S.switch_values.stiffness[s])
 
 
 @formula
 def most(S, W, t, k):
     """The most that force k holds along its quantity at rest: its own law, asked for that."""
-    x = W.sensed[VALUE, S.force_i[k, FORCE_F]]
-    load = W.sensed[RETURNED, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
+    x = W.sensed[VALUE, S.forces.F[k]]
+    load = W.sensed[RETURNED, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
     laws = (law(S, W, k, 0, (t, x, 0.0)), 0.0, STATIC)
     return magnitude(effort(kind_of(S, k), wide(S.force_x, k), x, 0.0, laws, load))
 
@@ -276,4 +276,4 @@ def most(S, W, t, k):
 @formula
 def corner(S, W, t, s):
     """The function u whose sign says on which side of its corner a law is."""
-    return evaluate(S.code, S.const, S.switch_i[s, SWITCH_LAW], W.stack, (t, 0.0 * t, 0.0 * t), W.sensed)
+    return evaluate(S.code, S.const, S.switches.law[s], W.stack, (t, 0.0 * t, 0.0 * t), W.sensed)

@@ -90,7 +90,7 @@ class Means(NamedTuple):
 @formula
 def compose(y, d, v, z, out, A):
     """The state with positions an increment d from those of y, and velocities v."""
-    nq = A[S_].kinds[COORDINATES]
+    nq = A[S_].coordinates[0]
     nv = v.shape[0]
     for i in range(nq):
         out[i] = y[i]
@@ -179,15 +179,15 @@ def powers(A, K, k):
         return
     S, W = A[S_], A[W_]
     rate = K.rate[k]
-    for n in range(S.control_i.shape[0]):
+    for n in range(S.controls.rate_law.shape[0]):
         rate[n] = W.y[1, n]
-    for f in range(S.force_i.shape[0]):
-        i = S.force_i[f, FORCE_WORK]
+    for f in range(S.forces.F.shape[0]):
+        i = S.forces.work[f]
         if i >= 0:
             rate[i] = W.y[1, i]
-    for r in range(S.row_i.shape[0]):
-        if S.row_i[r, ROW_WORK] >= 0:
-            rate[S.row_i[r, ROW_WORK]] = K.lam[k, r] * W.row[NU, r]
+    for r in range(S.rows.law.shape[0]):
+        if S.rows.work[r] >= 0:
+            rate[S.rows.work[r]] = K.lam[k, r] * W.row[NU, r]
     progress(S, W, K.z[k], rate)
 
 
@@ -230,7 +230,7 @@ def rows_of(S, W, K, P, k):
     rows of nothing but rounding weigh enough to hold nothing.
     """
     J = K.J[k]
-    for r in range(S.row_i.shape[0]):
+    for r in range(S.rows.law.shape[0]):
         for e in range(S.row_p[r], S.row_p[r + 1]):
             g = W.G[e]
             J[P.first[ROWS] + e] = g
@@ -319,12 +319,12 @@ def land(t, y, dy, A, K):
 def as_modes_are(A):
     """Tell the residuals the present modes and ways, and which rows restrain positions: between steps they stay."""
     S, W, WC, P = A[S_], A[W_], A[WC_], A[PLAN]
-    for s in range(S.switch_i.shape[0]):
+    for s in range(S.switches.row.shape[0]):
         for m in range(W.switch.shape[0]):
             WC.switch[m, s] = complex(W.switch[m, s], 0.0)
         m = way_of(S, W, s)
         WC.sensed[VALUE, m] = complex(W.sensed[VALUE, m], 0.0)
-        r = S.switch_i[s, SWITCH_ROW]
+        r = S.switches.row[s]
         if r >= 0:
             P.valued[r] = 0 if W.switch[MODE, s] == STEADY else P.holonomic[r]
 

@@ -98,17 +98,17 @@ def bare(address, S, W, R, clock, sheet, B, P):
     status = call(address, S, W, R, clock, sheet, MOTION)
     for d in range(W.vel.shape[1]):
         B.free[d] = W.vel[X_SOLVED, d]
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         B.loaded[k] = W.row[LAM, k]
     if status != 0:
         return status
     for i in range(B.which.shape[0]):
         respond(address, S, W, R, clock, sheet, B, i)
     for i in range(B.which.shape[0]):
-        m = S.switch_i[B.which[i], SWITCH_MEASURED]
+        m = S.switches.measured[B.which[i]]
         size = magnitude(W.sensed[BIAS, m])
         P.b[i] = B.sign[i] * (W.sensed[BIAS, m] + along(S, W, m, B.free))
-        r = S.row_i.shape[0] + m
+        r = S.rows.law.shape[0] + m
         for e in range(S.row_p[r], S.row_p[r + 1]):
             size += magnitude(W.G[e] * B.free[S.col_i[e]])
         P.grain[i] = GRAIN * size
@@ -124,7 +124,7 @@ def bare(address, S, W, R, clock, sheet, B, P):
 def along(S, W, m, a):
     """Gradient of measured quantity m times a."""
     s = 0.0
-    r = S.row_i.shape[0] + m
+    r = S.rows.law.shape[0] + m
     for e in range(S.row_p[r], S.row_p[r + 1]):
         s += W.G[e] * a[S.col_i[e]]
     return s
@@ -133,11 +133,11 @@ def along(S, W, m, a):
 @formula
 def respond(address, S, W, R, clock, sheet, B, i):
     """Response of row i."""
-    nv, nr = W.vel.shape[1], S.row_i.shape[0]
+    nv, nr = W.vel.shape[1], S.rows.law.shape[0]
     out = sheet.rows
     for d in range(out.shape[1]):
         out[0, d] = out[1, d] = 0.0
-    r = nr + S.switch_i[B.which[i], SWITCH_MEASURED]
+    r = nr + S.switches.measured[B.which[i]]
     for e in range(S.row_p[r], S.row_p[r + 1]):
         out[0, S.col_i[e]] += B.sign[i] * W.G[e]
     call(address, S, W, R, clock, sheet, SOLVE)
@@ -150,8 +150,8 @@ def respond(address, S, W, R, clock, sheet, B, i):
 @formula
 def held_by(S, W, t, B, i, load):
     """What friction of row i holds, or slides with, under a load; of an impulse what it adds to no load."""
-    k = S.switch_i[B.which[i], SWITCH_FORCE]
-    x = W.sensed[VALUE, S.force_i[k, FORCE_F]]
+    k = S.switches.force[B.which[i]]
+    x = W.sensed[VALUE, S.forces.F[k]]
     first = law(S, W, k, 0, (t, x, B.rate[i]))
     kind, par = kind_of(S, k), wide(S.force_x, k)
     if B.asks[IMPULSES] == OF_A_STEP:
@@ -167,15 +167,15 @@ def held_by(S, W, t, B, i, load):
 @formula
 def load_of(S, W, i, B):
     """Load of row i's friction by the multipliers in W; 0 if none."""
-    k = S.switch_i[B.which[i], SWITCH_FORCE]
-    n = S.force_i[k, FORCE_LOAD]
+    k = S.switches.force[B.which[i]]
+    n = S.forces.load[k]
     return W.sensed[RETURNED, n] if n >= 0 else 0.0
 
 
 @formula
 def carry(S, W, B, P, j, more):
     """Multipliers of all rows under the impulses of P, that of row j being ``more``."""
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         s = B.loaded[k]
         for i in range(B.which.shape[0]):
             s += (P.x[i] + (more if i == j else 0.0)) * B.L[i, k]
@@ -209,7 +209,7 @@ def reaches(S, W, t, B, P):
             P.const[i] = held_by(S, W, t, B, i, load_of(S, W, i, B))
             for j in range(n):
                 P.gain[i, j] = 0.0
-            follows = follows or S.force_i[S.switch_i[B.which[i], SWITCH_FORCE], FORCE_LOAD] >= 0
+            follows = follows or S.forces.load[S.switches.force[B.which[i]]] >= 0
     if not follows:
         return False
     for i in range(n):
@@ -235,7 +235,7 @@ def balanced(S, W, t, B, P):
     n, loads = B.which.shape[0], False
     for i in range(n):
         P.x[i] = 0.0
-        loads = loads or (B.way[i] != 0.0 and S.force_i[S.switch_i[B.which[i], SWITCH_FORCE], FORCE_LOAD] >= 0)
+        loads = loads or (B.way[i] != 0.0 and S.forces.load[S.switches.force[B.which[i]]] >= 0)
     if loads and B.asks[IMPULSES] != FORCES:  # without impulses loads have no slope: begin with what would hold
         for i in range(n):
             if B.way[i] != 0.0:
@@ -288,15 +288,15 @@ def relaxed(S, W, t, B, P):
 @formula
 def look(S, W, y, B):
     """Value, rate, and rounding of the rate, of the quantities of B's switches, into ``now``, ``rate``, ``seen``."""
-    nq, most = S.kinds[COORDINATES], 0.0
+    nq, most = S.coordinates[0], 0.0
     for d in range(W.vel.shape[1]):
         most = max(most, magnitude(y[nq + d]))
     for i in range(B.which.shape[0]):
-        m = S.switch_i[B.which[i], SWITCH_MEASURED]
+        m = S.switches.measured[B.which[i]]
         B.now[i] = B.rate[i] = B.seen[i] = 0.0
         if m >= 0:
             B.now[i], B.rate[i] = W.sensed[VALUE, m], W.sensed[RATE, m]
-            r = S.row_i.shape[0] + m
+            r = S.rows.law.shape[0] + m
             for e in range(S.row_p[r], S.row_p[r + 1]):
                 B.seen[i] += magnitude(W.G[e]) * (STILL * magnitude(y[nq + S.col_i[e]]) + SILENT * most)
 

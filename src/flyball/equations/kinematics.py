@@ -12,9 +12,9 @@ from .tree import motion, pose
 @formula
 def poses(S, W, q):
     """Positions and rotations of all bodies, parents first, and of the frames on them."""
-    for b in range(S.body_i.shape[0]):
+    for b in range(S.tree.parent.shape[0]):
         pose(S, W, b, q)
-    for k in range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES]):
+    for k in range(S.ground_frames[0], S.moving_frames[0]):
         p, R, _, _, _, _ = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
         store_pose(W.FK, k, p, R)
 
@@ -22,7 +22,7 @@ def poses(S, W, q):
 @formula
 def motions(S, W, v):
     """Velocities and bias accelerations at these poses."""
-    for b in range(S.body_i.shape[0]):
+    for b in range(S.tree.parent.shape[0]):
         motion(S, W, b, v)
     frame_motions(S, W)
 
@@ -30,7 +30,7 @@ def motions(S, W, v):
 @formula
 def frame_motions(S, W):
     """Those of the frames, from their bodies'."""
-    for k in range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES]):
+    for k in range(S.ground_frames[0], S.moving_frames[0]):
         _, _, w, u, alpha, a = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
         store_motion(W.FK, k, w, u, alpha, a)
 
@@ -38,7 +38,7 @@ def frame_motions(S, W):
 @formula
 def frames(S, W):
     """Poses and motions of the frames in one pass."""
-    for k in range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES]):
+    for k in range(S.ground_frames[0], S.moving_frames[0]):
         p, R, w, u, alpha, a = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
         store_pose(W.FK, k, p, R)
         store_motion(W.FK, k, w, u, alpha, a)
@@ -47,7 +47,7 @@ def frames(S, W):
 @formula
 def ground_frames(S, W):
     """Records of the frames on ground, written once."""
-    for k in range(S.kinds[GROUND_FRAMES]):
+    for k in range(S.ground_frames[0]):
         p, R, w, v, alpha, a = at_rest(load3(S.frame_x, k, 0), load9(S.frame_x, k, 3), 0.0 * S.frame_x[k, 0])
         store_pose(W.FK, k, p, R)
         store_motion(W.FK, k, w, v, alpha, a)

@@ -44,11 +44,11 @@ SLOW = 1e-9  # lengths of the mechanism, at its own rate: slower is at rest
 @formula
 def inertial(S, W):
     """Gravity less the inertial wrench at vdot = 0: f = m (g - a), t = -(I alpha + w x I w), about the mass centre."""
-    gravity = (S.glob[0], S.glob[1], S.glob[2])
-    for b in range(S.body_i.shape[0]):
-        put3(W.FB, b, 0, scale(S.body_x[b, MASS], sub(gravity, load3(W.BK, b, 21))))
+    gravity = (S.gravity[0], S.gravity[1], S.gravity[2])
+    for b in range(S.tree.parent.shape[0]):
+        put3(W.FB, b, 0, scale(S.bodies.mass[b], sub(gravity, load3(W.BK, b, 21))))
         R = load9(W.BK, b, 3)
-        t = euler(load9(S.body_x, b, INERTIA), mtv(R, load3(W.BK, b, 12)), mtv(R, load3(W.BK, b, 18)))
+        t = euler(load9(S.bodies.inertia, b, 0), mtv(R, load3(W.BK, b, 12)), mtv(R, load3(W.BK, b, 18)))
         put3(W.FB, b, 3, neg(mv(R, t)))
 
 
@@ -76,7 +76,7 @@ def act(W, b, sign, force, torque, point):
 @formula
 def law(S, W, k, slot, x):
     """Value of one of the element's laws for the inputs x = (t, a, b); zero where there is none."""
-    at = S.force_i[k, FORCE_LAW + slot]
+    at = S.forces.laws[k, slot]
     if at < 0:
         return 0.0 * x[0]
     return evaluate(S.code, S.const, at, W.stack, x, W.sensed)
@@ -109,8 +109,8 @@ def wide(T, k):
 def acting(S, W, t, k):
     """Records of frames F and M of force k between frames, and its wrench on M about M's origin."""
     kind = kind_of(S, k)
-    F = load(W.FK, S.force_i[k, FORCE_F])
-    M = load(W.FK, S.force_i[k, FORCE_M])
+    F = load(W.FK, S.forces.F[k])
+    M = load(W.FK, S.forces.M[k])
     par = wide(S.force_x, k)
     a, b = inputs(kind, par, F, M)
     x = (t + 0.0 * a, a, b)
@@ -121,18 +121,18 @@ def acting(S, W, t, k):
 @formula
 def forces(S, W, t, work):
     """Apply every force between frames to its bodies; the power of accounted ones goes to their work state."""
-    for k in range(S.force_i.shape[0]):
-        if S.force_i[k, FORCE_ALONG] != BETWEEN:
+    for k in range(S.forces.F.shape[0]):
+        if S.forces.family[k] != BETWEEN:
             continue
-        i = S.force_i[k, FORCE_F]
-        j = S.force_i[k, FORCE_M]
+        i = S.forces.F[k]
+        j = S.forces.M[k]
         F, M, force, torque = acting(S, W, t, k)
         if S.frame_i[j] >= 0:
             act(W, S.frame_i[j], 1.0, force, torque, M[0])
         if S.frame_i[i] >= 0:
             act(W, S.frame_i[i], -1.0, force, torque, M[0])
-        if S.force_i[k, FORCE_WORK] >= 0:
-            work[S.force_i[k, FORCE_WORK]] = power(F, M, force, torque)
+        if S.forces.work[k] >= 0:
+            work[S.forces.work[k]] = power(F, M, force, torque)
 
 
 @formula
@@ -151,7 +151,7 @@ def at_rest(S):
 @formula
 def way(S, W, k, rate):
     """Which way what force k acts along slides: as its switch says, where there is none by the sign of the rate."""
-    s = S.force_i[k, FORCE_SWITCH]
+    s = S.forces.switch[k]
     if s < 0:
         return sign(rate)
     told = W.sensed[VALUE, way_of(S, W, s)]
@@ -163,11 +163,11 @@ def way(S, W, k, rate):
 @formula
 def effort_of(S, W, t, k):
     """Force k along a measured quantity, and the rate of that."""
-    m = S.force_i[k, FORCE_F]
+    m = S.forces.F[k]
     x = W.sensed[VALUE, m]
     rate = W.sensed[RATE, m]
     o = 0.0 * x
-    pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else o
+    pressed = W.sensed[LOAD, S.forces.load[k]] if S.forces.load[k] >= 0 else o
     laws = (law(S, W, k, 0, (t + o, x, rate)), o, way(S, W, k, rate))
     return effort(kind_of(S, k), wide(S.force_x, k), x, rate, laws, pressed), rate
 
@@ -175,17 +175,17 @@ def effort_of(S, W, t, k):
 @formula
 def efforts(S, W, t, work, f):
     """Add every force along a measured quantity to the generalised forces ``f``; accounted ones as in ``forces``."""
-    for k in range(S.force_i.shape[0]):
-        if S.force_i[k, FORCE_ALONG] != ALONG:
-            if S.force_i[k, FORCE_ALONG] == SLIDING:
+    for k in range(S.forces.F.shape[0]):
+        if S.forces.family[k] != ALONG:
+            if S.forces.family[k] == SLIDING:
                 slide(S, W, k, work, f)
             continue
         s, rate = effort_of(S, W, t, k)
-        r = S.row_i.shape[0] + S.force_i[k, FORCE_F]
+        r = S.rows.law.shape[0] + S.forces.F[k]
         for e in range(S.row_p[r], S.row_p[r + 1]):
             f[S.col_i[e]] += s * W.G[e]
-        if S.force_i[k, FORCE_WORK] >= 0:
-            work[S.force_i[k, FORCE_WORK]] = s * rate
+        if S.forces.work[k] >= 0:
+            work[S.forces.work[k]] = s * rate
 
 
 @formula
@@ -193,11 +193,11 @@ def gather(S, W, f):
     """Generalised forces: the backward sweep of body wrenches, children to parents."""
     for d in range(f.shape[0]):
         f[d] = 0.0
-    for b in range(S.body_i.shape[0] - 1, -1, -1):
+    for b in range(S.tree.parent.shape[0] - 1, -1, -1):
         force = load3(W.FB, b, 0)
         torque = load3(W.FB, b, 3)
         point = load3(W.BK, b, 0)
-        if S.body_i[b, NV] > 0:
-            project(S, W, b, f, S.body_i[b, V0], 1.0, force, torque, point)
-        if S.body_i[b, PARENT] >= 0:
-            act(W, S.body_i[b, PARENT], 1.0, force, torque, point)
+        if S.tree.nv[b] > 0:
+            project(S, W, b, f, S.tree.v[b], 1.0, force, torque, point)
+        if S.tree.parent[b] >= 0:
+            act(W, S.tree.parent[b], 1.0, force, torque, point)

@@ -68,10 +68,10 @@ def turned(R, I):
 @formula
 def rigid(S, W, b):
     """Mass, first moment and inertia of body b about W.O[b]."""
-    m = S.body_x[b, MASS]
+    m = S.bodies.mass[b]
     if m == 0.0:
         return m, (m, m, m), (m, m, m, m, m, m)
-    J = turned(load9(W.BK, b, 3), load9(S.body_x, b, INERTIA))
+    J = turned(load9(W.BK, b, 3), load9(S.bodies.inertia, b, 0))
     r = sub(load3(W.BK, b, 0), load3(W.O, b, 0))
     return m, scale(m, r), shifted(J, scale(0.5 * m, r), r)
 
@@ -96,11 +96,11 @@ def shifted(J, e, d):
 @formula
 def root_columns(S, W, b):
     """Twist columns of body b into W.X, where those of all others stand, if it is a root: FREE, PLANAR or POINT."""
-    if S.body_i[b, TREE] <= POINT:
-        for k in range(S.body_i[b, NV]):
+    if S.tree.joint[b] <= POINT:
+        for k in range(S.tree.nv[b]):
             w, v = column(S, W, b, k)
-            put3(W.X, S.body_i[b, V0] + k, 0, w)
-            put3(W.X, S.body_i[b, V0] + k, 3, v)
+            put3(W.X, S.tree.v[b] + k, 0, w)
+            put3(W.X, S.tree.v[b] + k, 3, v)
 
 
 @formula
@@ -109,7 +109,7 @@ def composite(S, W):
     the one of the root's parent.
     """
     C = W.IC
-    n = S.body_i.shape[0]
+    n = S.tree.parent.shape[0]
     for b in range(n):
         root_columns(S, W, b)
         m, h, J = rigid(S, W, b)
@@ -117,7 +117,7 @@ def composite(S, W):
         put3(C, b, 1, h)
         put6(C, b, 4, J)
     for b in range(n - 1, -1, -1):
-        a = S.body_i[b, PARENT]
+        a = S.tree.parent[b]
         if a >= 0:
             m, h = C[b, 0], load3(C, b, 1)
             d = sub(load3(W.O, b, 0), load3(W.O, a, 0))
@@ -138,23 +138,23 @@ def mass_entries(S, W):
     composite(S, W)
     C = W.IC
     e = 0
-    for b in range(S.body_i.shape[0]):
+    for b in range(S.tree.parent.shape[0]):
         h = load3(C, b, 1)
-        for d in range(S.body_i[b, V0], S.body_i[b, V0] + S.body_i[b, NV]):
+        for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
             w, v = load3(W.X, d, 0), load3(W.X, d, 3)
             force = cross(w, h)
             moment = symmetric(load6(C, b, 4), w)
-            if S.body_i[b, TREE] != REVOLUTE:
+            if S.tree.joint[b] != REVOLUTE:
                 force, moment = add(force, scale(C[b, 0], v)), add(moment, cross(h, v))
             a = b
             while a >= 0:
-                a0 = S.body_i[a, V0]
-                if S.body_i[a, TREE] == REVOLUTE:
+                a0 = S.tree.v[a]
+                if S.tree.joint[a] == REVOLUTE:
                     W.M[e] = dot(load3(W.X, a0, 0), moment)
                     e += 1
                 else:
-                    for i in range(a0, min(a0 + S.body_i[a, NV], d + 1)):
+                    for i in range(a0, min(a0 + S.tree.nv[a], d + 1)):
                         W.M[e] = dot(load3(W.X, i, 0), moment) + dot(load3(W.X, i, 3), force)
                         e += 1
                 moment = add(moment, cross(load3(C, a, 10), force))
-                a = S.body_i[a, PARENT]
+                a = S.tree.parent[a]

@@ -90,16 +90,16 @@ def astray(S, W, t, q, v):
     They come from the derivatives of the laws: where these are not the whole truth, a law jumps.
     """
     worst = 0.0
-    for b in range(S.body_i.shape[0]):
-        law = S.body_i[b, BODY_LAW]
+    for b in range(S.tree.parent.shape[0]):
+        law = S.tree.law[b]
         if law >= 0:
             f, f1, _ = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
-            way = f - S.body_x[b, OFFSET] - q[S.body_i[b, Q0]]
-            size = S.glob[LENGTH]
-            if S.body_i[b, TREE] == REVOLUTE:  # its whole turns are the law's own
+            way = f - S.bodies.offset[b] - q[S.tree.q[b]]
+            size = S.length[0]
+            if S.tree.joint[b] == REVOLUTE:  # its whole turns are the law's own
                 way = atan2(sin(way), cos(way))
                 size = 0.0 * size + 1.0
-            rate = magnitude(f1 - v[S.body_i[b, V0]]) / (size * S.glob[TEMPO] + magnitude(f1))
+            rate = magnitude(f1 - v[S.tree.v[b]]) / (size * S.rate[0] + magnitude(f1))
             worst = max(worst, magnitude(way) / size, rate)
     return worst
 
@@ -107,20 +107,20 @@ def astray(S, W, t, q, v):
 @formula
 def accelerate(S, W, t, p, dy, factored):
     """Dy at the settled state p, whose kinematics and rows are in W; vdot and lam are left in W. Returns a status."""
-    nq = S.kinds[COORDINATES]
+    nq = S.coordinates[0]
     nv = W.vel.shape[1]
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
     if W.option[STABILIZE] == BAUMGARTE:
         a = 2.0 * W.option[ALPHA]
         b = W.option[BETA] * W.option[BETA]
-        for k in range(S.row_i.shape[0]):
+        for k in range(S.rows.law.shape[0]):
             W.row[GAMMA, k] -= a * (row_times(S, W, k, v) - W.row[NU, k]) + b * W.row[G_VALUE, k]
     if W.option[PARTED] > 0.0:  # from here on with the masses
         W.option[PARTED] = 0.0
         factored = OLD
     if factored == NEAR:
-        if S.kinds[SOLVER] == SCHUR:
+        if S.solver[0] == SCHUR:
             reuse(S, W)
         else:
             factored = OLD  # M is another one here
@@ -142,7 +142,7 @@ def balance(S, W, t, p, work, factored):
     # joints with friction need the solution to know their loads: again until these return themselves
     most = 2 * tries(W)
     for attempt in range(most):
-        control(S, W, t, p[S.kinds[COORDINATES] + W.vel.shape[1] :], work)
+        control(S, W, t, p[S.coordinates[0] + W.vel.shape[1] :], work)
         loaded(S, W, t, p, work)
         if (
             factored == OLD
@@ -153,7 +153,7 @@ def balance(S, W, t, p, work, factored):
                 return SINGULAR, factored
             factored = HERE
             solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
-        if S.load_i.shape[0] == 0:
+        if S.load_terms.load.shape[0] == 0:
             break
         last = change
         change = returned(S, W)
@@ -181,7 +181,7 @@ def loaded(S, W, t, p, work):
 @formula
 def finish(S, W, t, p, dy):
     """Dy at the state p from the solution in W. Returns a status."""
-    nq = S.kinds[COORDINATES]
+    nq = S.coordinates[0]
     nv = W.vel.shape[1]
     x = W.vel[X_SOLVED]
     v = p[nq : nq + nv]
@@ -192,13 +192,13 @@ def finish(S, W, t, p, dy):
     rates(S, p, v, dy)
     for d in range(nv):
         dy[nq + d] = x[d]
-    for k in range(S.row_i.shape[0]):
-        if S.row_i[k, ROW_WORK] >= 0:
-            work[S.row_i[k, ROW_WORK]] = W.row[LAM, k] * W.row[NU, k]
-    for b in range(S.body_i.shape[0]):
-        if S.body_i[b, BODY_LAW] >= 0:
-            d = S.body_i[b, V0]
-            work[S.body_i[b, BODY_WORK]] = W.vel[EFFORT, d] * v[d]
+    for k in range(S.rows.law.shape[0]):
+        if S.rows.work[k] >= 0:
+            work[S.rows.work[k]] = W.row[LAM, k] * W.row[NU, k]
+    for b in range(S.tree.parent.shape[0]):
+        if S.tree.law[b] >= 0:
+            d = S.tree.v[b]
+            work[S.tree.work[b]] = W.vel[EFFORT, d] * v[d]
     progress(S, W, p[nq + nv :], work)
     readings(S, W, t)
     W.info[STATUS] = finite(dy)
@@ -229,7 +229,7 @@ def finite(dy):
 @formula
 def derivative(t, y, dy, S, W):
     """dy/dt = f(P(y)) with P the projection; ``y`` is left as it is. Returns 0 or a status."""
-    nq = S.kinds[COORDINATES]
+    nq = S.coordinates[0]
     p = W.y[0]
     for i in range(y.shape[0]):
         p[i] = y[i]
@@ -252,7 +252,7 @@ def derivative(t, y, dy, S, W):
 @formula
 def arrive(t, y, dy, S, W):
     """Project the state y in place, to rounding, and evaluate there. Returns (0 or status, relative violation)."""
-    nq = S.kinds[COORDINATES]
+    nq = S.coordinates[0]
     q = y[:nq]
     v = y[nq : nq + W.vel.shape[1]]
     z = y[nq + W.vel.shape[1] :]
@@ -264,11 +264,11 @@ def arrive(t, y, dy, S, W):
         W.stack[fault, 0] = -W.stack[fault, 0]
     prepare(S, W, t, q, v)
     if W.option[STABILIZE] >= STEPS:
-        status, found, factored = settle(S, W, t, q, v, z, TIGHT_G * S.glob[LENGTH], TIGHT_V)
+        status, found, factored = settle(S, W, t, q, v, z, TIGHT_G * S.length[0], TIGHT_V)
         if status != 0:
             W.info[STATUS] = status
             return status, found
-        found = max(0.0, found - rounding(S, W, q) / S.glob[LENGTH])
+        found = max(0.0, found - rounding(S, W, q) / S.length[0])
         if W.option[PARTED] > 0.0:
             exchange(S, W)
     else:
@@ -294,10 +294,10 @@ def report(t, y, out, S, W):
 @formula
 def write_row(t, y, out, S, W):
     """Write t, the state y that W was last evaluated at, vdot, lam and the efforts of prescribed coordinates."""
-    nq = S.kinds[COORDINATES]
+    nq = S.coordinates[0]
     nv = W.vel.shape[1]
     ny = y.shape[0]
-    if S.row_i.shape[0] > 0:
+    if S.rows.law.shape[0] > 0:
         W.option[WORST_G] = max(W.option[WORST_G], violation(W, W.row[R2]))
         W.option[WORST_V] = max(W.option[WORST_V], drift(S, W, y[nq : nq + nv], W.row[R2])[0])
     out[0] = t
@@ -306,10 +306,10 @@ def write_row(t, y, out, S, W):
     for d in range(nv):
         out[1 + ny + d] = W.vel[X_SOLVED, d]
     to = 1 + ny + nv
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         out[to + k] = W.row[LAM, k]
-    to += S.row_i.shape[0]
-    for b in range(S.body_i.shape[0]):
-        if S.body_i[b, BODY_LAW] >= 0:
-            out[to] = W.vel[EFFORT, S.body_i[b, V0]]
+    to += S.rows.law.shape[0]
+    for b in range(S.tree.parent.shape[0]):
+        if S.tree.law[b] >= 0:
+            out[to] = W.vel[EFFORT, S.tree.v[b]]
             to += 1

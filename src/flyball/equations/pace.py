@@ -11,13 +11,13 @@ from .rows import measured
 @formula
 def own_speed(S):
     """The mechanism's length at its own rate [m/s]."""
-    return S.glob[LENGTH] * S.glob[TEMPO]
+    return S.length[0] * S.rate[0]
 
 
 @formula
 def pace(S, m):
     """The same for quantity m, whose unit may be a radian."""
-    return S.glob[UNIT + m] * S.glob[TEMPO]
+    return S.units[m] * S.rate[0]
 
 
 @formula

@@ -31,7 +31,7 @@ def pushes(S, W, out):
         out[i] = 0.0
     inertial(S, W)
     at = 0
-    for b in range(S.body_i.shape[0]):
+    for b in range(S.tree.parent.shape[0]):
         at = spread(S, W, b, out, at, -1.0, load3(W.FB, b, 0), load3(W.FB, b, 3), load3(W.BK, b, 0))
     return at
 
@@ -43,23 +43,23 @@ def parts(S, W, t, lam, out):
     Bodies; of each force between frames the side of M, then that of F; rows; forces along what is measured.
     """
     at = pushes(S, W, out)
-    for k in range(S.force_i.shape[0]):
-        if S.force_i[k, FORCE_ALONG] == BETWEEN:
+    for k in range(S.forces.F.shape[0]):
+        if S.forces.family[k] == BETWEEN:
             _, M, force, torque = acting(S, W, t, k)
-            at = spread(S, W, S.frame_i[S.force_i[k, FORCE_M]], out, at, -1.0, force, torque, M[0])
-            at = spread(S, W, S.frame_i[S.force_i[k, FORCE_F]], out, at, 1.0, force, torque, M[0])
-    nr = S.row_i.shape[0]
+            at = spread(S, W, S.frame_i[S.forces.M[k]], out, at, -1.0, force, torque, M[0])
+            at = spread(S, W, S.frame_i[S.forces.F[k]], out, at, 1.0, force, torque, M[0])
+    nr = S.rows.law.shape[0]
     for r in range(nr):
         at = along(S, W, r, -lam[r], out, at)
-    for k in range(S.force_i.shape[0]):
-        if S.force_i[k, FORCE_ALONG] == ALONG:
+    for k in range(S.forces.F.shape[0]):
+        if S.forces.family[k] == ALONG:
             s, _ = effort_of(S, W, t, k)
-            at = along(S, W, nr + S.force_i[k, FORCE_F], -s, out, at)
-        elif S.force_i[k, FORCE_ALONG] == SLIDING:
+            at = along(S, W, nr + S.forces.F[k], -s, out, at)
+        elif S.forces.family[k] == SLIDING:
             a, b, _ = friction(S, W, k)
-            at = along(S, W, nr + S.force_i[k, FORCE_F], -a, out, at)
-            if S.force_i[k, FORCE_M] >= 0:
-                at = along(S, W, nr + S.force_i[k, FORCE_M], -b, out, at)
+            at = along(S, W, nr + S.forces.F[k], -a, out, at)
+            if S.forces.M[k] >= 0:
+                at = along(S, W, nr + S.forces.M[k], -b, out, at)
     return at
 
 
@@ -68,8 +68,8 @@ def spread(S, W, b, out, at, sign, force, torque, point):
     """A wrench on body b along its velocities, then along those of what it hangs on. Returns the next place."""
     while b >= 0:
         project(S, W, b, out, at, sign, force, torque, point)
-        at += S.body_i[b, NV]
-        b = S.body_i[b, PARENT]
+        at += S.tree.nv[b]
+        b = S.tree.parent[b]
     return at
 
 

@@ -17,10 +17,10 @@ def prepare(S, W, t, q, v):
         run(W.info[MADE + PREPARE], S, W, t, q, v, q, v)
         return
     normalise(S, q)
-    for b in range(S.body_i.shape[0]):
-        law = S.body_i[b, BODY_LAW]
+    for b in range(S.tree.parent.shape[0]):
+        law = S.tree.law[b]
         if law >= 0:
             f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
-            q[S.body_i[b, Q0]] = f - S.body_x[b, OFFSET]
-            v[S.body_i[b, V0]] = f1
-            W.vel[GIVEN, S.body_i[b, V0]] = f2
+            q[S.tree.q[b]] = f - S.bodies.offset[b]
+            v[S.tree.v[b]] = f1
+            W.vel[GIVEN, S.tree.v[b]] = f2

@@ -135,10 +135,10 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     """
     W.option[PARTED] = 1.0 if W.option[STABILIZE] == PARTITIONING else 0.0
     still = W.option[PLACED] > 0.0  # nobody asks for accelerations there
-    if S.row_i.shape[0] == 0 and still and S.angle_i.shape[0] == 0:
+    if S.rows.law.shape[0] == 0 and still and S.angles.F.shape[0] == 0:
         return 0, 0.0, OLD
     place(S, W, t, q, z)
-    if S.row_i.shape[0] == 0:
+    if S.rows.law.shape[0] == 0:
         if not still:
             move(S, W, t, v, z)
         return 0, 0.0, OLD
@@ -158,7 +158,7 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
         found = 0.0
     if not still:
         move(S, W, t, v, z)
-    return 0, max(found / S.glob[LENGTH], lost), factored
+    return 0, max(found / S.length[0], lost), factored
 
 
 @formula
@@ -210,7 +210,7 @@ def steer(S, W, v, tol_v, factored):
     step = W.vel[V3]
     r = W.row[R2]
     worst, size = drift(S, W, v, r)
-    if worst > tol_v * (min(METRE, S.glob[LENGTH]) * S.glob[TEMPO] + size):
+    if worst > tol_v * (min(METRE, S.length[0]) * S.rate[0] + size):
         if factored == NEAR:
             reuse(S, W)
         if factored == OLD or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]:
@@ -230,9 +230,9 @@ def tangent(y, e, S, W):
     Near a singular position rounding is large along what the constraints forbid, and small along what they allow.
     """
     choice = W.option[STABILIZE]
-    if S.row_i.shape[0] == 0 or choice < STEPS or choice == PARTITIONING:
+    if S.rows.law.shape[0] == 0 or choice < STEPS or choice == PARTITIONING:
         return
-    nq = S.kinds[COORDINATES]
+    nq = S.coordinates[0]
     way = W.vel[F_APPLIED]
     if choice != VELOCITIES:
         unrated(S, y, e, way)
@@ -246,9 +246,9 @@ def tangent(y, e, S, W):
 def stay(S, W, v):
     """Take from v what changes the constraints, with the factor in W."""
     r = W.row[R2]
-    for b in range(S.body_i.shape[0]):
-        if S.body_i[b, BODY_LAW] >= 0:
-            v[S.body_i[b, V0]] = 0.0
+    for b in range(S.tree.parent.shape[0]):
+        if S.tree.law[b] >= 0:
+            v[S.tree.v[b]] = 0.0
     for k in range(r.shape[0]):
         r[k] = -row_times(S, W, k, v)
     step = W.vel[V3]

@@ -24,8 +24,8 @@ def readings(S, W, t):
         return
     for m in range(first, column_of(S, W, 0)):
         W.sensed[VALUE, m] = 0.0 * t
-    for x in range(S.load_i.shape[0]):
-        at, what = S.load_i[x, 0], S.load_i[x, 1]
+    for x in range(S.load_terms.load.shape[0]):
+        at, what = S.load_terms.load[x], S.load_terms.term[x]
         if at >= first:
             if what >= 0:
                 through(S, W, at, what)
@@ -49,7 +49,7 @@ def through(S, W, at, what):
 @formula
 def along(S, W, t, what):
     """What a row, a force along a quantity or a driver that prescribes does along its quantity."""
-    nr, nk = S.row_i.shape[0], S.force_i.shape[0]
+    nr, nk = S.rows.law.shape[0], S.forces.F.shape[0]
     if what < nr:
         return W.row[LAM, what]
     if what < nr + nk:

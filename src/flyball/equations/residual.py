@@ -61,9 +61,9 @@ def residuals(S, W, bench, task):
     say, whatever the steps are; with GAPS also, and only g and G v - nu are found. With PARTS the terms of r stand
     behind all others in place of r (`parts`), with PUSHES those of the bodies alone.
     """
-    nq = S.kinds[COORDINATES]
+    nq = S.coordinates[0]
     nv = W.vel.shape[1]
-    nr = S.row_i.shape[0]
+    nr = S.rows.law.shape[0]
     known = nv + 3 * nr + 3 * measured(S)
     behind = known + bench.steps.shape[1] - (3 * nv + 1)
     a = W.vel[V2]
@@ -80,9 +80,9 @@ def residuals(S, W, bench, task):
             p[nq + c - 2 * nv - 1] += bench.steps[n, c]
         if task == ALONG or task == GAPS:
             prepare(S, W, t, p[:nq], p[nq : nq + nv])
-            for b in range(S.body_i.shape[0]):
-                if S.body_i[b, BODY_LAW] >= 0:
-                    a[S.body_i[b, V0]] = W.vel[GIVEN, S.body_i[b, V0]]
+            for b in range(S.tree.parent.shape[0]):
+                if S.tree.law[b] >= 0:
+                    a[S.tree.v[b]] = W.vel[GIVEN, S.tree.v[b]]
         if task == GAPS:
             poses(S, W, p[:nq])
             row_values(S, W, t, p[nq + nv :])
@@ -90,12 +90,12 @@ def residuals(S, W, bench, task):
                 bench.out[n, nv + k] = W.row[G_VALUE, k]
                 bench.out[n, nv + nr + k] = row_times(S, W, k, p[nq : nq + nv]) - W.row[NU, k]
         elif task == PUSHES:
-            for b in range(S.body_i.shape[0]):
+            for b in range(S.tree.parent.shape[0]):
                 pose(S, W, b, p[:nq])
                 accelerated(S, W, b, p[nq : nq + nv], a)
             pushes(S, W, bench.out[n, behind:])
         else:
-            at_once(S, W, t, p, a, task == STEPS or S.mix_i.shape[0] > 0)
+            at_once(S, W, t, p, a, task == STEPS or S.sensor_drivers.row.shape[0] > 0)
             if task == PARTS:
                 missed_by_parts(S, W, t, p, bench.lam, bench.out[n], behind)
             else:
@@ -108,12 +108,12 @@ def residuals(S, W, bench, task):
 @formula
 def residual(S, W, t, p, vdot, lam, out):
     """The residual at one state, by the engine's own loops: no more of its code."""
-    nq = S.kinds[COORDINATES]
+    nq = S.coordinates[0]
     v = p[nq : nq + W.vel.shape[1]]
     z = p[nq + W.vel.shape[1] :]
     poses(S, W, p[:nq])
     row_values(S, W, t, z)
-    for b in range(S.body_i.shape[0]):
+    for b in range(S.tree.parent.shape[0]):
         accelerated(S, W, b, v, vdot)
     frame_motions(S, W)
     row_biases(S, W, t, v, z)  # the bias at true accelerations is the acceleration itself
@@ -123,9 +123,9 @@ def residual(S, W, t, p, vdot, lam, out):
 @formula
 def at_once(S, W, t, p, vdot, whole):
     """The same kinematics and rows in one pass; without accelerations of what is measured unless ``whole``."""
-    nq = S.kinds[COORDINATES]
+    nq = S.coordinates[0]
     v = p[nq : nq + W.vel.shape[1]]
-    for b in range(S.body_i.shape[0]):
+    for b in range(S.tree.parent.shape[0]):
         pose(S, W, b, p[:nq])
         accelerated(S, W, b, v, vdot)
     frames(S, W)
@@ -135,9 +135,9 @@ def at_once(S, W, t, p, vdot, whole):
 @formula
 def missed(S, W, t, p, lam, out):
     """What the equations miss with these multipliers, kinematics and rows being known."""
-    nq = S.kinds[COORDINATES]
+    nq = S.coordinates[0]
     nv = W.vel.shape[1]
-    nr = S.row_i.shape[0]
+    nr = S.rows.law.shape[0]
     v = p[nq : nq + nv]
     for k in range(nr):
         out[nv + k] = W.row[G_VALUE, k]
@@ -164,8 +164,8 @@ def missed(S, W, t, p, lam, out):
 @formula
 def missed_by_parts(S, W, t, p, lam, out, first):
     """G v - nu, and from ``first`` on the terms of r."""
-    nv, nr = W.vel.shape[1], S.row_i.shape[0]
-    v = p[S.kinds[COORDINATES] : S.kinds[COORDINATES] + nv]
+    nv, nr = W.vel.shape[1], S.rows.law.shape[0]
+    v = p[S.coordinates[0] : S.coordinates[0] + nv]
     for k in range(nr):
         out[nv + nr + k] = row_times(S, W, k, v) - W.row[NU, k]
     told(S, W, t, p, lam)
@@ -175,20 +175,20 @@ def missed_by_parts(S, W, t, p, lam, out, first):
 @formula
 def told(S, W, t, p, lam):
     """What forces are told besides motions: multipliers, loads of joints, states of controllers."""
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         W.row[LAM, k] = lam[k]
     reaction_loads(S, W)
     for n in range(2 * measured(S), loads_end(S, W)):
         W.sensed[LOAD, n] = W.sensed[RETURNED, n]
-    control(S, W, t, p[S.kinds[COORDINATES] + W.vel.shape[1] :], W.y[1])
+    control(S, W, t, p[S.coordinates[0] + W.vel.shape[1] :], W.y[1])
 
 
 @formula
 def accelerated(S, W, b, v, vdot):
     """Velocity and true acceleration of body b at its pose in W, its parent's being known."""
     motion(S, W, b, v)
-    kind = S.body_i[b, TREE]
-    v0 = S.body_i[b, V0]
+    kind = S.tree.joint[b]
+    v0 = S.tree.v[b]
     alpha = load3(W.BK, b, 18)
     a = load3(W.BK, b, 21)
     if kind == PLANAR:
@@ -199,7 +199,7 @@ def accelerated(S, W, b, v, vdot):
         alpha = add(alpha, mv(load9(W.BK, b, 3), (vdot[v0 + 3], vdot[v0 + 4], vdot[v0 + 5])))
     else:
         arm = sub(load3(W.BK, b, 0), load3(W.O, b, 0))
-        for k in range(S.body_i[b, NV]):
+        for k in range(S.tree.nv[b]):
             x, u = column(S, W, b, k)
             turn = scale(vdot[v0 + k], x)
             alpha = add(alpha, turn)

@@ -58,24 +58,24 @@ def parameters(T, k):
 @formula
 def measured(S):
     """Number of measured quantities."""
-    return S.row_p.shape[0] - 1 - S.row_i.shape[0]
+    return S.row_p.shape[0] - 1 - S.rows.law.shape[0]
 
 
 @formula
 def carried(S, W, k):
     """What the multiplier of term k's row does through it: (force, torque) on its second body, about M's origin."""
-    c = W.row[LAM, S.term_i[k, TERM_ROW]] * S.term_x[k, COEFFICIENT]
+    c = W.row[LAM, S.terms.row[k]] * S.term_x[k, COEFFICIENT]
     return scale(c, load3(W.T, k, 0)), scale(c, load3(W.T, k, 3))
 
 
 @formula
 def on_second(S, W, what):
     """The same on the second body of the term's joint, about its point there; see `tables.terms.on_second`."""
-    nt = S.term_i.shape[0]
+    nt = S.terms.row.shape[0]
     k = what if what < nt else what - nt
     force, torque = carried(S, W, k)
     if what >= nt:  # told of the other body, at the other frame: the reverse of both, about this one
-        arm = sub(load3(W.FK, S.term_i[k, TERM_M], 0), load3(W.FK, S.term_i[k, TERM_F], 0))
+        arm = sub(load3(W.FK, S.terms.M[k], 0), load3(W.FK, S.terms.F[k], 0))
         return neg(force), neg(add(torque, cross(arm, force)))
     return force, torque
 
@@ -94,7 +94,7 @@ def begin(S, W):
 @formula
 def hint_of(S, z, k, o):
     """The state that term k leans on to tell whole turns, or its place on a curve; zero if it needs none."""
-    h = S.term_i[k, TERM_HINT]
+    h = S.terms.hint[k]
     return z[h] if h >= 0 else o
 
 
@@ -102,8 +102,8 @@ def hint_of(S, z, k, o):
 def add_value(S, W, k, g, force, torque_M, torque_F, from_F, from_M):
     """Add term k, of which F and M are at the given points, to its row or measured quantity."""
     c = S.term_x[k, COEFFICIENT]
-    r = S.term_i[k, TERM_ROW]
-    nr = S.row_i.shape[0]
+    r = S.terms.row[k]
+    nr = S.rows.law.shape[0]
     if r < nr:
         W.row[G_VALUE, r] += c * g
     else:
@@ -111,18 +111,18 @@ def add_value(S, W, k, g, force, torque_M, torque_F, from_F, from_M):
     if W.T.shape[0] > 0:
         put3(W.T, k, 0, force)
         put3(W.T, k, 3, torque_M)
-    for s in range(S.term_i[k, TERM_SEG], S.term_i[k, TERM_SEG_END]):
-        if S.seg_i[s, 1] > 0:
-            project(S, W, S.seg_i[s, 0], W.G, S.seg_i[s, 2], c, force, torque_M, from_M)
+    for s in range(S.terms.segment[k], S.terms.segment_end[k]):
+        if S.segments.side[s] > 0:
+            project(S, W, S.segments.body[s], W.G, S.segments.entry[s], c, force, torque_M, from_M)
         else:
-            project(S, W, S.seg_i[s, 0], W.G, S.seg_i[s, 2], c, neg(force), torque_F, from_F)
+            project(S, W, S.segments.body[s], W.G, S.segments.entry[s], c, neg(force), torque_F, from_F)
 
 
 @formula
 def add_bias(S, W, k, bias):
     """Take term k's acceleration bias from its row's gamma, or add it to its measured quantity."""
-    r = S.term_i[k, TERM_ROW]
-    nr = S.row_i.shape[0]
+    r = S.terms.row[k]
+    nr = S.rows.law.shape[0]
     if r < nr:
         W.row[GAMMA, r] -= S.term_x[k, COEFFICIENT] * bias
     else:
@@ -133,8 +133,8 @@ def add_bias(S, W, k, bias):
 def each_value(S, W, z, kind, row):
     """Add every term of one kind to its row: value and Jacobian entries, from the poses."""
     for k in range(S.kinds[kind], S.kinds[kind + 1]):
-        F = load(W.FK, S.term_i[k, TERM_F])
-        M = load(W.FK, S.term_i[k, TERM_M])
+        F = load(W.FK, S.terms.F[k])
+        M = load(W.FK, S.terms.M[k])
         hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
         g, force, torque_M, torque_F, _ = row(parameters(S.term_x, k), F, M, hint, S.const)
         add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
@@ -144,8 +144,8 @@ def each_value(S, W, z, kind, row):
 def each_bias(S, W, z, kind, row):
     """Take every term's acceleration bias of one kind from its row's gamma; add it to its measured quantity."""
     for k in range(S.kinds[kind], S.kinds[kind + 1]):
-        F = load(W.FK, S.term_i[k, TERM_F])
-        M = load(W.FK, S.term_i[k, TERM_M])
+        F = load(W.FK, S.terms.F[k])
+        M = load(W.FK, S.terms.M[k])
         hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
         _, _, _, _, bias = row(parameters(S.term_x, k), F, M, hint, S.const)
         add_bias(S, W, k, bias)
@@ -155,12 +155,12 @@ def each_bias(S, W, z, kind, row):
 def each_row(S, W, z, whole, kind, row):
     """``each_value`` and ``each_bias`` in one; what is measured has no bias unless ``whole``."""
     for k in range(S.kinds[kind], S.kinds[kind + 1]):
-        F = load(W.FK, S.term_i[k, TERM_F])
-        M = load(W.FK, S.term_i[k, TERM_M])
+        F = load(W.FK, S.terms.F[k])
+        M = load(W.FK, S.terms.M[k])
         hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
         g, force, torque_M, torque_F, bias = row(parameters(S.term_x, k), F, M, hint, S.const)
         add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
-        if whole or S.term_i[k, TERM_ROW] < S.row_i.shape[0]:
+        if whole or S.terms.row[k] < S.rows.law.shape[0]:
             add_bias(S, W, k, bias)
 
 
@@ -169,8 +169,8 @@ def rare_values(S, W, z, first, last, row):
     """``each_value`` for kinds that share one loop, ``row(kind, par, F, M, hint, data)``: less to compile."""
     for kind in range(first, last):
         for k in range(S.kinds[kind], S.kinds[kind + 1]):
-            F = load(W.FK, S.term_i[k, TERM_F])
-            M = load(W.FK, S.term_i[k, TERM_M])
+            F = load(W.FK, S.terms.F[k])
+            M = load(W.FK, S.terms.M[k])
             hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
             g, force, torque_M, torque_F, _ = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
             add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
@@ -181,8 +181,8 @@ def rare_biases(S, W, z, first, last, row):
     """``each_bias`` for kinds that share one loop."""
     for kind in range(first, last):
         for k in range(S.kinds[kind], S.kinds[kind + 1]):
-            F = load(W.FK, S.term_i[k, TERM_F])
-            M = load(W.FK, S.term_i[k, TERM_M])
+            F = load(W.FK, S.terms.F[k])
+            M = load(W.FK, S.terms.M[k])
             hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
             _, _, _, _, bias = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
             add_bias(S, W, k, bias)
@@ -193,8 +193,8 @@ def rare_rows(S, W, z, first, last, row):
     """``each_row`` for kinds that share one loop, biases always."""
     for kind in range(first, last):
         for k in range(S.kinds[kind], S.kinds[kind + 1]):
-            F = load(W.FK, S.term_i[k, TERM_F])
-            M = load(W.FK, S.term_i[k, TERM_M])
+            F = load(W.FK, S.terms.F[k])
+            M = load(W.FK, S.terms.M[k])
             hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
             g, force, torque_M, torque_F, bias = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
             add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
@@ -205,7 +205,7 @@ def rare_rows(S, W, z, first, last, row):
 def begin_rows(S, W):
     """Start rows and measured quantities, their biases too, from nothing."""
     begin(S, W)
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         W.row[GAMMA, k] = 0.0
     for m in range(measured(S)):
         W.sensed[BIAS, m] = 0.0
@@ -216,7 +216,7 @@ def end_rows(S, W, t, v):
     """Laws of time, rates of the measured quantities, and gamma of the laws."""
     end(S, W, t)
     rates(S, W, v)
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         W.row[GAMMA, k] += W.row[NU_DOT, k]
     end_biases(S, W, t)
 
@@ -224,36 +224,36 @@ def end_rows(S, W, t, v):
 @formula
 def end(S, W, t):
     """Take the laws of time from the rows; angles that follow a law are compared modulo a whole turn."""
-    for k in range(S.row_i.shape[0]):
-        law = S.row_i[k, ROW_LAW]
+    for k in range(S.rows.law.shape[0]):
+        law = S.rows.law[k]
         if law >= 0:
             f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
             g = W.row[G_VALUE, k] - f
-            W.row[G_VALUE, k] = atan2(sin(g), cos(g)) if S.row_i[k, ROW_WRAP] == 1 else g
+            W.row[G_VALUE, k] = atan2(sin(g), cos(g)) if S.rows.wrapped[k] == 1 else g
             W.row[NU, k] = f1
             W.row[NU_DOT, k] = f2
         else:
             W.row[NU, k] = 0.0
             W.row[NU_DOT, k] = 0.0
     switch_rows(S, W)
-    for x in range(S.mix_i.shape[0]):
-        law = S.row_i[S.mix_i[x, MIX_ROW], ROW_LAW]
-        _, slope, _ = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, S.mix_i[x, MIX_SLOT])
-        for i in range(S.mix_i[x, MIX_COUNT]):
-            W.G[S.mix_i[x, MIX_TO] + i] -= slope * W.G[S.mix_i[x, MIX_FROM] + i]
+    for x in range(S.sensor_drivers.row.shape[0]):
+        law = S.rows.law[S.sensor_drivers.row[x]]
+        _, slope, _ = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, S.sensor_drivers.slot[x])
+        for i in range(S.sensor_drivers.count[x]):
+            W.G[S.sensor_drivers.to[x] + i] -= slope * W.G[S.sensor_drivers.start[x] + i]
 
 
 @formula
 def way_of(S, W, s):
     """Column of W.sensed in which the way of switch s stands: of sliding, of pushing, the sign of a corner."""
-    return W.sensed.shape[1] - S.switch_i.shape[0] + s
+    return W.sensed.shape[1] - S.switches.row.shape[0] + s
 
 
 @formula
 def switch_rows(S, W):
     """Of rows with modes: what is off counts for nothing, what is held is compared with where it is held."""
-    for s in range(S.switch_i.shape[0]):
-        k = S.switch_i[s, SWITCH_ROW]
+    for s in range(S.switches.row.shape[0]):
+        k = S.switches.row[s]
         if k < 0:
             continue
         if W.switch[MODE, s].real == OFF:
@@ -269,8 +269,8 @@ def switch_rows(S, W):
 @formula
 def switch_biases(S, W):
     """What is off has no right-hand side."""
-    for s in range(S.switch_i.shape[0]):
-        k = S.switch_i[s, SWITCH_ROW]
+    for s in range(S.switches.row.shape[0]):
+        k = S.switches.row[s]
         if k >= 0 and W.switch[MODE, s].real == OFF:
             W.row[GAMMA, k] = 0.0
 
@@ -278,8 +278,8 @@ def switch_biases(S, W):
 @formula
 def size_rows_off(S, W):
     """Rows that are off have a size, though nothing of them is left."""
-    for s in range(S.switch_i.shape[0]):
-        k = S.switch_i[s, SWITCH_ROW]
+    for s in range(S.switches.row.shape[0]):
+        k = S.switches.row[s]
         if k >= 0 and W.switch[MODE, s].real == OFF:
             W.row[DIAGONAL, k] = W.row[DIAGONAL, k] + 1.0
 
@@ -290,14 +290,14 @@ def begin_biases(S, W, v):
     rates(S, W, v)
     for m in range(measured(S)):
         W.sensed[BIAS, m] = 0.0
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         W.row[GAMMA, k] = W.row[NU_DOT, k]
 
 
 @formula
 def rates(S, W, v):
     """Rates of the measured quantities."""
-    nr = S.row_i.shape[0]
+    nr = S.rows.law.shape[0]
     nm = measured(S)
     for m in range(nm):
         s = 0.0 * W.sensed[VALUE, m]
@@ -312,10 +312,10 @@ def end_biases(S, W, t):
     """Gamma of laws that follow sensors: f'' along the motion in place of its second derivative by time."""
     switch_biases(S, W)
     last = -1
-    for x in range(S.mix_i.shape[0]):
-        k = S.mix_i[x, MIX_ROW]
+    for x in range(S.sensor_drivers.row.shape[0]):
+        k = S.sensor_drivers.row[x]
         if k != last:
-            _, _, f2 = evaluate_jet(S.code, S.const, S.row_i[k, ROW_LAW], W.stack, t, W.sensed, WHOLE)
+            _, _, f2 = evaluate_jet(S.code, S.const, S.rows.law[k], W.stack, t, W.sensed, WHOLE)
             W.row[GAMMA, k] += f2 - W.row[NU_DOT, k]
         last = k
 

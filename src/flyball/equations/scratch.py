@@ -36,7 +36,7 @@ def work(s: Structure, system: System, dtype: Any = None) -> Work:
     if dtype.kind in "fc":
         return scratch(s, system, dtype).fields  # type: ignore[no-any-return]
     W = blank(s, system, dtype)
-    W.switch[LOWER], W.switch[UPPER] = system.switch_x[:, SWITCH_LOWER], system.switch_x[:, SWITCH_UPPER]
+    W.switch[LOWER], W.switch[UPPER] = system.switch_values.lower, system.switch_values.upper
     ground_frames(system, W)
     return W
 
@@ -51,10 +51,10 @@ def scratch(s: Structure, system: System, dtype: Any) -> PooledBuffer:
 
 def fill(s: Structure, system: System, array: Callable[[str], np.ndarray]) -> None:
     """Put into blank scratch, whose arrays are found by name, what the tables say of it."""
-    if len(system.switch_x):
+    if len(system.switch_values.lower):
         switch = array("switch")
-        switch[LOWER], switch[UPPER] = system.switch_x[:, SWITCH_LOWER], system.switch_x[:, SWITCH_UPPER]
-    if n := system.kinds[GROUND_FRAMES]:
+        switch[LOWER], switch[UPPER] = system.switch_values.lower, system.switch_values.upper
+    if n := system.ground_frames[0]:
         _, at_rest = s.kept.get("ground", id(system), MOST, lambda: (system, on_ground(system)))  # told by its address
         array("FK")[:n] = at_rest
 
@@ -66,7 +66,7 @@ def tables(s: Structure, system: System) -> StructBuffer:
 
 def on_ground(system: System) -> np.ndarray:
     """Records of the frames on ground: they stand first in `Work.FK`, and nothing writes them again."""
-    W = Records(np.zeros((system.kinds[GROUND_FRAMES], 24), system.frame_x.dtype))
+    W = Records(np.zeros((system.ground_frames[0], 24), system.frame_x.dtype))
     ground_frames(system, W)
     return W.FK
 
@@ -79,15 +79,15 @@ class Records(NamedTuple):
 
 def blank(s: Structure, system: System, dtype: Any) -> Work:
     """Scratch of zeros."""
-    nb, nf, nr, nv = len(system.body_i), len(system.frame_i), len(system.row_i), s.nv
+    nb, nf, nr, nv = len(system.tree.parent), len(system.frame_i), len(system.rows.law), s.nv
     n, ny, nl, nw = len(system.ldl.perm), s.nq + nv + len(s.states), len(s.loads), len(s.switches)
-    nc, ne = len(system.control_i), width(s)
+    nc, ne = len(system.controls.rate_law), width(s)
 
     def z(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype)
 
     return Work(
-        z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_i)), z(len(system.col_i)),
+        z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_entries.row)), z(len(system.col_i)),
         z(len(system.col_i)), z(len(s.terms) if s.loads or s.reads else 0, 6), z(9, nr), z(8, nv),
         z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl + ne + nc + nw), z(INVERSE_SLOPES + nw, nw),
         z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n), z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny),

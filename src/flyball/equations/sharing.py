@@ -69,25 +69,25 @@ def sharing(ns: int, nr: int) -> Sharing:
 @formula
 def cell_of(S, W, t, G, s, c):
     """Bounds of switch s into cell c. Returns whether it has one."""
-    D, k, kind = G.Q.D, G.Q.count[OPEN], S.switch_i[s, SWITCH_KIND]
-    row, other = S.switch_i[s, SWITCH_ROW], S.switch_i[s, SWITCH_PARTNER] if kind == SLIP else -1
+    D, k, kind = G.Q.D, G.Q.count[OPEN], S.switches.kind[s]
+    row, other = S.switches.row[s], S.switches.partner[s] if kind == SLIP else -1
     if -1 < other < s:
         return False
     for i in range(3):
         for j in range(k + 1):
             D[c, i, j] = 0.0
     if kind == SLIP:
-        mu, gap = S.switch_x[s, SWITCH_REST], S.switch_i[S.switch_i[s, SWITCH_OTHER], SWITCH_ROW]
+        mu, gap = S.switch_values.static_friction[s], S.switches.row[S.switches.other[s]]
         D[c, 0, 0], D[c, 1, 0] = mu * W.row[LAM, gap], W.row[LAM, row]
         for j in range(k):
             D[c, 0, 1 + j], D[c, 1, 1 + j] = mu * G.null[j, gap], G.null[j, row]
         if other >= 0:
-            along = S.switch_i[other, SWITCH_ROW]
+            along = S.switches.row[other]
             D[c, 2, 0] = W.row[LAM, along]
             for j in range(k):
                 D[c, 2, 1 + j] = G.null[j, along]
     elif kind == FRICTION:
-        D[c, 0, 0], D[c, 1, 0] = most(S, W, t, S.switch_i[s, SWITCH_FORCE]), W.row[LAM, row]
+        D[c, 0, 0], D[c, 1, 0] = most(S, W, t, S.switches.force[s]), W.row[LAM, row]
         for j in range(k):
             D[c, 0, 1 + j], D[c, 1, 1 + j] = G.bend[j, s], G.null[j, row]
     else:
@@ -107,7 +107,7 @@ def cell_of(S, W, t, G, s, c):
 def fill(S, W, t, G):
     """Bounds of all that is in the group, by the multipliers in W."""
     c, size = 0, 0.0
-    for s in range(S.switch_i.shape[0]):
+    for s in range(S.switches.row.shape[0]):
         if W.switch[SHARED, s] > 0.0 and cell_of(S, W, t, G, s, c):
             for i in range(3):
                 size = max(size, magnitude(G.Q.D[c, i, 0]))
@@ -173,7 +173,7 @@ def shares(S: System, W: Work, G: Sharing, K: Watch, _: Watch, row: int) -> int:
 @formula
 def renewed(address, S, W, R, own, sheet, G):
     """The null vectors at the state last evaluated: what is not in balance any more is taken from them."""
-    out, nr = sheet.rows, S.row_i.shape[0]
+    out, nr = sheet.rows, S.rows.law.shape[0]
     for j in range(G.Q.count[OPEN]):
         terms, left = 0.0, 0.0
         for d in range(out.shape[1]):
@@ -207,7 +207,7 @@ def shared(S, W, t, G):
         else:
             low = x
     for j in range(Q.count[OPEN]):
-        for k in range(S.row_i.shape[0]):
+        for k in range(S.rows.law.shape[0]):
             W.row[LAM, k] += high * Q.y[j] * G.null[j, k]
 
 

@@ -43,7 +43,7 @@ NOT_WATCHED = float("nan")
 @formula
 def slides(S, W, s):
     """Whether the place of contact whose first slip is switch s is closed and does not stick."""
-    return W.switch[MODE, s].real == OFF and W.switch[MODE, S.switch_i[s, SWITCH_OTHER]].real != OFF
+    return W.switch[MODE, s].real == OFF and W.switch[MODE, S.switches.other[s]].real != OFF
 
 
 @formula
@@ -53,12 +53,12 @@ def heading(S, W, sensed, s):
     In the plane it is the way of the switch, in space `direction`.
     """
     way = sensed[VALUE, way_of(S, W, s)]
-    u = sensed[RATE, S.switch_i[s, SWITCH_MEASURED]]
-    other = S.switch_i[s, SWITCH_PARTNER]
+    u = sensed[RATE, S.switches.measured[s]]
+    other = S.switches.partner[s]
     if other < 0:
         return way, 0.0 * way, u * way
     side = sensed[VALUE, way_of(S, W, other)]
-    v = sensed[RATE, S.switch_i[other, SWITCH_MEASURED]]
+    v = sensed[RATE, S.switches.measured[other]]
     return direction(own_speed(S), (way, side), (u, v))
 
 
@@ -95,12 +95,12 @@ def begins(pace, way, velocity, square):
 def slide(S, W, k, work, f):
     """Add the friction of a place of contact to the generalised forces ``f``, and its power to its work."""
     a, b, power = friction(S, W, k)
-    work[S.force_i[k, FORCE_WORK]] = power
+    work[S.forces.work[k]] = power
     for side in range(2):
-        m = S.force_i[k, FORCE_F] if side == 0 else S.force_i[k, FORCE_M]
+        m = S.forces.F[k] if side == 0 else S.forces.M[k]
         if m < 0:
             continue
-        r = S.row_i.shape[0] + m
+        r = S.rows.law.shape[0] + m
         for j in range(S.row_p[r], S.row_p[r + 1]):
             f[S.col_i[j]] += (a if side == 0 else b) * W.G[j]
 
@@ -108,12 +108,12 @@ def slide(S, W, k, work, f):
 @formula
 def friction(S, W, k):
     """-mu N d of a place of contact that slides along d, on each tangent, and its power; N is its gap's multiplier."""
-    s = S.force_i[k, FORCE_SWITCH]
+    s = S.forces.switch[k]
     if not slides(S, W, s):
-        o = 0.0 * W.sensed[LOAD, S.force_i[k, FORCE_LOAD]]
+        o = 0.0 * W.sensed[LOAD, S.forces.load[k]]
         return o, o, o
     d, e, speed = heading(S, W, W.sensed, s)
-    pressed, mu = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]], S.switch_x[s, SWITCH_SLIDING]
+    pressed, mu = W.sensed[LOAD, S.forces.load[k]], S.switch_values.kinetic_friction[s]
     if pressed.real < 0.0 and mu.real > 1.0:  # past where it opens, to the end of the step: it must not run away
         mu = 1.0 + 0.0 * mu
     push = -mu * pressed
@@ -124,20 +124,20 @@ def friction(S, W, k):
 def watched_place(S, W, sensed, lam, kind, s):
     """Value of a guard of a place: friction that its stick has left; whether it slides its way; whether it is there."""
     if kind == G_ASTRAY:
-        held = W.switch[MODE, S.switch_i[s, SWITCH_OTHER]] != OFF
-        return sensed[VALUE, S.switch_i[s, SWITCH_MEASURED]] if held else NOT_WATCHED
-    other = S.switch_i[s, SWITCH_PARTNER]
+        held = W.switch[MODE, S.switches.other[s]] != OFF
+        return sensed[VALUE, S.switches.measured[s]] if held else NOT_WATCHED
+    other = S.switches.partner[s]
     if kind == G_CONE:
         if W.switch[MODE, s] == OFF:
             return NOT_WATCHED
-        pressed = lam[S.switch_i[S.switch_i[s, SWITCH_OTHER], SWITCH_ROW]]
-        a = lam[S.switch_i[s, SWITCH_ROW]]
-        b = lam[S.switch_i[other, SWITCH_ROW]] if other >= 0 else 0.0
-        return S.switch_x[s, SWITCH_REST] * pressed - sqrt(a * a + b * b)
+        pressed = lam[S.switches.row[S.switches.other[s]]]
+        a = lam[S.switches.row[s]]
+        b = lam[S.switches.row[other]] if other >= 0 else 0.0
+        return S.switch_values.static_friction[s] * pressed - sqrt(a * a + b * b)
     if not slides(S, W, s):
         return NOT_WATCHED
-    u = sensed[RATE, S.switch_i[s, SWITCH_MEASURED]]
-    v = sensed[RATE, S.switch_i[other, SWITCH_MEASURED]]
+    u = sensed[RATE, S.switches.measured[s]]
+    v = sensed[RATE, S.switches.measured[other]]
     way, side = sensed[VALUE, way_of(S, W, s)], sensed[VALUE, way_of(S, W, other)]
     speed, size = sqrt(u * u + v * v), sqrt(way * way + side * side)
     turned = (way * u + side * v) / size - TURNED * speed

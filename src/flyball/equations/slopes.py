@@ -23,10 +23,10 @@ STEP = 1e-6  # of the mechanism's length, or of a radian; rates also of themselv
 @formula
 def slopes(S, W, t, out):
     """Stiffness and damping (out[k], see above) of every force at the state in W."""
-    for k in range(S.force_i.shape[0]):
+    for k in range(S.forces.F.shape[0]):
         for i in range(DIRECTIONS):
             out[k, i] = 0.0
-        if S.force_i[k, FORCE_ALONG] == 1:
+        if S.forces.family[k] == 1:
             along(S, W, t, k, out)
         else:
             between(S, W, t, k, out)
@@ -35,11 +35,11 @@ def slopes(S, W, t, out):
 @formula
 def along(S, W, t, k, out):
     """Of a force along a measured quantity."""
-    m = S.force_i[k, FORCE_F]
+    m = S.forces.F[k]
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
-    d = STEP * min(1.0, S.glob[LENGTH])
+    d = STEP * min(1.0, S.length[0])
     e = d + STEP * abs(rate)
-    pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
+    pressed = W.sensed[LOAD, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
     for j in range(5):
         dx = d if j == 1 else -d if j == 2 else 0.0
         dr = e if j == 3 else -e if j == 4 else 0.0
@@ -56,9 +56,9 @@ def between(S, W, t, k, out):
     """Of a force between frames, one of the two states of M after the other."""
     kind = kind_of(S, k)
     par = wide(S.force_x, k)
-    F = load(W.FK, S.force_i[k, FORCE_F])
-    p, R, w, v, alpha, a = load(W.FK, S.force_i[k, FORCE_M])
-    d = STEP * min(1.0, S.glob[LENGTH])
+    F = load(W.FK, S.forces.F[k])
+    p, R, w, v, alpha, a = load(W.FK, S.forces.M[k])
+    d = STEP * min(1.0, S.length[0])
     e = d + STEP * norm(sub(v, F[3]))
     n = int(out[k, DIRECTIONS])
     for j in range(4 * n):

@@ -65,14 +65,14 @@ STALLED = 0.7  # a refinement that leaves more than this of the residual is the 
 @formula
 def inverse_mass(S, b, x, at, out, to):
     """out[to:] = M_b^-1 x[at:] for a body with constant mass block."""
-    m = S.body_x[b, PER_MASS]
-    n = S.body_i[b, NV]
+    m = S.bodies.inverse_mass[b]
+    n = S.tree.nv[b]
     out[to] = m * x[at]
     out[to + 1] = m * x[at + 1]
     if n == 3:  # the angle of a planar body, z of a point mass
-        out[to + 2] = S.body_x[b, INVERSE + 8] * x[at + 2]
+        out[to + 2] = S.bodies.inverse_inertia[b, 8] * x[at + 2]
     elif n == 6:
-        r = mv(load9(S.body_x, b, INVERSE), (x[at + 3], x[at + 4], x[at + 5]))
+        r = mv(load9(S.bodies.inverse_inertia, b, 0), (x[at + 3], x[at + 4], x[at + 5]))
         out[to + 2] = m * x[at + 2]
         for i in range(3):
             out[to + 3 + i] = r[i]
@@ -84,9 +84,9 @@ def factor(S, W):
     W.info[FACTORISATIONS] += 1
     if W.info[MADE + FACTOR] != 0:
         return int(run(W.info[MADE + FACTOR], S, W, 0.0, W.A, W.A, W.A, W.A))
-    if S.kinds[SOLVER] == SCHUR:
+    if S.solver[0] == SCHUR:
         return factor_schur(S, W)
-    if S.kinds[SOLVER] == COUPLED:
+    if S.solver[0] == COUPLED:
         return factor_coupled(S, W)
     return articulate(S, W)
 
@@ -94,21 +94,21 @@ def factor(S, W):
 @formula
 def turn_rows(S, W):
     """H = M^-1 G^T for the rows now in W."""
-    for e in range(S.block_i.shape[0]):
-        at = S.block_i[e, 1]
+    for e in range(S.blocks.body.shape[0]):
+        at = S.blocks.entry[e]
         if W.option[PARTED] > 0.0:
-            turn_dependent(S, W, S.block_i[e, 0], at)
+            turn_dependent(S, W, S.blocks.body[e], at)
         else:
-            inverse_mass(S, S.block_i[e, 0], W.G, at, W.H, at)
+            inverse_mass(S, S.blocks.body[e], W.G, at, W.H, at)
 
 
 @formula
 def turn_dependent(S, W, b, at):
     """A block of H with masses of the dependent coordinates alone: the independent ones do not move."""
-    n = S.body_i[b, NV]
+    n = S.tree.nv[b]
     for k in range(n):
-        per = S.body_x[b, PER_MASS] if k <= n // 3 else S.body_x[b, PER_COMPACT]
-        W.H[at + k] = per * W.G[at + k] if W.vel[PARTITION, S.body_i[b, V0] + k].real > 0.0 else 0.0
+        per = S.bodies.inverse_mass[b] if k <= n // 3 else S.bodies.inverse_reference_inertia[b]
+        W.H[at + k] = per * W.G[at + k] if W.vel[PARTITION, S.tree.v[b] + k].real > 0.0 else 0.0
 
 
 @formula
@@ -117,11 +117,11 @@ def natural_size(S, W):
 
     A slender body makes entries a million times larger along its own axis, which say nothing about the others.
     """
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         W.row[DIAGONAL, k] = 0.0
-    for e in range(S.block_i.shape[0]):
-        b, at, k = S.block_i[e, 0], S.block_i[e, 1], S.block_i[e, 2]
-        n = S.body_i[b, NV]
+    for e in range(S.blocks.body.shape[0]):
+        b, at, k = S.blocks.body[e], S.blocks.entry[e], S.blocks.row[e]
+        n = S.tree.nv[b]
         shift = W.G[at] * W.G[at] + W.G[at + 1] * W.G[at + 1]
         turn = 0.0 * shift
         if n == 6:
@@ -129,14 +129,14 @@ def natural_size(S, W):
             turn += W.G[at + 3] * W.G[at + 3] + W.G[at + 4] * W.G[at + 4] + W.G[at + 5] * W.G[at + 5]
         elif n == 3:
             turn += W.G[at + 2] * W.G[at + 2]
-        W.row[DIAGONAL, k] += shift * S.body_x[b, PER_BULK] + turn * S.body_x[b, PER_COMPACT]
+        W.row[DIAGONAL, k] += shift * S.bodies.inverse_reference_mass[b] + turn * S.bodies.inverse_reference_inertia[b]
     size_rows_off(S, W)
 
 
 @formula
 def reuse(S, W):
     """Keep the last factor for rows that have moved a little: as a preconditioner of the refinement."""
-    if S.kinds[SOLVER] == SCHUR:
+    if S.solver[0] == SCHUR:
         if W.info[MADE + REUSE] != 0:
             run(W.info[MADE + REUSE], S, W, 0.0, W.A, W.A, W.A, W.A)
         else:
@@ -149,16 +149,16 @@ def factor_schur(S, W):
     turn_rows(S, W)
     for e in range(W.A.shape[0]):
         W.A[e] = 0.0
-    for e in range(S.pair_i.shape[0]):
-        i, j, length, place = S.pair_i[e, 0], S.pair_i[e, 1], S.pair_i[e, 2], S.pair_i[e, 3]
+    for e in range(S.pairs.first.shape[0]):
+        i, j, length, place = S.pairs.first[e], S.pairs.second[e], S.pairs.length[e], S.pairs.place[e]
         s = W.G[i] * W.H[j]
         for k in range(1, length):
             s += W.G[i + k] * W.H[j + k]
         W.A[place] += s
     natural_size(S, W)
-    for k in range(S.row_i.shape[0]):
+    for k in range(S.rows.law.shape[0]):
         place = S.ldl.Ap[S.ldl.perm[k] + 1] - 1
-        W.A[place] += S.glob[REGULARISE] * W.row[DIAGONAL, k] + ROUNDING * W.A[place]
+        W.A[place] += S.regularization[0] * W.row[DIAGONAL, k] + ROUNDING * W.A[place]
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
 
 
@@ -171,25 +171,25 @@ def factor_coupled(S, W):
     """
     nv = W.vel.shape[1]
     per = W.vel[V1]
-    lever = minimum(1.0, S.glob[LENGTH]) ** 2
+    lever = minimum(1.0, S.length[0]) ** 2
     mass_entries(S, W)
-    for e in range(S.mass_i.shape[0]):
-        d = S.mass_i[e, 0]
-        own = d == S.mass_i[e, 1]
+    for e in range(S.mass_entries.row.shape[0]):
+        d = S.mass_entries.row[e]
+        own = d == S.mass_entries.column[e]
         if own:
             per[d] = 1.0 / W.M[e]
         if W.option[PARTED] > 0.0:  # masses of the dependent coordinates alone
             W.M[e] *= (RIGID if W.vel[PARTITION, d].real < 0.0 else 1.0) if own else 0.0
-        W.A[S.mass_i[e, 2]] = W.M[e]
-    for k in range(S.row_i.shape[0]):
+        W.A[S.mass_entries.place[e]] = W.M[e]
+    for k in range(S.rows.law.shape[0]):
         s = 0.0 * W.row[DIAGONAL, k]
         for e in range(S.row_p[k], S.row_p[k + 1]):
-            W.A[S.pair_i[e, 3]] = W.G[e]
-            if S.pair_i[e, 3] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
+            W.A[S.pairs.place[e]] = W.G[e]
+            if S.pairs.place[e] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
                 s += (W.G[e] * W.G[e] + lever) * per[S.col_i[e]]
         s = choose(s, s, s + 1.0)
         W.row[DIAGONAL, k] = s
-        W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * s
+        W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.regularization[0] * s
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
 
 
@@ -209,9 +209,9 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
     for k in range(lam.shape[0]):
         lam[k] = 0.0
         W.row[R1, k] = gamma[k]
-    if S.kinds[SOLVER] == SCHUR:
+    if S.solver[0] == SCHUR:
         return solve_schur(S, W, f, gamma, x, lam, loaded, refinements)
-    if S.kinds[SOLVER] == COUPLED:
+    if S.solver[0] == COUPLED:
         return solve_coupled(S, W, f, gamma, x, lam, loaded, refinements)
     articulated_solve(S, W, f, x, W.vel[EFFORT])
     return 0.0
@@ -234,12 +234,12 @@ def solve_made(S, W, f, gamma, x, lam, loaded, refinements):
 def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
     """Through S = G M^-1 G^T: one pass, then as many for what is left as it takes."""
     rhs = W.vel[V2]
-    semidefinite = S.glob[SEMIDEFINITE] > 0.0 and not W.option[PARTED] > 0.0
+    semidefinite = S.semidefinite[0] > 0.0 and not W.option[PARTED] > 0.0
     for d in range(x.shape[0]):
         rhs[d] = f[d] if loaded else 0.0
     if loaded and not semidefinite:
-        for b in range(S.body_i.shape[0]):
-            inverse_mass(S, b, f, S.body_i[b, V0], x, S.body_i[b, V0])
+        for b in range(S.tree.parent.shape[0]):
+            inverse_mass(S, b, f, S.tree.v[b], x, S.tree.v[b])
         for k in range(lam.shape[0]):
             W.row[R1, k] = gamma[k] - row_times(S, W, k, x)
     pass_schur(S, W, rhs, x, lam, semidefinite)
@@ -269,8 +269,8 @@ def pass_schur(S, W, rhs, x, lam, loaded):
     for d in range(x.shape[0]):
         dx[d] = 0.0
     if loaded:
-        for b in range(S.body_i.shape[0]):
-            inverse_mass(S, b, rhs, S.body_i[b, V0], dx, S.body_i[b, V0])
+        for b in range(S.tree.parent.shape[0]):
+            inverse_mass(S, b, rhs, S.tree.v[b], dx, S.tree.v[b])
     for k in range(r.shape[0]):
         z[S.ldl.perm[k]] = r[k] - row_times(S, W, k, dx) if loaded else r[k]
     ldl_solve(S.ldl, W.L, W.D[0], z)
@@ -347,8 +347,8 @@ def remainder(S, W, f, gamma, x, lam, rhs, loaded):
     for d in range(x.shape[0]):
         rhs[d] = f[d] if loaded else 0.0
         size = larger(size, magnitude(rhs[d]))
-    for e in range(S.mass_i.shape[0]):
-        i, j = S.mass_i[e, 0], S.mass_i[e, 1]
+    for e in range(S.mass_entries.row.shape[0]):
+        i, j = S.mass_entries.row[e], S.mass_entries.column[e]
         p = W.M[e] * x[j]
         rhs[i] -= p
         size = larger(size, magnitude(p))
@@ -370,9 +370,9 @@ def remainder(S, W, f, gamma, x, lam, rhs, loaded):
         W.row[R1, k] = s
         off = larger(off, magnitude(s))
         wide = larger(wide, a)
-    for b in range(S.body_i.shape[0]):
-        if S.body_i[b, BODY_LAW] >= 0:
-            d = S.body_i[b, V0]
+    for b in range(S.tree.parent.shape[0]):
+        if S.tree.law[b] >= 0:
+            d = S.tree.v[b]
             W.vel[EFFORT, d] = -rhs[d]
             rhs[d] = 0.0
     worst = 0.0
@@ -386,20 +386,20 @@ def excess(S, dx, rhs, x):
     """Rhs = E dx: what the regularised mass of the last step has to give back. Returns its size relative to M x."""
     worst = 0.0
     size = 1e-300
-    for b in range(S.body_i.shape[0]):
-        v0 = S.body_i[b, V0]
-        n = S.body_i[b, NV]
+    for b in range(S.tree.parent.shape[0]):
+        v0 = S.tree.v[b]
+        n = S.tree.nv[b]
         if n == 3:
-            rhs[v0 + 2] = S.body_x[b, EXCESS + 8] * dx[v0 + 2]
+            rhs[v0 + 2] = S.bodies.excess_inertia[b, 8] * dx[v0 + 2]
             worst = larger(worst, magnitude(rhs[v0 + 2]))
         elif n == 6:
-            t = mv(load9(S.body_x, b, EXCESS), (dx[v0 + 3], dx[v0 + 4], dx[v0 + 5]))
-            rhs[v0 + 2] = S.body_x[b, EXCESS_MASS] * dx[v0 + 2]
+            t = mv(load9(S.bodies.excess_inertia, b, 0), (dx[v0 + 3], dx[v0 + 4], dx[v0 + 5]))
+            rhs[v0 + 2] = S.bodies.excess_mass[b] * dx[v0 + 2]
             for i in range(3):
                 rhs[v0 + 3 + i] = t[i]
                 worst = larger(worst, magnitude(t[i]))
         for i in range(2):
-            rhs[v0 + i] = S.body_x[b, EXCESS_MASS] * dx[v0 + i]
-            worst = larger(worst, magnitude(rhs[v0 + i]) * S.glob[LENGTH])
-            size = larger(size, S.body_x[b, MASS] * magnitude(x[v0 + i]) * S.glob[LENGTH])
+            rhs[v0 + i] = S.bodies.excess_mass[b] * dx[v0 + i]
+            worst = larger(worst, magnitude(rhs[v0 + i]) * S.length[0])
+            size = larger(size, S.bodies.mass[b] * magnitude(x[v0 + i]) * S.length[0])
     return worst / size

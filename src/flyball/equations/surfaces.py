@@ -44,14 +44,14 @@ FLAT = 1e-9
 @formula
 def along(S, W, s):
     """Whether the motion is held on the corner of switch s."""
-    return S.switch_i[s, SWITCH_KIND] == BRANCH and W.switch[MODE, s] != OFF
+    return S.switches.kind[s] == BRANCH and W.switch[MODE, s] != OFF
 
 
 @formula
 def bound(S, W):
     """Whether the motion is held on some corner."""
     count = 0
-    for s in range(S.switch_i.shape[0]):
+    for s in range(S.switches.row.shape[0]):
         count += 1 if along(S, W, s) else 0
     return count > 0
 
@@ -59,7 +59,7 @@ def bound(S, W):
 @formula
 def drifts(S, W, t):
     """How fast u of each corner changes, or its rate, with the accelerations at hand, into row DRIFT_OFF."""
-    nr = S.row_i.shape[0]
+    nr = S.rows.law.shape[0]
     nm = measured(S)
     for m in range(nm):
         a = W.sensed[BIAS, m]
@@ -68,13 +68,13 @@ def drifts(S, W, t):
         W.sensed[RATE, nm + m] = a
         W.sensed[BIAS, nm + m] = W.sensed[BIAS, m]
         W.sensed[BIAS, m] = a
-    for c in range(S.control_i.shape[0]):
-        law = S.control_i[c, CONTROL_RATE]
+    for c in range(S.controls.rate_law.shape[0]):
+        law = S.controls.rate_law[c]
         at = column_of(S, W, c)
         W.sensed[BIAS, at] = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, WHOLE)[1] if law >= 0 else 0.0
-    for s in range(S.switch_i.shape[0]):
-        if S.switch_i[s, SWITCH_KIND] == BRANCH:
-            law = S.switch_i[s, SWITCH_LAW]
+    for s in range(S.switches.row.shape[0]):
+        if S.switches.kind[s] == BRANCH:
+            law = S.switches.law[s]
             jet = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, WHOLE)
             W.switch[DRIFT_OFF, s] = jet[2] if W.switch[MODE, s] == STEADY else jet[1]
     for m in range(nm):
@@ -87,7 +87,7 @@ def drifts(S, W, t):
 def settled(S, W, t, n):
     """Whether u stays zero on all corners that hold the motion; if not, their sides are moved. n counts the passes."""
     drifts(S, W, t)
-    ns = S.switch_i.shape[0]
+    ns = S.switches.row.shape[0]
     if n > 0:
         learn(S, W)
     worst = 0.0
@@ -114,7 +114,7 @@ def settled(S, W, t, n):
 @formula
 def learn(S, W):
     """Broyden's update of the inverse slopes, B += (dx - B dr) (dx^T B) / (dx^T B dr) (Broyden, 1965)."""
-    ns = S.switch_i.shape[0]
+    ns = S.switches.row.shape[0]
     moved = 0.0
     share = 0.0
     for s in range(ns):

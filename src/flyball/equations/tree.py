@@ -56,8 +56,8 @@ from .records import load, store_motion, store_pose
 @formula
 def pose(S, W, b, q):
     """Position and rotation of body b, its reference point and what its twist columns need, from its parent's pose."""
-    kind = S.body_i[b, TREE]
-    q0 = S.body_i[b, Q0]
+    kind = S.tree.joint[b]
+    q0 = S.tree.q[b]
     o = 0.0 * S.body_x[b, 0]
     if kind == PLANAR:
         c = cos(q[q0 + 2])
@@ -71,8 +71,8 @@ def pose(S, W, b, q):
         store_pose(W.BK, b, p, quaternion_matrix(q[q0 + 3], q[q0 + 4], q[q0 + 5], q[q0 + 6]))
         put3(W.O, b, 0, p)
     elif kind == POINT:
-        p = (q[q0], q[q0 + 1], q[q0 + 2] if S.body_i[b, NV] == 3 else 0.0 * q[q0])
-        store_pose(W.BK, b, p, load9(S.body_x, b, BODY_R))
+        p = (q[q0], q[q0 + 1], q[q0 + 2] if S.tree.nv[b] == 3 else 0.0 * q[q0])
+        store_pose(W.BK, b, p, load9(S.bodies.body_rotation, b, 0))
         put3(W.O, b, 0, p)
     else:
         hinge(S, W, b, kind, q, q0)
@@ -81,14 +81,14 @@ def pose(S, W, b, q):
 @formula
 def hinge(S, W, b, kind, q, q0):
     """The other kinds: move the tree joint's frame on the parent, then go over to the body."""
-    parent = S.body_i[b, PARENT]
-    p = load3(S.body_x, b, TREE_P)
-    R = load9(S.body_x, b, TREE_R)
+    parent = S.tree.parent[b]
+    p = load3(S.bodies.joint_position, b, 0)
+    R = load9(S.bodies.joint_rotation, b, 0)
     if parent >= 0:
         A = load9(W.BK, parent, 3)
         p = add(load3(W.BK, parent, 0), mv(A, p))
-        R = mm(A, R) if S.body_x[b, TREE_TURNS] != 0.0 else A
-    v0 = S.body_i[b, V0]
+        R = mm(A, R) if S.bodies.joint_turned[b] != 0.0 else A
+    v0 = S.tree.v[b]
     axis = col(R, 2)
     if kind == REVOLUTE:
         put3(W.X, v0, 0, axis)
@@ -101,9 +101,9 @@ def hinge(S, W, b, kind, q, q0):
         for i in range(3):
             put3(W.X, v0 + i, 0, (R[i], R[3 + i], R[6 + i]))
     put3(W.O, b, 0, p)
-    p = add(p, mv(R, load3(S.body_x, b, BODY_P)))
-    if S.body_x[b, BODY_TURNS] != 0.0:
-        R = mm(R, load9(S.body_x, b, BODY_R))
+    p = add(p, mv(R, load3(S.bodies.body_position, b, 0)))
+    if S.bodies.body_turned[b] != 0.0:
+        R = mm(R, load9(S.bodies.body_rotation, b, 0))
     store_pose(W.BK, b, p, R)
 
 
@@ -126,8 +126,8 @@ def turned(R, c, s):
 @formula
 def motion(S, W, b, v):
     """Velocities and bias accelerations of body b at its pose, from its parent's."""
-    kind = S.body_i[b, TREE]
-    v0 = S.body_i[b, V0]
+    kind = S.tree.joint[b]
+    v0 = S.tree.v[b]
     if kind == PLANAR:
         o = 0.0 * v[v0]
         zero = (o, o, o)
@@ -140,7 +140,7 @@ def motion(S, W, b, v):
     elif kind == POINT:
         o = 0.0 * v[v0]
         zero = (o, o, o)
-        store_motion(W.BK, b, zero, (v[v0], v[v0 + 1], v[v0 + 2] if S.body_i[b, NV] == 3 else o), zero, zero)
+        store_motion(W.BK, b, zero, (v[v0], v[v0 + 1], v[v0 + 2] if S.tree.nv[b] == 3 else o), zero, zero)
     else:
         hinge_motion(S, W, b, kind, v, v0)
 
@@ -148,7 +148,7 @@ def motion(S, W, b, v):
 @formula
 def hinge_motion(S, W, b, kind, v, v0):
     """The other kinds: the parent's motion at the reference point, then what the joint adds, then to the body."""
-    parent = S.body_i[b, PARENT]
+    parent = S.tree.parent[b]
     o = 0.0 * W.BK[b, 0]
     w = (o, o, o)
     u = w
@@ -179,14 +179,14 @@ def hinge_motion(S, W, b, kind, v, v0):
 @formula
 def column(S, W, b, k):
     """World twist of body b per unit of its k-th own velocity: (angular velocity, velocity of the reference point)."""
-    kind = S.body_i[b, TREE]
+    kind = S.tree.joint[b]
     o = 0.0 * W.BK[b, 0]
     l = o + 1.0
     zero = (o, o, o)
     if kind == REVOLUTE or kind == SPHERICAL:
-        return load3(W.X, S.body_i[b, V0] + k, 0), zero
+        return load3(W.X, S.tree.v[b] + k, 0), zero
     if kind == PRISMATIC:
-        return zero, load3(W.X, S.body_i[b, V0], 3)
+        return zero, load3(W.X, S.tree.v[b], 3)
     if kind == PLANAR and k == 2:
         return (o, o, l), zero
     if kind == FREE and k >= 3:
@@ -204,12 +204,12 @@ def project(S, W, b, out, at, sign, force, torque, point):
 
     The twist columns times the wrench, with the zeros and ones left out.
     """
-    kind = S.body_i[b, TREE]
+    kind = S.tree.joint[b]
     if kind == PRISMATIC:
-        out[at] += sign * dot(load3(W.X, S.body_i[b, V0], 3), force)
+        out[at] += sign * dot(load3(W.X, S.tree.v[b], 3), force)
         return
     if kind == POINT:
-        for i in range(S.body_i[b, NV]):
+        for i in range(S.tree.nv[b]):
             out[at + i] += sign * force[i]
         return
     t = add(torque, cross(sub(point, load3(W.O, b, 0)), force))
@@ -226,38 +226,38 @@ def project(S, W, b, out, at, sign, force, torque, point):
         out[at + 4] += sign * m[1]
         out[at + 5] += sign * m[2]
     elif kind == REVOLUTE:
-        out[at] += sign * dot(load3(W.X, S.body_i[b, V0], 0), t)
+        out[at] += sign * dot(load3(W.X, S.tree.v[b], 0), t)
     elif kind == SPHERICAL:
         for i in range(3):
-            out[at + i] += sign * dot(load3(W.X, S.body_i[b, V0] + i, 0), t)
+            out[at + i] += sign * dot(load3(W.X, S.tree.v[b] + i, 0), t)
 
 
 @formula
 def quaternion_at(S, b):
     """Where body b's quaternion begins in q, and its angular velocity in v; (-1, -1) if it has none."""
-    kind = S.body_i[b, TREE]
+    kind = S.tree.joint[b]
     if kind == FREE:
-        return S.body_i[b, Q0] + 3, S.body_i[b, V0] + 3
+        return S.tree.q[b] + 3, S.tree.v[b] + 3
     if kind == SPHERICAL:
-        return S.body_i[b, Q0], S.body_i[b, V0]
+        return S.tree.q[b], S.tree.v[b]
     return -1, -1
 
 
 @formula
 def lengths(S, b):
     """How many of body b's coordinates, its first, are plain: their rates are velocities."""
-    kind = S.body_i[b, TREE]
+    kind = S.tree.joint[b]
     if kind == POINT:
-        return S.body_i[b, NV]
+        return S.tree.nv[b]
     return 0 if kind == SPHERICAL or kind == WELD else 1 if kind >= REVOLUTE else 3
 
 
 @formula
 def rates(S, q, v, dq):
     """Qdot of every body from its velocities."""
-    for b in range(S.body_i.shape[0]):
-        q0 = S.body_i[b, Q0]
-        v0 = S.body_i[b, V0]
+    for b in range(S.tree.parent.shape[0]):
+        q0 = S.tree.q[b]
+        v0 = S.tree.v[b]
         for i in range(lengths(S, b)):
             dq[q0 + i] = v[v0 + i]
         k, w = quaternion_at(S, b)
@@ -271,9 +271,9 @@ def rates(S, q, v, dq):
 @formula
 def unrated(S, q, dq, v):
     """V of every body from its qdot: the reverse of ``rates``."""
-    for b in range(S.body_i.shape[0]):
-        q0 = S.body_i[b, Q0]
-        v0 = S.body_i[b, V0]
+    for b in range(S.tree.parent.shape[0]):
+        q0 = S.tree.q[b]
+        v0 = S.tree.v[b]
         for i in range(lengths(S, b)):
             v[v0 + i] = dq[q0 + i]
         k, w = quaternion_at(S, b)
@@ -286,9 +286,9 @@ def unrated(S, q, dq, v):
 @formula
 def retract(S, q, d):
     """Q (+) d: move every body by the finite step d along its velocities, in place."""
-    for b in range(S.body_i.shape[0]):
-        q0 = S.body_i[b, Q0]
-        v0 = S.body_i[b, V0]
+    for b in range(S.tree.parent.shape[0]):
+        q0 = S.tree.q[b]
+        v0 = S.tree.v[b]
         for i in range(lengths(S, b)):
             q[q0 + i] += d[v0 + i]
         k, w = quaternion_at(S, b)
@@ -301,7 +301,7 @@ def retract(S, q, d):
 @formula
 def normalise(S, q):
     """Give every quaternion unit length again, in place."""
-    for b in range(S.body_i.shape[0]):
+    for b in range(S.tree.parent.shape[0]):
         k, _ = quaternion_at(S, b)
         if k >= 0:
             square = q[k] * q[k] + q[k + 1] * q[k + 1] + q[k + 2] * q[k + 2] + q[k + 3] * q[k + 3]

@@ -13,31 +13,31 @@ from .rows import parameters
 @formula
 def turn(S, W, z, dz):
     """Rates of the states that count turns of angles."""
-    for k in range(S.angle_i.shape[0]):
-        F = load(W.FK, S.angle_i[k, 0])
-        M = load(W.FK, S.angle_i[k, 1])
+    for k in range(S.angles.F.shape[0]):
+        F = load(W.FK, S.angles.F[k])
+        M = load(W.FK, S.angles.M[k])
         n = angle((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, 0.0, S.const)[2]
-        dz[S.angle_i[k, 2]] = dot(n, sub(M[2], F[2]))
+        dz[S.angles.state[k]] = dot(n, sub(M[2], F[2]))
 
 
 @formula
 def move_on(S, W, z, dz, kind, foot, progress):
     """Rates of the states that say where the terms of a kind are on their curves."""
     for k in range(S.kinds[kind], S.kinds[kind + 1]):
-        F = load(W.FK, S.term_i[k, TERM_F])
-        M = load(W.FK, S.term_i[k, TERM_M])
+        F = load(W.FK, S.terms.F[k])
+        M = load(W.FK, S.terms.M[k])
         par = parameters(S.term_x, k)
-        s = foot(par, F, M, z[S.term_i[k, TERM_HINT]], S.const)
-        dz[S.term_i[k, TERM_HINT]] = progress(par, F, M, s, S.const)[0]
+        s = foot(par, F, M, z[S.terms.hint[k]], S.const)
+        dz[S.terms.hint[k]] = progress(par, F, M, s, S.const)[0]
 
 
 @formula
 def remember_turns(S, W, z):
     """Put the states that count turns where the poses in W say they are."""
-    for k in range(S.angle_i.shape[0]):
-        F = load(W.FK, S.angle_i[k, 0])
-        M = load(W.FK, S.angle_i[k, 1])
-        h = S.angle_i[k, 2]
+    for k in range(S.angles.F.shape[0]):
+        F = load(W.FK, S.angles.F[k])
+        M = load(W.FK, S.angles.M[k])
+        h = S.angles.state[k]
         z[h] = angle((1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, z[h], S.const)[0]
 
 
@@ -45,7 +45,7 @@ def remember_turns(S, W, z):
 def remember_places(S, W, z, kind, foot):
     """Put the places of a kind's terms where the poses in W say they are."""
     for k in range(S.kinds[kind], S.kinds[kind + 1]):
-        F = load(W.FK, S.term_i[k, TERM_F])
-        M = load(W.FK, S.term_i[k, TERM_M])
-        h = S.term_i[k, TERM_HINT]
+        F = load(W.FK, S.terms.F[k])
+        M = load(W.FK, S.terms.M[k])
+        h = S.terms.hint[k]
         z[h] = foot(parameters(S.term_x, k), F, M, z[h], S.const)

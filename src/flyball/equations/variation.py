@@ -72,9 +72,9 @@ def land(t, y, dy, A, P):
     S = A[S_]
     nv = P.zero.shape[0]
     settle_at(A, P, t, A[OWN].y[0])
-    bound = S.row_i.shape[0] > 0
-    for b in range(S.body_i.shape[0]):
-        bound = bound or S.body_i[b, BODY_LAW] >= 0
+    bound = S.rows.law.shape[0] > 0
+    for b in range(S.tree.parent.shape[0]):
+        bound = bound or S.tree.law[b] >= 0
     if bound:
         for k in range(P.size[COUNT]):
             a = P.size[NQ] + nv + 2 * nv * k

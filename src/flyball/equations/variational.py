@@ -32,15 +32,15 @@ SMALL = 0.02  # turn [rad] below which functions of it are series
 def weigh(v, p, A):
     """Momenta of velocities: of turns along the body's axes."""
     S = A[S_]
-    for b in range(S.body_i.shape[0]):
-        i, n = S.body_i[b, V0], S.body_i[b, NV]
-        m = S.body_x[b, MASS]
+    for b in range(S.tree.parent.shape[0]):
+        i, n = S.tree.v[b], S.tree.nv[b]
+        m = S.bodies.mass[b]
         p[i], p[i + 1] = m * v[i], m * v[i + 1]
         if n == 3:
-            p[i + 2] = S.body_x[b, INERTIA + 8] * v[i + 2]
+            p[i + 2] = S.bodies.inertia[b, 8] * v[i + 2]
         elif n == 6:
             p[i + 2] = m * v[i + 2]
-            L = mv(load9(S.body_x, b, INERTIA), (v[i + 3], v[i + 4], v[i + 5]))
+            L = mv(load9(S.bodies.inertia, b, 0), (v[i + 3], v[i + 4], v[i + 5]))
             p[i + 3], p[i + 4], p[i + 5] = L
 
 
@@ -48,8 +48,8 @@ def weigh(v, p, A):
 def speed(p, v, A):
     """Velocities of momenta."""
     S = A[S_]
-    for b in range(S.body_i.shape[0]):
-        inverse_mass(S, b, p, S.body_i[b, V0], v, S.body_i[b, V0])
+    for b in range(S.tree.parent.shape[0]):
+        inverse_mass(S, b, p, S.tree.v[b], v, S.tree.v[b])
 
 
 @formula
@@ -60,8 +60,8 @@ def fly(p, h, d, p1, A):
     for i in range(d.shape[0]):
         d[i] *= h
         p1[i] = p[i]
-    for b in range(S.body_i.shape[0]):
-        if quaternion_at(S, b)[1] >= 0 and turn(load9(S.body_x, b, INERTIA), p, h, d, p1, S.body_i[b, V0] + 3) != 0:
+    for b in range(S.tree.parent.shape[0]):
+        if quaternion_at(S, b)[1] >= 0 and turn(load9(S.bodies.inertia, b, 0), p, h, d, p1, S.tree.v[b] + 3) != 0:
             return 1
     return 0
 
@@ -141,7 +141,7 @@ def solve3(columns, r):
 def push(t, y, lam, f, A):
     """Generalised forces at a state, but for those of inertia and of rows; friction presses with ``lam``."""
     S, W, own, rows = A[S_], A[W_], A[OWN], A[SHEET].rows
-    nv, nq = f.shape[0], S.kinds[COORDINATES]
+    nv, nq = f.shape[0], S.coordinates[0]
     own.real[T] = t
     for i in range(y.shape[0]):
         own.y[0, i] = y[i]
@@ -152,11 +152,11 @@ def push(t, y, lam, f, A):
     through(A, RESIDUAL)
     for i in range(nv):
         f[i] = -rows[0, i]
-    for b in range(S.body_i.shape[0]):
+    for b in range(S.tree.parent.shape[0]):
         i = quaternion_at(S, b)[1]
         if i >= 0:
             w = (y[nq + i], y[nq + i + 1], y[nq + i + 2])
-            g = cross(w, mv(load9(S.body_x, b, INERTIA), w))
+            g = cross(w, mv(load9(S.bodies.inertia, b, 0), w))
             for k in range(3):
                 f[i + k] += g[k]
     for r in range(lam.shape[0]):
@@ -189,9 +189,9 @@ def relax(g, lam, A):
     S, rows = A[S_], A[SHEET].rows
     for r in range(g.shape[0]):
         rows[1, r] = -g[r]
-    for b in range(S.body_i.shape[0]):
-        for k in range(S.body_i[b, NV]):
-            rows[0, S.body_i[b, V0] + k] = 0.0
+    for b in range(S.tree.parent.shape[0]):
+        for k in range(S.tree.nv[b]):
+            rows[0, S.tree.v[b] + k] = 0.0
     through(A, SOLVE)
     for r in range(g.shape[0]):
         lam[r] = rows[3, r]

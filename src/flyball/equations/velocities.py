@@ -37,16 +37,16 @@ def turned_angles(x: Values, W: Any, q: np.ndarray) -> dict[str, Any]:
     """
     S = x.system
     since: list[Any] = []  # what the coordinates along each chain have turned it since it was drawn
-    for b in range(len(S.body_i)):
-        total = since[S.body_i[b, PARENT]] if S.body_i[b, PARENT] >= 0 else 0.0
-        for i in range(S.body_i[b, NV]):
-            at = S.body_i[b, Q0] + i
+    for b in range(len(S.tree.parent)):
+        total = since[S.tree.parent[b]] if S.tree.parent[b] >= 0 else 0.0
+        for i in range(S.tree.nv[b]):
+            at = S.tree.q[b] + i
             total = total + column(S, W, b, i)[0][2] * (q[at] - x.q[at])
         since.append(total)
     out = {}
     for name, b in x.structure.place.items():
-        if b >= 0 and S.body_i[b, TREE] == PLANAR:
-            out[name] = q[S.body_i[b, Q0] + 2]
+        if b >= 0 and S.tree.joint[b] == PLANAR:
+            out[name] = q[S.tree.q[b] + 2]
         elif b >= 0:
             near, angle = x.bodies[name].angle + since[b], atan2(W.BK[b, 6], W.BK[b, 3])
             out[name] = angle + whole_turns(near, angle)
@@ -59,11 +59,11 @@ def _rates(x: Values, W: Any, t: TreeJoint, d: BodyState, parent: BodyState, v: 
     seen = parent.v + _cross(parent.w, d.p - parent.p)
     columns, at = [], []
     for link in t.links:
-        for k in range(int(S.body_i[link, NV])):
+        for k in range(int(S.tree.nv[link])):
             turn, shift = column(S, W, link, k)
             arm = d.p - W.O[link]
             columns.append(np.array((*add(shift, cross(turn, arm)), *scale(x.length, turn))))
-            at.append(int(S.body_i[link, V0]) + k)
+            at.append(int(S.tree.v[link]) + k)
     if len(at) == 1 and not np.iscomplexobj(columns[0]):
         rel = np.concatenate((d.v - seen, x.length * (d.w - parent.w)))
         v[at[0]] = (columns[0] @ rel) / (columns[0] @ columns[0])

@@ -66,7 +66,7 @@ def all_guards(A, W, t, K, row):
     still(S, W, K)
     guards(S, W, t, out)
     kept_at_zero(S, W, K, out)
-    if S.guard_i[last, GUARD_KIND] == G_SHARED:
+    if S.guards.kind[last] == G_SHARED:
         guard_of_group(S, W, t, A[GROUP], K, row)
 
 
@@ -77,7 +77,7 @@ def kept_at_zero(S, W, K, out):
     for i in range(K.tied.shape[0]):
         if K.tied[i] > 0.0:
             least = LEFT * K.tied[i]
-            if S.guard_i[i, GUARD_KIND] == G_BACK:
+            if S.guards.kind[i] == G_BACK:
                 fastest = quickest(S, W) if fastest < 0.0 else fastest
                 least = LEFT * max(fastest, K.tied[i])
             out[i] -= min(max(out[i], -least), least)
@@ -117,7 +117,7 @@ def watch(t, y, A, K, row):
 def note(A, K, row):
     """Keep what guards depend on at the state last evaluated, and the guards there."""
     S, W = A[S_], A[W_]
-    nr = S.row_i.shape[0]
+    nr = S.rows.law.shape[0]
     end = 0 if row == START else 1
     for m in range(measured(S)):
         a = W.sensed[BIAS, m]
@@ -132,7 +132,7 @@ def note(A, K, row):
     grains(S, W, A[OWN].real[T], A[EXPECTED].sensed, K.real[FASTEST], K.g[grain])
     astray(S, W, A[OWN].real[T], K.g[ASTRAY])
     last = K.grain.shape[0] - 1
-    if S.guard_i[last, GUARD_KIND] == G_SHARED:
+    if S.guards.kind[last] == G_SHARED:
         K.g[grain, last] = GRAIN * A[GROUP].size[0]
     for i in range(K.grain.shape[0]):
         K.grain[i] = K.g[grain, i] if K.kept[i] == 1 else min(K.g[GRAIN_START, i], K.g[grain, i])
@@ -216,23 +216,23 @@ def keeps(S: System) -> np.ndarray:
 
     A slip in the plane is one of them: what begins at rest goes its way. One in space turns where it likes.
     """
-    kinds, of = S.guard_i[:, GUARD_KIND], S.guard_i[:, GUARD_OF]
+    kinds, of = S.guards.kind, S.guards.of
     slips = np.flatnonzero(kinds == G_TURNS)
     kept = np.isin(kinds, KEPT)
-    kept[slips[S.switch_i[of[slips], SWITCH_PARTNER] < 0]] = True
+    kept[slips[S.switches.partner[of[slips]] < 0]] = True
     return np.where(kept, np.where(np.isin(kinds, FIRM), 2, 1), 0)
 
 
 def _desk(S: System, expected: Work, c: np.ndarray, stages: int) -> Watch:
     """What a loop keeps that watches."""
-    nm = len(S.row_p) - 1 - len(S.row_i)
-    rows = np.unique(S.switch_i[S.switch_i[:, SWITCH_ROW] >= 0, SWITCH_ROW])
+    nm = len(S.row_p) - 1 - len(S.rows.law)
+    rows = np.unique(S.switches.row[S.switches.row >= 0])
     columns = np.arange(2 * nm, expected.sensed.shape[1])
-    loads = columns[: len(columns) - len(S.switch_i)]
+    loads = columns[: len(columns) - len(S.switches.row)]
     spots = [(VALUE, m) for m in columns] + [(RETURNED, m) for m in loads]
     there = expected.sensed, expected.row[LAM]
-    guarded = S.guard_i[:, GUARD_WAY], keeps(S)
-    return watching(*guarded, c, stages, nm, rows, np.array(spots, int), there, 3 * len(S.switch_i))
+    guarded = S.guards.direction, keeps(S)
+    return watching(*guarded, c, stages, nm, rows, np.array(spots, int), there, 3 * len(S.switches.row))
 
 
 @lru_cache(maxsize=16)
@@ -272,7 +272,7 @@ class Loop:
         self.steps, self.clock, self.s, self.S, self.scratch = steps, clock, s, S, scratch
         W = scratch.fields
         self._known = [idle_tableau()]
-        if len(S.guard_i):
+        if len(S.guards.kind):
             self.expected = W._replace(sensed=W.sensed.copy(), row=W.row.copy())
             self.desk = _desk(S, self.expected, steps.c, steps.stages)
         else:  # nobody looks at it, or writes to it
@@ -286,7 +286,7 @@ class Loop:
             clock.seen,
         )  # fmt: skip
         self.group, nv = group, W.vel.shape[1]
-        sheet = Sheet(np.zeros((4, max(width, len(S.guard_i), nv, len(S.row_i), 1))))
+        sheet = Sheet(np.zeros((4, max(width, len(S.guards.kind), nv, len(S.rows.law), 1))))
         self.own = Own(own, sheet, self._known[0].fields, np.zeros(2, np.int64))
         self._bound: BoundKernel | None = None
         self._clock, self._watch, self._group = (StructBuffer(x) for x in (clock, self.desk, group))
@@ -309,7 +309,7 @@ class Loop:
         if self.group.Q.count[OPEN] and not self.group.door[0]:
             self.group.door[0] = shares.address
         asked = self._asked
-        if not len(S.guard_i) and sampling is not None:
+        if not len(S.guards.kind) and sampling is not None:
             plan, part = sampling.plan, sampling.sheet.rows
             return int(sampled_steps_kernel(*asked, self._watch, self._clock, plan, part, out))
         return int(watched_kernel(*asked, self._group, self._expected, self._watch, self._clock, out))

@@ -56,17 +56,17 @@ WITHIN, EXPECTED, LOOK, ROWS = 0, 5, 6, 7
 
 def law_starts(S) -> np.ndarray:
     """Where each law begins in the code, by its number (see `law_at`); -1 where there is none."""
-    return np.r_[S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel(), S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW]]
+    return np.r_[S.forces.laws.ravel(), S.rows.law, S.tree.law]
 
 
 def noted(S) -> int:
     """How many numbers `take_note` keeps of each end."""
-    return measured(S) + (1 + PARTS) * len(S.force_i)
+    return measured(S) + (1 + PARTS) * len(S.forces.F)
 
 
 def breaking(S) -> bool:
     """Whether the formula of some force breaks somewhere."""
-    return any(breaks(kind_of(S, k)) for k in range(len(S.force_i)))
+    return any(breaks(kind_of(S, k)) for k in range(len(S.forces.F)))
 
 
 def kept(S, sampled: Collection[int] | None = None) -> np.ndarray:
@@ -78,8 +78,8 @@ def kept(S, sampled: Collection[int] | None = None) -> np.ndarray:
     look = [at >= 0 and brief(S.code, at) and (sampled is None or at in sampled) for at in laws]
     if not any(look) and not breaking(S):
         return np.zeros((ROWS, 0))
-    loads = int((S.force_i[:, FORCE_LOAD] >= 0).sum())
-    sensed = 2 * measured(S) + loads + len(S.control_i) + len(S.switch_i)
+    loads = int((S.forces.load >= 0).sum())
+    sensed = 2 * measured(S) + loads + len(S.controls.rate_law) + len(S.switches.row)
     seen = np.zeros((ROWS, max(sensed, noted(S), NODES, len(laws))))
     seen[LOOK, : len(laws)] = look
     return seen
@@ -105,7 +105,7 @@ def inspect(t, h, span, first, seen, S, W):
     if first == 0 and parted(S, seen, h):
         return 1, 0.5, BREAKS
     again = first % 2 == 1  # the law that was named last has another place to look at
-    for k in range(first // 2, LAWS * S.force_i.shape[0] + S.row_i.shape[0] + S.body_i.shape[0]):
+    for k in range(first // 2, LAWS * S.forces.F.shape[0] + S.rows.law.shape[0] + S.tree.parent.shape[0]):
         law = law_at(S, k)
         if seen[LOOK, k] > 0.0:
             n = max(LEAST, int(SAMPLES * min(1.0, h / span)))
@@ -122,12 +122,12 @@ def inspect(t, h, span, first, seen, S, W):
 @formula
 def law_at(S, k):
     """Law number k, of forces, of rows, of prescribed coordinates; -1 if it has none."""
-    if k < LAWS * S.force_i.shape[0]:
-        return S.force_i[k // LAWS, FORCE_LAW + k % LAWS]
-    k -= LAWS * S.force_i.shape[0]
-    if k < S.row_i.shape[0]:
-        return S.row_i[k, ROW_LAW]
-    return S.body_i[k - S.row_i.shape[0], BODY_LAW]
+    if k < LAWS * S.forces.F.shape[0]:
+        return S.forces.laws[k // LAWS, k % LAWS]
+    k -= LAWS * S.forces.F.shape[0]
+    if k < S.rows.law.shape[0]:
+        return S.rows.law[k]
+    return S.tree.law[k - S.rows.law.shape[0]]
 
 
 @formula
@@ -139,19 +139,19 @@ def take_note(S, W, seen, row):
     for m in range(nm):
         seen[row, m] = W.sensed[VALUE, m]
         seen[row + 1, m] = W.sensed[RATE, m]
-    for f in range(S.force_i.shape[0]):
-        if S.force_i[f, FORCE_ALONG] == SLIDING:
+    for f in range(S.forces.F.shape[0]):
+        if S.forces.family[f] == SLIDING:
             continue
-        if S.force_i[f, FORCE_ALONG] == ALONG:
-            a, b = W.sensed[VALUE, S.force_i[f, FORCE_F]], W.sensed[RATE, S.force_i[f, FORCE_F]]
+        if S.forces.family[f] == ALONG:
+            a, b = W.sensed[VALUE, S.forces.F[f]], W.sensed[RATE, S.forces.F[f]]
         else:
-            F = load(W.FK, S.force_i[f, FORCE_F])
-            M = load(W.FK, S.force_i[f, FORCE_M])
+            F = load(W.FK, S.forces.F[f])
+            M = load(W.FK, S.forces.M[f])
             a, b = inputs(kind_of(S, f), wide(S.force_x, f), F, M)
-            if S.force_i[f, FORCE_ALONG] == BETWEEN and breaks(kind_of(S, f)):
+            if S.forces.family[f] == BETWEEN and breaks(kind_of(S, f)):
                 side = branch(kind_of(S, f), wide(S.force_x, f), F, M)
                 for i in range(PARTS):
-                    seen[row, nm + S.force_i.shape[0] + PARTS * f + i] = side[i]
+                    seen[row, nm + S.forces.F.shape[0] + PARTS * f + i] = side[i]
         seen[row, nm + f] = a
         seen[row + 1, nm + f] = b
 
@@ -159,9 +159,9 @@ def take_note(S, W, seen, row):
 @formula
 def parted(S, seen, h):
     """Whether some force is on another branch of its formula at the end of the step than at its begin, or may be."""
-    nf = S.force_i.shape[0]
+    nf = S.forces.F.shape[0]
     for f in range(nf):
-        if S.force_i[f, FORCE_ALONG] == BETWEEN and breaks(kind_of(S, f)):
+        if S.forces.family[f] == BETWEEN and breaks(kind_of(S, f)):
             at = measured(S) + nf + PARTS * f
             s = 0.0
             for i in range(PARTS - 1):
@@ -248,7 +248,7 @@ def sample(S, W, k, law, t, h, x, seen):
     for m in range(nm):
         seen[WITHIN, m], seen[WITHIN, nm + m] = between(seen, m, x, h)
     made = W.info[MADE + SAMPLED]
-    if k >= LAWS * S.force_i.shape[0]:
+    if k >= LAWS * S.forces.F.shape[0]:
         if made != 0:
             return run(S.flat[made + k], S, W, s, seen[WITHIN], seen[WITHIN], seen[WITHIN], seen[WITHIN])
         return evaluate_jet(S.code, S.const, law, W.stack, s, seen, BY_TIME)[2]

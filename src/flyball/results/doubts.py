@@ -88,7 +88,7 @@ def _lifting(result: Result) -> float:
     if result.health.contact is None:
         return 0.0
     mass = float(sum(whole(result).mass)) + sum(float(b.mass.sum()) for b in result.bulk.values())
-    return mass * float(np.linalg.norm(result.values.system.glob[:3])) * result.health.contact.size
+    return mass * float(np.linalg.norm(result.values.system.gravity)) * result.health.contact.size
 
 
 def warnings_of_impulses(result: Result) -> tuple[str, ...]:
@@ -329,7 +329,7 @@ def creep(result: Result) -> dict[str, tuple[float, float]]:
             continue
         k = next(k for k, e in enumerate(forces) if e is f)
         arm, limit = f.sticking(wide(S.force_x, k))
-        x, rate = result.measured.quantity(int(S.force_i[k, FORCE_F]))
+        x, rate = result.measured.quantity(int(S.forces.F[k]))
         speed = np.abs(arm * rate)
         slow = speed < limit
         both = slow[1:] & slow[:-1]

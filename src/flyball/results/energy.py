@@ -47,7 +47,7 @@ def _of_speeds(result: Result, bodies: Iterable[int], of: tuple[int, int]) -> np
         record = r.body(b)
         w, v = (record[k] for k in of)
         w_B = mtv(record[1], w)
-        total += 0.5 * S.body_x[b, MASS] * dot(v, v) + 0.5 * dot(w_B, mv(load9(S.body_x, b, INERTIA), w_B))
+        total += 0.5 * S.bodies.mass[b] * dot(v, v) + 0.5 * dot(w_B, mv(load9(S.bodies.inertia, b, 0), w_B))
     return total
 
 
@@ -56,7 +56,7 @@ def gravity(result: Result, bodies: Iterable[int]) -> np.ndarray:
     r, S = result.records, result.values.system
     total = r.zeros()
     for b in bodies:
-        total -= S.body_x[b, MASS] * dot(tuple(S.glob[:3]), r.body(b)[0])
+        total -= S.bodies.mass[b] * dot(tuple(S.gravity), r.body(b)[0])
     return total
 
 
@@ -83,7 +83,7 @@ class Energy(Named):
         """Rows of the body table, but for bodies that stand for something else."""
         s = self._result.values.structure
         aside = {s.place[name] for name in s.model.aside if name in s.place}
-        return [b for b in range(len(self._result.values.system.body_i)) if b not in aside]
+        return [b for b in range(len(self._result.values.system.tree.parent)) if b not in aside]
 
     @cached_property
     def kinetic(self) -> np.ndarray:
@@ -99,7 +99,7 @@ class Energy(Named):
             return self._of_pieces("gravity")
         S = self._result.values.system
         total = gravity(self._result, self._bodies)
-        return sum((b.potential(S.glob[:3]) for b in self._result.bulk.values()), total)
+        return sum((b.potential(S.gravity) for b in self._result.bulk.values()), total)
 
     @cached_property
     def elastic(self) -> np.ndarray:

@@ -49,7 +49,7 @@ class Ledger:
     @property
     def mass(self) -> list[Any]:
         """Of each of the bodies [kg]; where runs differ (runs,)."""
-        every = self.result.values.system.body_x[self.bodies, MASS].tolist()
+        every = self.result.values.system.bodies.mass[self.bodies].tolist()
         return [self._rows(m)[..., 0] if isinstance(m, np.ndarray) else m for m in every]
 
     @property
@@ -57,7 +57,7 @@ class Ledger:
         """Of all of the bodies [N]."""
         g = [
             self._rows(a)[..., 0] if isinstance(a, np.ndarray) else a
-            for a in self.result.values.system.glob[:3].tolist()
+            for a in self.result.values.system.gravity.tolist()
         ]
         return sum(self.mass) * sum(a * a for a in g) ** 0.5
 
@@ -89,7 +89,7 @@ class Ledger:
     @property
     def of(self) -> str:
         """Whose it is, in words; empty: that of all."""
-        if len(self.bodies) == len(self.result.values.system.body_i):
+        if len(self.bodies) == len(self.result.values.system.tree.parent):
             return ""
         place = {b: name for name, b in self.result.values.structure.place.items()}
         names = [place[b] for b in self.bodies.tolist() if b in place]  # massless links have none
@@ -111,7 +111,7 @@ class Ledger:
 def whole(result: Result) -> Ledger:
     """That of everything."""
     e = result.energy
-    every = np.arange(len(result.values.system.body_i))
+    every = np.arange(len(result.values.system.tree.parent))
     none = result.records.zeros()
     return Ledger(result, every, e.kinetic, e.balance, (e.gravity, e.elastic), tuple(e.work.values()), none)
 
@@ -148,10 +148,10 @@ def apart(result: Result) -> list[Ledger]:
 def connected(S: System) -> np.ndarray:
     """The part to which each row of the body table belongs, (nb,): joints, couplings and forces connect them."""
     first = list(
-        range(len(S.body_i))
+        range(len(S.tree.parent))
     )  # of what each hangs together with, as far as it is known: a body before it, or itself
     pairs = [(b, int(row[PARENT])) for b, row in enumerate(S.body_i) if row[PARENT] >= 0]
-    some = [*(_of_line(S, k) for k in range(len(S.row_i))), *(_of_force(S, k) for k in range(len(S.force_i)))]
+    some = [*(_of_line(S, k) for k in range(len(S.rows.law))), *(_of_force(S, k) for k in range(len(S.forces.F)))]
     pairs += [(int(bodies[0]), int(b)) for bodies in some for b in bodies[1:]]
     for i, j in pairs:
         unite(first, i, j)
@@ -160,7 +160,7 @@ def connected(S: System) -> np.ndarray:
 
 def _of_line(S: System, k: int) -> np.ndarray:
     """Bodies of a row, or of a measured quantity behind all rows."""
-    body = np.repeat(np.arange(len(S.body_i)), S.body_i[:, NV])
+    body = np.repeat(np.arange(len(S.tree.parent)), S.tree.nv)
     return np.unique(body[S.col_i[S.row_p[k] : S.row_p[k + 1]]])
 
 
@@ -171,7 +171,7 @@ def _of_force(S: System, k: int) -> np.ndarray:
         at = S.frame_i[ends[ends >= 0]]
         return np.unique(at[at >= 0])
     lines = ends[ends >= 0] if force[FORCE_ALONG] == SLIDING else ends[:1]
-    return np.unique(np.concatenate([_of_line(S, len(S.row_i) + m) for m in lines]))
+    return np.unique(np.concatenate([_of_line(S, len(S.rows.law) + m) for m in lines]))
 
 
 def _part_of(result: Result, e: Any, part: np.ndarray) -> int:

@@ -39,7 +39,7 @@ def _largest_force(result: Result) -> float:
     """The largest multiplier that is a force, or weight [N]."""
     s, x = result.values.structure, result.values
     metric = sorted({t.row for t in s.terms if not t.measured and t.formula.measure == "m"})
-    weight = float(np.linalg.norm(x.system.glob[:3]) * x.system.body_x[:, MASS].max(initial=0.0))
+    weight = float(np.linalg.norm(x.system.gravity) * x.system.bodies.mass.max(initial=0.0))
     return max(weight, float(np.abs(result.multipliers[:, metric]).max(initial=0.0)))
 
 

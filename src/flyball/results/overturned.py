@@ -53,7 +53,7 @@ def perhaps_overturned(result: Result, runs: int) -> np.ndarray:
     """Which of several motions, one after the other, are (runs,)."""
     out = np.zeros(runs, bool)
     S = result.values.system
-    for b in range(len(S.body_i) if _known(result) else 0):
+    for b in range(len(S.tree.parent) if _known(result) else 0):
         i = quaternion_at(S, b)[1]
         if i >= 0:
             out |= _off(result, i, runs) > FAR

@@ -84,8 +84,8 @@ class Reactions:
         """
         S = self._result.values.system
         W = self._acting()
-        for b in range(len(S.body_i) - 1, -1, -1):
-            parent = int(S.body_i[b, PARENT])
+        for b in range(len(S.tree.parent) - 1, -1, -1):
+            parent = int(S.tree.parent[b])
             if parent >= 0:
                 act(W, parent, 1.0, load3(W.FB, b, 0), load3(W.FB, b, 3), load3(W.BK, b, 0))
         return -W.FB
@@ -108,12 +108,12 @@ class Reactions:
     def _inertial(self) -> SimpleNamespace:
         """Kinematics, and gravity less what each body needs to move as it does."""
         S, records = self._result.values.system, self._result.records
-        W = SimpleNamespace(BK=records.W.BK, FB=records.zeros(len(S.body_i), 6))
-        gravity = tuple(S.glob[:3])
-        for b in range(len(S.body_i)):
+        W = SimpleNamespace(BK=records.W.BK, FB=records.zeros(len(S.tree.parent), 6))
+        gravity = tuple(S.gravity)
+        for b in range(len(S.tree.parent)):
             _, R, w, _, alpha, a = records.body(b)
-            put3(W.FB, b, 0, scale(S.body_x[b, MASS], sub(gravity, a)))
-            put3(W.FB, b, 3, neg(mv(R, euler(load9(S.body_x, b, INERTIA), mtv(R, w), mtv(R, alpha)))))
+            put3(W.FB, b, 0, scale(S.bodies.mass[b], sub(gravity, a)))
+            put3(W.FB, b, 3, neg(mv(R, euler(load9(S.bodies.inertia, b, 0), mtv(R, w), mtv(R, alpha)))))
         return W
 
     def _between(self, W: SimpleNamespace, name: str) -> None:

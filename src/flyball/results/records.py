@@ -37,7 +37,7 @@ class Records:
         self.x, self.q = x, q
         self.n = len(q)
         S = x.system
-        nb, nv = len(S.body_i), v.shape[1]
+        nb, nv = len(S.tree.parent), v.shape[1]
         numbers = [x for x in (S.body_x, S.frame_x, S.const) if x.dtype != object]  # objects: arrays over time
         self.dtype = np.result_type(q, v, *([] if vdot is None else [vdot]), *numbers)  # complex for derivatives
         self.W = SimpleNamespace(BK=self.zeros(nb, 24), X=self.zeros(nv, 6), O=self.zeros(nb, 3))
@@ -61,17 +61,17 @@ class Records:
         """
         S, W = self.x.system, self.W
         missing: list[tuple[tuple, tuple]] = []
-        for b in range(len(S.body_i)):
+        for b in range(len(S.tree.parent)):
             p, _, _, _, bias_alpha, bias_a = load(W.BK, b)
             alpha = a = (0.0, 0.0, 0.0)
-            parent = int(S.body_i[b, PARENT])
+            parent = int(S.tree.parent[b])
             if parent >= 0:
                 alpha, a = missing[parent]
                 a = add(a, cross(alpha, sub(p, load3(W.BK, parent, 0))))
             arm = sub(p, load3(W.O, b, 0))
-            for i in range(S.body_i[b, NV]):
+            for i in range(S.tree.nv[b]):
                 turn, shift = column(S, W, b, i)
-                s = vdot[S.body_i[b, V0] + i]
+                s = vdot[S.tree.v[b] + i]
                 alpha = add(alpha, scale(s, turn))
                 a = add(a, scale(s, add(shift, cross(turn, arm))))
             missing.append((alpha, a))

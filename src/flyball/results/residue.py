@@ -49,7 +49,7 @@ def _worst(r: Result, angular: bool) -> tuple[float, str, float, float, str]:
     t, unit = r.t[rows], "rad/s^2" if angular else "m/s^2"
     if len(t) < LEAST:
         return 0.0, "", 0.0, 0.0, unit
-    least = BESIDE * (float(np.linalg.norm(S.glob[:3])) + length / float(np.ptp(t)) ** 2) / (length if angular else 1.0)
+    least = BESIDE * (float(np.linalg.norm(S.gravity)) + length / float(np.ptp(t)) ** 2) / (length if angular else 1.0)
     found = []
     for name, b in r.values.structure.place.items():
         if b < 0:

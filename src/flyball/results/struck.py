@@ -228,7 +228,7 @@ class ImpulseReactions(Reactions):
         for name, tree in s.tree_joints.items():
             W = self._onto(out, name)
             force, torque = load3(self.through, tree.child, 0), load3(self.through, tree.child, 3)
-            at, parent = load3(W.BK, tree.child, 0), int(result.values.system.body_i[tree.links[0], PARENT])
+            at, parent = load3(W.BK, tree.child, 0), int(result.values.system.tree.parent[tree.links[0]])
             act(W, tree.child, 1.0, force, torque, at)
             if parent >= 0:
                 act(W, parent, -1.0, force, torque, at)
@@ -266,7 +266,7 @@ class ImpulseReactions(Reactions):
     def _onto(self, out: dict[str, np.ndarray], name: str) -> SimpleNamespace:
         """Kinematics, and what an element does to the bodies so far, to be added to."""
         records = self._result.records
-        FB = out.setdefault(name, records.zeros(len(self._result.values.system.body_i), 6))
+        FB = out.setdefault(name, records.zeros(len(self._result.values.system.tree.parent), 6))
         return SimpleNamespace(BK=records.W.BK, FB=FB)
 
     def _along(self, out: dict[str, np.ndarray], name: str, slot: int, effort: np.ndarray) -> None:
@@ -285,12 +285,12 @@ class ImpulseReactions(Reactions):
     def _inertial(self) -> SimpleNamespace:
         """Kinematics, and the momentum that each body lost, about its centre of mass."""
         S, records = self._result.values.system, self._result.records
-        W = SimpleNamespace(BK=records.W.BK, FB=records.zeros(len(S.body_i), 6))
-        for b in range(len(S.body_i)):
+        W = SimpleNamespace(BK=records.W.BK, FB=records.zeros(len(S.tree.parent), 6))
+        for b in range(len(S.tree.parent)):
             _, R, w, v, _, _ = records.body(b)
             _, _, w_after, v_after, _, _ = self._after.records.body(b)
-            put3(W.FB, b, 0, scale(S.body_x[b, MASS], sub(v, v_after)))
-            put3(W.FB, b, 3, neg(mv(R, mv(load9(S.body_x, b, INERTIA), mtv(R, sub(w_after, w))))))
+            put3(W.FB, b, 0, scale(S.bodies.mass[b], sub(v, v_after)))
+            put3(W.FB, b, 3, neg(mv(R, mv(load9(S.bodies.inertia, b, 0), mtv(R, sub(w_after, w))))))
         return W
 
     def _acting(self) -> SimpleNamespace:

@@ -68,7 +68,7 @@ def _planned(s: Structure, S: System) -> Plan:
 
 def estimate(S: System) -> int:
     """Operations of all procedures, from the tables' sizes (within a factor of two)."""
-    return 30 * len(S.col_i) + 45 * len(S.ldl.Li) + 150 * len(S.frame_i) + 200 * len(S.body_i)
+    return 30 * len(S.col_i) + 45 * len(S.ldl.Li) + 150 * len(S.frame_i) + 200 * len(S.tree.parent)
 
 
 def _structure(s: Structure, S: System) -> bytes:

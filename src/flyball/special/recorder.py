@@ -68,7 +68,7 @@ class Recorder:
         self.s, self.graph = s, Graph(rounded=True)
         self.S, self.constants = symbols(S, self.graph, known)
         self.W: Work = work(s, self.S, dtype=object)
-        self.nv, self.nr, self.nm = s.nv, len(S.row_i), measured(S)
+        self.nv, self.nr, self.nm = s.nv, len(S.rows.law), measured(S)
         self.procedures: dict[str, Procedure] = {}
         self.t = self.graph.symbol("t")
         self.q, self.v = self.numbered("q", s.nq), self.numbered("v", s.nv)

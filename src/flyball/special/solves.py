@@ -34,7 +34,7 @@ class Solves(Recorder):
 
     def solved(self) -> None:
         """Factor and solves."""
-        solver = self.S.kinds[SOLVER]
+        solver = self.S.solver[0]
         S, W = self.S, self.W
         if solver == SCHUR:
             turn_rows(S, W)
@@ -43,7 +43,7 @@ class Solves(Recorder):
         stores = {SCHUR: self.kept("H"), COUPLED: self.kept("M"), ARTICULATED: []}[solver]
         if solver != ARTICULATED:
             stores += self.kept("L") + self.stored("D", 0, range(len(W.D[0])))
-        if len(S.load_i):
+        if len(S.load_terms.load):
             stores += self.stored("row", DIAGONAL, range(self.nr))
         self.add("FACTOR", {}, stores)
         reads: dict[int, Place] = {}
@@ -66,15 +66,15 @@ class Solves(Recorder):
         if is_loaded:
             reads |= self.fresh("vel", GIVEN, self.driven)
             x[self.driven] = W.vel[GIVEN, self.driven]
-        if S.kinds[SOLVER] == SCHUR and self.semidefinite:  # what a pass gives back of E is of all that it has moved
+        if S.solver[0] == SCHUR and self.semidefinite:  # what a pass gives back of E is of all that it has moved
             W.vel[V2] = f if is_loaded else 0.0
-        elif S.kinds[SOLVER] == SCHUR:
-            for b in range(len(S.body_i)) if is_loaded else ():
-                inverse_mass(S, b, f, S.body_i[b, V0], x, S.body_i[b, V0])
+        elif S.solver[0] == SCHUR:
+            for b in range(len(S.tree.parent)) if is_loaded else ():
+                inverse_mass(S, b, f, S.tree.v[b], x, S.tree.v[b])
             W.row[R1] = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]
-        elif S.kinds[SOLVER] == COUPLED and is_loaded:
+        elif S.solver[0] == COUPLED and is_loaded:
             remainder(S, W, f, gamma, x, lam, W.vel[V2], True)
-        elif S.kinds[SOLVER] == ARTICULATED:
+        elif S.solver[0] == ARTICULATED:
             articulated_solve(S, W, f, x, W.vel[EFFORT])
         stores = [*self.solution(x, lam), (("W_flat", LOADED), 1.0 if is_loaded else 0.0)]
         self.add(name, reads, stores)
@@ -84,7 +84,7 @@ class Solves(Recorder):
         out: list[tuple[Place, Any]] = [(("c", k), y) for k, y in enumerate(x)] + [
             (("d", k), y) for k, y in enumerate(lam)
         ]
-        if self.S.kinds[SOLVER] == SCHUR:
+        if self.S.solver[0] == SCHUR:
             left = self.stored("vel", V2, range(self.nv)) if self.semidefinite else []
         else:
             left = self.stored("vel", V2, range(self.nv)) + self.stored("vel", EFFORT, self.driven)
@@ -93,7 +93,7 @@ class Solves(Recorder):
     @property
     def semidefinite(self) -> bool:
         """Whether something stands in for missing masses."""
-        return bool(self.S.glob[SEMIDEFINITE] > 0.0)
+        return bool(self.S.semidefinite[0] > 0.0)
 
     def schur_left(self, gamma: np.ndarray, x: np.ndarray) -> Any:
         """What is left after a pass, and its size."""
@@ -109,7 +109,7 @@ class Solves(Recorder):
         reads = {**reads, **self.given("a", f), **self.given("b", gamma), **self.given("c", x), **self.given("d", lam)}
         reads |= self.fresh("row", R1, range(self.nr)) | self.fresh("vel", V2, range(self.nv))
         x, lam = x.copy(), lam.copy()
-        if S.kinds[SOLVER] == SCHUR:
+        if S.solver[0] == SCHUR:
             pass_schur(S, W, W.vel[V2], x, lam, self.semidefinite)
             worst = self.schur_left(gamma, x)
         else:

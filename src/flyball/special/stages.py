@@ -94,7 +94,7 @@ class Stages(Solves):
     def entries(self, readers: Sequence[Callable[[Work], list[Any]]], far: bool = False) -> list[tuple[int, int]]:
         """Entries of the frames' records that others read; all positions if they ask how ``far`` frames are."""
         S, FK, graph = self.S, self.W.FK, self.graph
-        moving = range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES])
+        moving = range(S.ground_frames[0], S.moving_frames[0])
         asked = {(k, c) for k in moving for c in range(3)} if far else set()
         granted = len(graph.granted)
         for reader in readers:
@@ -141,7 +141,7 @@ class Stages(Solves):
         return list(seen.ravel())
 
     def _weighed(self, W: Work) -> list[Any]:
-        if not len(self.S.load_i):
+        if not len(self.S.load_terms.load):
             return []
         T, row, sensed = (np.array([self.graph.symbol(f"{n}?{k}") for k in range(x.size)], object).reshape(x.shape)
                           for n, x in (("T", W.T), ("row", W.row), ("sensed", W.sensed)))  # fmt: skip
@@ -192,9 +192,9 @@ class Stages(Solves):
         sensed = np.full((3, 2 * self.nm), None, object)
         sensed[VALUE] = values = self.numbered("within", 2 * self.nm)
         inputs = (self.t, *self.numbered("input", 2))
-        forces = LAWS * len(S.force_i)
+        forces = LAWS * len(S.forces.F)
         self.laws: list[str] = []
-        for k in range(forces + len(S.row_i) + len(S.body_i)) if kept(S).shape[1] else ():
+        for k in range(forces + len(S.rows.law) + len(S.tree.parent)) if kept(S).shape[1] else ():
             law = law_at(S, k)
             self.laws.append("")
             if law < 0 or not brief(S.code, law):

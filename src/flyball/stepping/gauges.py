@@ -25,9 +25,9 @@ NEAR = 1e-12  # change of a spring's length that is none, of its own or a radian
 @formula
 def gauge(S, W, k, n, i):
     """How far force k is along its direction i of n, at the kinematics in W."""
-    if S.force_i[k, FORCE_ALONG] == 1:
-        return W.sensed[VALUE, S.force_i[k, FORCE_F]]
-    F, M = load(W.FK, S.force_i[k, FORCE_F]), load(W.FK, S.force_i[k, FORCE_M])
+    if S.forces.family[k] == 1:
+        return W.sensed[VALUE, S.forces.F[k]]
+    F, M = load(W.FK, S.forces.F[k]), load(W.FK, S.forces.M[k])
     line = sub(M[0], F[0])
     if n == 1:
         return norm(line)
@@ -50,10 +50,10 @@ def note_bends(A):
         x = A.spring_x[i]
         k = int(x[SPRING_OF])
         x[BEND] = 0.0
-        if A.S.force_i[k, FORCE_ALONG] == 1:
-            x[BEND] = A.W.sensed[BIAS, A.S.force_i[k, FORCE_F]]
+        if A.S.forces.family[k] == 1:
+            x[BEND] = A.W.sensed[BIAS, A.S.forces.F[k]]
         elif x[OF_MANY] < 2.0:
-            x[BEND] = bend_of_line(load(A.W.FK, A.S.force_i[k, FORCE_F]), load(A.W.FK, A.S.force_i[k, FORCE_M]))
+            x[BEND] = bend_of_line(load(A.W.FK, A.S.forces.F[k]), load(A.W.FK, A.S.forces.M[k]))
 
 
 @formula
@@ -83,7 +83,7 @@ def put_right(A):
     if not stiff:
         return
     h = A.real[STEP]
-    q = A.clock.y[0, : A.S.kinds[COORDINATES]]
+    q = A.clock.y[0, : A.S.coordinates[0]]
     step = A.mixing[0]
     for _ in range(PASSES):
         call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, POSITION)

@@ -43,9 +43,9 @@ SOFT = 1e-3  # h^2 k / m + h c / m: what is softer than this is left to the eval
 def climb(S, W, b, out, at, sign, force, torque, point):
     """Add the power of a wrench on body b along all velocities that move it; ``out[at]`` is that of velocity 0."""
     while b >= 0:
-        if S.body_i[b, NV] > 0:
-            project(S, W, b, out, at + S.body_i[b, V0], sign, force, torque, point)
-        b = S.body_i[b, PARENT]
+        if S.tree.nv[b] > 0:
+            project(S, W, b, out, at + S.tree.v[b], sign, force, torque, point)
+        b = S.tree.parent[b]
 
 
 @formula
@@ -53,17 +53,17 @@ def gradient(S, W, k, n, i, row):
     """What force k acts along, direction i of n, as a row over all velocities."""
     for d in range(row.shape[0]):
         row[d] = 0.0
-    if S.force_i[k, FORCE_ALONG] == 1:
-        r = S.row_i.shape[0] + S.force_i[k, FORCE_F]
+    if S.forces.family[k] == 1:
+        r = S.rows.law.shape[0] + S.forces.F[k]
         for e in range(S.row_p[r], S.row_p[r + 1]):
             row[S.col_i[e]] += W.G[e]
         return
-    F, M = load(W.FK, S.force_i[k, FORCE_F]), load(W.FK, S.force_i[k, FORCE_M])
+    F, M = load(W.FK, S.forces.F[k]), load(W.FK, S.forces.M[k])
     axis = direction(F, M[0], n, i)
     zero = (0.0, 0.0, 0.0)
     force, torque = (axis, zero) if i < 3 else (zero, axis)
-    climb(S, W, S.frame_i[S.force_i[k, FORCE_M]], row, 0, 1.0, force, torque, M[0])
-    climb(S, W, S.frame_i[S.force_i[k, FORCE_F]], row, 0, -1.0, force, torque, M[0])
+    climb(S, W, S.frame_i[S.forces.M[k]], row, 0, 1.0, force, torque, M[0])
+    climb(S, W, S.frame_i[S.forces.F[k]], row, 0, -1.0, force, torque, M[0])
 
 
 @formula
@@ -78,7 +78,7 @@ def dot_rows(a, b):
 @formula
 def respond(A, force, out):
     """What generalised impulses change the velocities by, rows of joints closed; springs have no say."""
-    nv, nr = A.wide.shape[1], A.S.row_i.shape[0]
+    nv, nr = A.wide.shape[1], A.S.rows.law.shape[0]
     rows = A.sheet.rows
     for d in range(nv):
         rows[0, d] = force[d]
@@ -94,12 +94,12 @@ def take_springs(A, h):
     """Find what is to be taken implicitly, at the state evaluated last, and factor what it adds."""
     S, W = A.S, A.W
     A.count[SPRINGS] = 0
-    if S.force_i.shape[0] == 0:
+    if S.forces.F.shape[0] == 0:
         return
     call(A.door[0], S, W, A.R, A.clock, A.slopes, SLOPES)
     found = A.slopes.rows
     used = 0
-    for k in range(S.force_i.shape[0]):
+    for k in range(S.forces.F.shape[0]):
         n = max(1, int(found[k, DIRECTIONS]))
         for i in range(n):
             stiffness, damping = max(0.0, found[k, STIFFNESS + i]), max(0.0, found[k, DAMPING + i])
@@ -117,9 +117,9 @@ def one_spring(A, h, n, which, stiffness, damping):
     J, Y, x = A.spring_J[n], A.spring_Y[n], A.spring_x[n]
     gradient(A.S, A.W, which[0], which[1], which[2], J)
     z = h * (h * stiffness + damping)
-    if A.S.kinds[SOLVER] == SCHUR:  # joints make nothing lighter
-        for b in range(A.S.body_i.shape[0]):
-            inverse_mass(A.S, b, J, A.S.body_i[b, V0], Y, A.S.body_i[b, V0])
+    if A.S.solver[0] == SCHUR:  # joints make nothing lighter
+        for b in range(A.S.tree.parent.shape[0]):
+            inverse_mass(A.S, b, J, A.S.tree.v[b], Y, A.S.tree.v[b])
         if z * dot_rows(J, Y) < SOFT:
             return False
     respond(A, J, Y)

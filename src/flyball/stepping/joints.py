@@ -85,7 +85,7 @@ def ask(A, M, C, P, X, task):
         keep(A, P, X)
         return 0
     if task == MEAN:
-        for i in range(A.S.kinds[COORDINATES]):  # at half the step, from where FINISH goes on
+        for i in range(A.S.coordinates[0]):  # at half the step, from where FINISH goes on
             A.clock.y[2, i] = A.clock.y[0, i]
         for d in range(A.wide.shape[1]):
             X.wide[d] = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
@@ -114,7 +114,7 @@ def ask(A, M, C, P, X, task):
         A.count[BEGUN] = 0
         settle_account(A)
         for d in range(A.wide.shape[1]):
-            X.wide[d] = A.clock.y[0, A.S.kinds[COORDINATES] + d]
+            X.wide[d] = A.clock.y[0, A.S.coordinates[0] + d]
     return 0
 
 
@@ -128,14 +128,14 @@ def make_consistent(A, X):
     rows = A.sheet.rows
     for d in range(A.wide.shape[1]):
         rows[0, d] = 0.0
-    for r in range(A.S.row_i.shape[0]):
+    for r in range(A.S.rows.law.shape[0]):
         rows[1, r] = A.W.row[NU, r] - row_times(A.S, A.W, r, X.wide)
     call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, SOLVE)
     for d in range(A.wide.shape[1]):
         A.wide[WAY, d] = X.wide[d] + 0.5 * rows[2, d]
         X.wide[d] += rows[2, d]
         A.wide[V_BEFORE, d] = X.wide[d]
-    for r in range(A.S.row_i.shape[0]):
+    for r in range(A.S.rows.law.shape[0]):
         A.real[ASTRAY] -= rows[3, r] * row_times(A.S, A.W, r, A.wide[WAY])
 
 
@@ -146,7 +146,7 @@ def start(A, M, X):
     A.clock.real[T] = A.real[TIME]
     status = call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, MOTION)
     put_aside(A, A.real[STEP])
-    nq = A.S.kinds[COORDINATES]
+    nq = A.S.coordinates[0]
     for d in range(A.wide.shape[1]):
         X.wide[d] = A.wide[V_BEFORE, d] = A.wide[V_AFTER, d] = A.clock.y[0, nq + d]
         A.wide[STRUCK, d] = 0.0
@@ -162,7 +162,7 @@ def start(A, M, X):
 @formula
 def free(A, M, X):
     """Velocities without contact, from those in State.wide; asked once more it begins at the same place again."""
-    y, nq = A.clock.y, A.S.kinds[COORDINATES]
+    y, nq = A.clock.y, A.S.coordinates[0]
     if A.count[BEGUN] == 0:
         for i in range(y.shape[1]):
             y[1, i] = y[0, i]
@@ -237,7 +237,7 @@ def struck(A):
 @formula
 def evaluate_again(A, part):
     """Evaluate at half the step once more, at the mean velocities with a part of what impacts changed."""
-    nq = A.S.kinds[COORDINATES]
+    nq = A.S.coordinates[0]
     for d in range(A.wide.shape[1]):
         mean = A.wide[V_BEFORE, d] + 0.5 * A.wide[CHANGE, d]
         A.clock.y[0, nq + d] = mean + part * A.wide[STRUCK, d]
@@ -251,14 +251,14 @@ def turn_on(A, h):
     Coriolis' terms make up for masses that change along the way: with those of the velocities before, impacts would
     give energy. In absolute coordinates the projection that ends the step does that.
     """
-    y, z = A.clock.y, A.S.kinds[COORDINATES] + A.wide.shape[1]
-    if A.S.kinds[SOLVER] == SCHUR or not struck(A):
+    y, z = A.clock.y, A.S.coordinates[0] + A.wide.shape[1]
+    if A.S.solver[0] == SCHUR or not struck(A):
         return
     for i in range(z, y.shape[1]):
         y[2, i] = A.clock.K[0, i]
     if evaluate_again(A, 1.0) == 0:
         for d in range(A.wide.shape[1]):
-            vdot = A.clock.K[0, A.S.kinds[COORDINATES] + d]
+            vdot = A.clock.K[0, A.S.coordinates[0] + d]
             A.wide[V_AFTER, d] += 0.5 * (h * vdot - A.wide[SMOOTH, d])
         for i in range(A.count[SPRINGS]):  # their dampers are taken at the velocities after impacts already
             s = 0.5 * h * A.spring_x[i, SPRING_C] * dot_rows(A.spring_J[i], A.wide[STRUCK])
@@ -296,22 +296,22 @@ def account(A, h):
     if struck(A):
         evaluate_again(A, 0.5)
     weigh_mean(A, h)
-    work = A.clock.K[0, S.kinds[COORDINATES] + A.wide.shape[1] :]
-    for r in range(S.row_i.shape[0]):
-        if S.row_i[r, ROW_WORK] >= 0:
-            work[S.row_i[r, ROW_WORK]] = (A.lam[0, r] + A.lam[1, r] / h) * W.row[NU, r]
-    for b in range(S.body_i.shape[0]):
-        if S.body_i[b, BODY_LAW] >= 0:
-            d = S.body_i[b, V0]
+    work = A.clock.K[0, S.coordinates[0] + A.wide.shape[1] :]
+    for r in range(S.rows.law.shape[0]):
+        if S.rows.work[r] >= 0:
+            work[S.rows.work[r]] = (A.lam[0, r] + A.lam[1, r] / h) * W.row[NU, r]
+    for b in range(S.tree.parent.shape[0]):
+        if S.tree.law[b] >= 0:
+            d = S.tree.v[b]
             mean = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
-            work[S.body_i[b, BODY_WORK]] = A.wide[EFFORTS, d] * mean
+            work[S.tree.work[b]] = A.wide[EFFORTS, d] * mean
     for d in range(A.wide.shape[1]):
         A.wide[WAY, d] = A.wide[V_AFTER, d] - A.wide[V_BEFORE, d]
     for i in range(A.count[SPRINGS]):
         k = int(A.spring_x[i, SPRING_OF])
-        if S.force_i[k, FORCE_WORK] >= 0:
+        if S.forces.work[k] >= 0:
             rate = dot_rows(A.spring_J[i], A.wide[V_BEFORE]) + 0.5 * dot_rows(A.spring_J[i], A.wide[WAY])
-            work[S.force_i[k, FORCE_WORK]] -= implied(A, h, i, A.wide[V_BEFORE], A.wide[WAY]) / h * rate
+            work[S.forces.work[k]] -= implied(A, h, i, A.wide[V_BEFORE], A.wide[WAY]) / h * rate
 
 
 @formula
@@ -337,7 +337,7 @@ def finish(A, M, X):
 
     It may be asked again, with others beside them.
     """
-    S, nq, nv, h = A.S, A.S.kinds[COORDINATES], A.wide.shape[1], A.real[STEP]
+    S, nq, nv, h = A.S, A.S.coordinates[0], A.wide.shape[1], A.real[STEP]
     y, way = A.clock.y, A.wide[WAY]
     for d in range(nv):
         way[d] = 0.5 * h * A.wide[V_AFTER, d] + h * X.wide[d]

@@ -19,9 +19,9 @@ from .joined import ASTRAY, KINETIC, POTENTIAL, WEIGHED
 def kinetic(A):
     """Kinetic energy at the kinematics in the engine's room."""
     total = 0.0
-    for b in range(A.S.body_i.shape[0]):
+    for b in range(A.S.tree.parent.shape[0]):
         v, w = load3(A.W.BK, b, 15), mtv(load9(A.W.BK, b, 3), load3(A.W.BK, b, 12))
-        total += 0.5 * A.S.body_x[b, MASS] * dot(v, v) + 0.5 * dot(w, mv(load9(A.S.body_x, b, INERTIA), w))
+        total += 0.5 * A.S.bodies.mass[b] * dot(v, v) + 0.5 * dot(w, mv(load9(A.S.bodies.inertia, b, 0), w))
     return total
 
 
@@ -29,16 +29,16 @@ def kinetic(A):
 def weighed(A, column):
     """Sum of m g . x, x in three columns of the bodies' kinematics: places from 0 on, velocities from 15 on."""
     total = 0.0
-    for b in range(A.S.body_i.shape[0]):
+    for b in range(A.S.tree.parent.shape[0]):
         x = load3(A.W.BK, b, column)
-        total += A.S.body_x[b, MASS] * (A.S.glob[0] * x[0] + A.S.glob[1] * x[1] + A.S.glob[2] * x[2])
+        total += A.S.bodies.mass[b] * (A.S.gravity[0] * x[0] + A.S.gravity[1] * x[1] + A.S.gravity[2] * x[2])
     return total
 
 
 @formula
 def reactions_work(A, lam, v):
     """Work of joints' impulses of impacts at velocities v, beyond that of what is prescribed."""
-    for r in range(A.S.row_i.shape[0]):
+    for r in range(A.S.rows.law.shape[0]):
         A.real[ASTRAY] -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.row[NU, r])
 
 

@@ -47,7 +47,7 @@ INFINITE = 1e300
 @formula
 def line_groups(A, k):
     """Group of the quantity that line k acts along; -1 if nothing moves it."""
-    r = A.S.row_i.shape[0] + A.line[k, MEASURED]
+    r = A.S.rows.law.shape[0] + A.line[k, MEASURED]
     for e in range(A.S.row_p[r], A.S.row_p[r + 1]):
         for g in range(A.queue.shape[0]):
             if A.group[g] <= A.S.col_i[e] < A.group[g + 1]:
@@ -59,7 +59,7 @@ def line_groups(A, k):
 def rate_of(A, k, v):
     """Rate of the quantity of line k with velocities v."""
     s = 0.0
-    r = A.S.row_i.shape[0] + A.line[k, MEASURED]
+    r = A.S.rows.law.shape[0] + A.line[k, MEASURED]
     for e in range(A.S.row_p[r], A.S.row_p[r + 1]):
         s += A.W.G[e] * v[A.S.col_i[e]]
     return s
@@ -111,7 +111,7 @@ def one_row(A, P, k, g, where):
     at, size, side = where
     for d in range(size):
         P.J[at + d] = 0.0
-    r = A.S.row_i.shape[0] + A.line[k, MEASURED]
+    r = A.S.rows.law.shape[0] + A.line[k, MEASURED]
     for e in range(A.S.row_p[r], A.S.row_p[r + 1]):
         P.J[at + A.S.col_i[e] - A.group[g]] += side * A.W.G[e]
 
@@ -184,8 +184,8 @@ def lines_done(A, P, X):
             A.real[LOST] -= work
         else:
             f = A.line[k, OF_FORCE]
-            if A.S.force_i[f, FORCE_WORK] >= 0:
-                z = A.S.kinds[COORDINATES] + A.wide.shape[1] + A.S.force_i[f, FORCE_WORK]
+            if A.S.forces.work[f] >= 0:
+                z = A.S.coordinates[0] + A.wide.shape[1] + A.S.forces.work[f]
                 A.clock.K[0, z] += work / A.real[STEP]
             A.line_x[k, PULLED] = X.line[i] * side / A.real[STEP]
     press(A)
@@ -194,14 +194,14 @@ def lines_done(A, P, X):
 @formula
 def press(A):
     """Loads of joints with friction, from the reactions of the step."""
-    if A.S.load_i.shape[0] == 0:
+    if A.S.load_terms.load.shape[0] == 0:
         return
     for r in range(A.lam.shape[1]):
         A.W.row[LAM, r] = A.lam[0, r] + (A.lam[1, r] + A.lam[2, r]) / A.real[STEP]
     reaction_loads(A.S, A.W)
     for k in range(A.line.shape[0]):
-        if A.line[k, WHAT] == FRICTION and A.S.force_i[A.line[k, OF_FORCE], FORCE_LOAD] >= 0:
-            A.line_x[k, PRESSED] = A.W.sensed[RETURNED, A.S.force_i[A.line[k, OF_FORCE], FORCE_LOAD]]
+        if A.line[k, WHAT] == FRICTION and A.S.forces.load[A.line[k, OF_FORCE]] >= 0:
+            A.line_x[k, PRESSED] = A.W.sensed[RETURNED, A.S.forces.load[A.line[k, OF_FORCE]]]
 
 
 @formula

@@ -247,7 +247,7 @@ def back(N, M, A, X, pace, sums):
         for i in range(6):
             X.v[k, i] = N.start[k, 12 + i]
     for d in range(X.wide.shape[0]):
-        X.wide[d] = A.clock.y[1, A.S.kinds[COORDINATES] + d]
+        X.wide[d] = A.clock.y[1, A.S.coordinates[0] + d]
     for r in range(A.lam.shape[1]):
         A.lam[2, r] = 0.0
     real, count = pace.real, pace.count

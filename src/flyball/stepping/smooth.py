@@ -29,7 +29,7 @@ NOTHING = 1e-12  # part of a column that is left of it: it says nothing new
 @formula
 def free_velocities(A):
     """Go half a step on, and find there how the velocities change by all but contact. Returns a status."""
-    nq, nv = A.S.kinds[COORDINATES], A.wide.shape[1]
+    nq, nv = A.S.coordinates[0], A.wide.shape[1]
     y, h = A.clock.y, A.real[STEP]
     before, change, half = A.wide[V_BEFORE], A.wide[CHANGE], A.mixing[HALF]
     for d in range(nv):
@@ -62,7 +62,7 @@ def free_velocities(A):
 @formula
 def put_aside(A, h):
     """What the evaluation found: h vdot, multipliers, efforts of drivers. Solving for others writes over it."""
-    nq = A.S.kinds[COORDINATES]
+    nq = A.S.coordinates[0]
     for d in range(A.wide.shape[1]):
         A.wide[SMOOTH, d] = h * A.clock.K[0, nq + d]
         A.wide[EFFORTS, d] = A.W.vel[EFFORT, d]

@@ -62,7 +62,7 @@ class Angles:
         if isinstance(owner, Joint):
             row = step_of(s, owner.name, what)
             if row is not None:
-                return owner.coordinates[what].sign * self.q[S.body_i[row, Q0]]
+                return owner.coordinates[what].sign * self.q[S.tree.q[row]]
         if not s.model.planar:
             return None
         here, there = (self._heading(k) + self._since[int(S.frame_i[k])] for k in (F, M))
@@ -76,10 +76,10 @@ class Angles:
         """Angle of every body of a planar mechanism: where it is drawn, and what coordinates have turned it since."""
         S, x = self.x.system, self.x
         since: list[Any] = []
-        for b in range(len(S.body_i)):
-            total = since[S.body_i[b, PARENT]] if S.body_i[b, PARENT] >= 0 else 0.0
-            for i in range(S.body_i[b, NV]):
-                at = S.body_i[b, Q0] + i
+        for b in range(len(S.tree.parent)):
+            total = since[S.tree.parent[b]] if S.tree.parent[b] >= 0 else 0.0
+            for i in range(S.tree.nv[b]):
+                at = S.tree.q[b] + i
                 total = total + column(S, W, b, i)[0][2] * (self.q[at] - x.q[at])
             since.append(total)
         out: dict[int, Any] = {-1: 0.0}

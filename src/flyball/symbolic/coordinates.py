@@ -66,7 +66,7 @@ def _told(model: Model, wish: str, tree: Sequence[str]) -> str:
 def _clear(c: Compiled, wish: str) -> bool:
     """Whether, as drawn, inertia moves along all velocities and rows leave no reaction open that a friction follows."""
     s, S = c.structure, c.values.system
-    light, loaded = S.glob[SEMIDEFINITE] != 0.0, bool(s.loads) and wish != "absolute"
+    light, loaded = S.semidefinite[0] != 0.0, bool(s.loads) and wish != "absolute"
     if not light and not loaded:
         return True
     T = traced(s, plain(S))
@@ -81,7 +81,7 @@ def _clear(c: Compiled, wish: str) -> bool:
     if not s.tree:  # joints' coordinates must have inertia of their own, bodies only where the rows let them go
         Z = _free(G)
         M = Z.T @ M @ Z
-    return not len(M) or bool(np.linalg.eigvalsh(M)[0] > THIN * S.body_x[:, MASS].sum() * c.values.length**2)
+    return not len(M) or bool(np.linalg.eigvalsh(M)[0] > THIN * S.bodies.mass.sum() * c.values.length**2)
 
 
 def _independent(G: np.ndarray) -> bool:

@@ -85,9 +85,9 @@ def formulated(x: Values, graph: Graph) -> Formulated:
 def _drawn(S: Any, nq: int) -> list[Any]:
     """Values of the coordinates as drawn, where the engine's are zero."""
     out: list[Any] = [0.0] * nq
-    for b in range(len(S.body_i)):
-        if S.body_x[b, OFFSET] != 0.0:
-            out[S.body_i[b, Q0]] = S.body_x[b, OFFSET]
+    for b in range(len(S.tree.parent)):
+        if S.bodies.offset[b] != 0.0:
+            out[S.tree.q[b]] = S.bodies.offset[b]
     return out
 
 
@@ -100,7 +100,7 @@ def _places(x: Values, T: Traced) -> tuple[list[Place], list[Node]]:
         if kind.foot is None or kind.progress is None:
             continue
         F, M, par = load(W.FK, t.F), load(W.FK, t.M), parameters(S.term_x, k)
-        symbol = T.z[S.term_i[k, TERM_HINT]]
+        symbol = T.z[S.terms.hint[k]]
         p = mtv(F[1], sub(M[0], F[0]))
         x0, x1, _, y0, y1, _ = point(par, symbol, S.const)
         feet.append(kind.foot(par, F, M, symbol, S.const))
@@ -139,14 +139,14 @@ def _prescribed(T: Traced, S: Any, lam: list[Node]) -> Traced:
     g, nu, G, gamma = [], [], np.zeros((len(order), s.nv), object), []
     for k, name in enumerate(order):
         b = s.prescribed[name]
-        f = evaluate_jet(S.code, S.const, S.body_i[b, BODY_LAW], T.work.stack, T.t, T.work.sensed, BY_TIME)
-        g.append(T.q[S.body_i[b, Q0]] - f[0])
+        f = evaluate_jet(S.code, S.const, S.tree.law[b], T.work.stack, T.t, T.work.sensed, BY_TIME)
+        g.append(T.q[S.tree.q[b]] - f[0])
         nu.append(f[1])
         gamma.append(f[2])
         G[k] = 0.0
-        G[k, S.body_i[b, V0]] = 1.0
-        if S.body_i[b, BODY_WORK] >= 0:
-            T.powers[S.body_i[b, BODY_WORK]] = lam[len(s.rows) + k] * T.v[S.body_i[b, V0]]
+        G[k, S.tree.v[b]] = 1.0
+        if S.tree.work[b] >= 0:
+            T.powers[S.tree.work[b]] = lam[len(s.rows) + k] * T.v[S.tree.v[b]]
     return replace(
         T,
         lam=lam,

@@ -106,7 +106,7 @@ class Lagrange:
         x = self.equations.formulated.traced
         out = objects([0.0] * len(x.v))
         p = self.momenta.list()
-        for b in range(len(x.system.body_i)):
+        for b in range(len(x.system.tree.parent)):
             _, at = quaternion_at(x.system, b)
             if at >= 0:
                 out[at : at + 3] = cross(tuple(x.v[at : at + 3]), tuple(p[at : at + 3]))

@@ -68,7 +68,7 @@ class Quantities:
         x = self.equations.formulated
         b = x.values.structure.place.get(owner, -1)
         S = x.values.system
-        if b < 0 or S.body_i[b, TREE] != FREE:
+        if b < 0 or S.tree.joint[b] != FREE:
             instead = f"{owner}.angle" if x.values.structure.model.planar else f"{owner}.rotation"
             more = "" if x.values.structure.model.planar or b < 0 else ", or coordinates='absolute'"
             raise ModelError(f"the quaternion of {owner!r} is no coordinate here: take {instead!r}{more}")

@@ -37,7 +37,7 @@ def mass_table(s: Structure, bodies: Mapping, frame_x: np.ndarray, length: Any, 
     """
     body_x = new.table("body_x", (len(s.tables["body_i"]), BODY_WIDTH), frame_x.dtype)
     moved = {f.body for f in s.frames if new.asks(f.element)}
-    rescaled = new.base is None or has_lanes([length]) or new.base.system.glob[LENGTH] != length
+    rescaled = new.base is None or has_lanes([length]) or new.base.system.length[0] != length
     usual = usual_mass([d.mass for name, d in bodies.items() if name != GROUND])
     reach = _reaches(s, frame_x)
     for name, b in s.place.items():

@@ -104,7 +104,7 @@ def traced(
         What the coordinates are where the engine's are zero, (nq,): the equations are then in these.
     """
     graph = Graph() if graph is None else graph
-    names = names or numbered(s, len(S.row_i))
+    names = names or numbered(s, len(S.rows.law))
     graph.functions.names.update(tables_by_name(s, S))
     W = work(s, S, dtype=object)
     t = graph.symbol(Symbol("t", "time", "t", "s"))
@@ -179,7 +179,7 @@ def _rates(S: System, q: list[Node], v: list[Node], T: np.ndarray) -> None:
 
 def _rows(S: System, W: Work, nm: int, nv: int) -> tuple[np.ndarray, np.ndarray]:
     """Gradients of what is measured and of the rows, dense."""
-    nr = len(S.row_i)
+    nr = len(S.rows.law)
     dense = np.array([[0.0] * nv] * (nr + nm), object).reshape(nr + nm, nv)
     for k in range(nr + nm):
         for e in range(S.row_p[k], S.row_p[k + 1]):
@@ -190,17 +190,17 @@ def _rows(S: System, W: Work, nm: int, nv: int) -> tuple[np.ndarray, np.ndarray]
 def mass_matrix(S: System, W: Work, nv: int) -> np.ndarray:
     """M, dense: of the bodies themselves where every one hangs on ground, else of composite bodies."""
     M = np.array([[0.0] * nv] * nv, object).reshape(nv, nv)
-    if len(S.mass_i):
+    if len(S.mass_entries.row):
         mass_entries(S, W)
         for e, (i, j, _) in enumerate(S.mass_i):
             M[i, j] = M[j, i] = W.M[e]
         return M
-    for b in range(len(S.body_i)):
-        v0, n = S.body_i[b, V0], S.body_i[b, NV]
+    for b in range(len(S.tree.parent)):
+        v0, n = S.tree.v[b], S.tree.nv[b]
         for k in range(n):
-            M[v0 + k, v0 + k] = S.body_x[b, MASS]
+            M[v0 + k, v0 + k] = S.bodies.mass[b]
         if n == 6:
-            M[v0 + 3 : v0 + 6, v0 + 3 : v0 + 6] = S.body_x[b, INERTIA : INERTIA + 9].reshape(3, 3)
-        elif S.body_i[b, TREE] == PLANAR:
-            M[v0 + 2, v0 + 2] = S.body_x[b, INERTIA + 8]
+            M[v0 + 3 : v0 + 6, v0 + 3 : v0 + 6] = S.bodies.inertia[b].reshape(3, 3)
+        elif S.tree.joint[b] == PLANAR:
+            M[v0 + 2, v0 + 2] = S.bodies.inertia[b, 8]
     return M

@@ -167,7 +167,7 @@ def _chosen(show: Collection[str]) -> tuple[str, ...]:
 
 
 def _down(result: Result) -> tuple[float, float, float]:
-    g = np.asarray(result.values.system.glob[:3]).real
+    g = np.asarray(result.values.system.gravity).real
     size = float(np.sqrt(g @ g))
     return three(g / size if size > 0.0 else g)
 

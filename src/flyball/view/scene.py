@@ -72,7 +72,7 @@ def grounds(result: Result, every: np.ndarray, moving: tuple[RecordedBody | Reco
 
 
 def _up(result: Result) -> np.ndarray:
-    g = np.real(np.asarray(result.values.system.glob[:3]))
+    g = np.real(np.asarray(result.values.system.gravity))
     size = float(np.sqrt(g @ g))
     return -g / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
 

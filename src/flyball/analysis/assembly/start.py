@@ -165,7 +165,7 @@ def _moved(c: Compiled, before: np.ndarray, after: np.ndarray, near: float) -> d
     k = 2 if c.structure.model.planar else 3
     for name, b in c.structure.place.items():
         if b >= 0:
-            at = slice(int(c.values.system.body_i[b, Q0]), int(c.values.system.body_i[b, Q0]) + k)
+            at = slice(int(c.values.system.tree.q[b]), int(c.values.system.tree.q[b]) + k)
             d = float(np.linalg.norm(after[at] - before[at]))
             if d > 1e-12 * c.values.length + near:
                 out[name] = d
@@ -183,7 +183,7 @@ def _repositioned(c: Compiled, before: np.ndarray, after: np.ndarray, near: floa
     for name, b in x.structure.place.items():
         if b < 0:
             continue
-        at, n = int(x.system.body_i[b, Q0]), int(x.system.body_i[b, NQ])
+        at, n = int(x.system.tree.q[b]), int(x.system.tree.nq[b])
         was, now = before[at : at + n], after[at : at + n]
         p, o = (_origin(z, x.bodies[name], k) for z in (was, now))
         what, unit = ("angle", "rad") if k == 2 else ("orientation", "1")

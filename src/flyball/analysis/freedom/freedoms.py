@@ -119,8 +119,8 @@ def _named(a: Assembly, basis: np.ndarray, bodies: list[str], names: list[str], 
 def _spin(c: Compiled, b: int) -> np.ndarray:
     """Rows that give the angular velocity of a spatial body in world axes."""
     out = np.zeros((3, c.structure.nv))
-    v0 = int(c.values.system.body_i[b, V0])
-    if c.values.system.body_i[b, TREE] == POINT:
+    v0 = int(c.values.system.tree.v[b])
+    if c.values.system.tree.joint[b] == POINT:
         return out
     out[:, v0 + 3 : v0 + 6] = c.work.BK[b, 3:12].reshape(3, 3)
     return out

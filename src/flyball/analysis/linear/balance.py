@@ -104,8 +104,8 @@ def shaken(x: State) -> Iterator[State]:
     """The state and the mechanism's numbers with other last digits: the same for all that can be told."""
     S = x.c.values.system
     size = x.c.sizes
-    for b in range(len(S.body_i)):
-        q0, v0, n = int(S.body_i[b, Q0]), int(S.body_i[b, V0]), lengths(S, b)
+    for b in range(len(S.tree.parent)):
+        q0, v0, n = int(S.tree.q[b]), int(S.tree.v[b]), lengths(S, b)
         size[v0 : v0 + n] += np.abs(x.q[q0 : q0 + n])
     rng = np.random.default_rng(0)
     for _ in range(SAMPLES):

@@ -55,6 +55,6 @@ def _bodies(start: Start, values: Values, of: tuple[np.ndarray, np.ndarray]) -> 
     for name, b in values.structure.place.items():
         if b >= 0:
             p, R, w, u, *_ = (np.array(part)[..., 0] for part in r.body(b))
-            angle = q[values.system.body_i[b, Q0] + 2] if values.structure.model.planar else 0.0
+            angle = q[values.system.tree.q[b] + 2] if values.structure.model.planar else 0.0
             out[name] = BodyState(p, R.reshape(3, 3), u, w, angle)
     return out

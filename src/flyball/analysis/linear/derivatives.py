@@ -244,9 +244,9 @@ def by_prescription(x: State, stepped: Values) -> tuple[np.ndarray, np.ndarray]:
     stack = np.zeros((x.c.structure.depth + 1, 3), complex)
     out = []
     for b in x.c.structure.prescribed.values():
-        law = int(S.body_i[b, BODY_LAW])
+        law = int(S.tree.law[b])
         f, f1, _ = evaluate_jet(S.code, S.const, law, stack, complex(x.t), np.zeros((3, 0), complex), BY_TIME)
-        out.append((-derivative(f - S.body_x[b, OFFSET]), -derivative(f1)))
+        out.append((-derivative(f - S.bodies.offset[b]), -derivative(f1)))
     found = np.array(out).reshape(-1, 2)
     return found[:, 0], found[:, 1]
 
@@ -268,8 +268,8 @@ def pattern(s: Structure, S: System) -> Any:
     """
     import scipy.sparse as sp
 
-    nb, nr, nm = len(S.body_i), len(s.rows), len(s.measured)
-    body = np.repeat(np.arange(nb), S.body_i[:, NV])
+    nb, nr, nm = len(S.tree.parent), len(s.rows), len(s.measured)
+    body = np.repeat(np.arange(nb), S.tree.nv)
     of_row = [np.unique(body[S.col_i[S.row_p[k] : S.row_p[k + 1]]]) for k in range(nr + nm)]
     named = sorted({m % nm for m in s.slots.values()}) if s.slots else []
     also = np.unique(np.concatenate([of_row[nr + m] for m in named])) if named else np.zeros(0, int)

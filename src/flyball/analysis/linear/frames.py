@@ -32,7 +32,7 @@ def kinematic(x: State) -> np.ndarray:
     """N of `Frame`: changes of rotations have components along axes that turn, (nv, nv)."""
     S = x.c.values.system
     N = np.zeros((len(x.v),) * 2)
-    for b in range(len(S.body_i)):
+    for b in range(len(S.tree.parent)):
         _, w0 = quaternion_at(S, b)
         if w0 >= 0:
             at = slice(w0, w0 + 3)
@@ -85,8 +85,8 @@ def generator(x: State, turning: np.ndarray) -> np.ndarray:
         return _of_joints(x, turning)
     x.c.at(x.t, x.q, x.v)
     H = np.zeros((len(x.v),) * 2)
-    for b in range(len(S.body_i)):
-        v0, n = int(S.body_i[b, V0]), int(S.body_i[b, NV])
+    for b in range(len(S.tree.parent)):
+        v0, n = int(S.tree.v[b]), int(S.tree.nv[b])
         own = _of_body(np.array(x.c.work.BK[b, 3:12]).reshape(3, 3), np.array(x.c.work.BK[b, 12:15]), turning)
         kept = (IN_PLANE if s.model.planar else range(6))[:n]  # a point mass has no turn
         H[v0 : v0 + n, v0 : v0 + n] = own[np.ix_(kept, kept)]

@@ -28,7 +28,7 @@ def moving_copy(model: Model, parameters: Mapping[str, float] | None, outputs: S
         Curves that are asked for.
     """
     c = compiled(model, parameters=parameters)
-    mass = LIGHT * float(c.values.system.body_x[:, MASS].sum()) or 1.0
+    mass = LIGHT * float(c.values.system.bodies.mass.sum()) or 1.0
     scales = {x.name: Scale(push=mass, mass=mass) for x in wired(model)}
     begin, env = beginnings(model), model.environment(parameters)
     other = slid(model, begin, outputs, scales=scales, board=mass)

@@ -53,7 +53,7 @@ def is_steady(x: State, e: Equations, f: Free, frame: Frame) -> bool:
 
 def still(x: State) -> bool:
     """Whether nothing moves, compared with the mechanism's own rate, or with what forces give."""
-    scale, pace = x.c.sizes / x.c.values.length, float(x.c.values.system.glob[TEMPO].real)
+    scale, pace = x.c.sizes / x.c.values.length, float(x.c.values.system.rate[0].real)
     given = np.sqrt(pace**2 + np.abs(x.vdot / scale).max(initial=0.0))
     return not (np.abs(x.v) / scale).max(initial=0.0) > STILL * given
 
@@ -126,7 +126,7 @@ def left_over(x: State, e: Equations, off: np.ndarray | None = None) -> np.ndarr
 
 def timed(S: System) -> bool:
     """Whether a law of a force follows time."""
-    for law in S.force_i[:, FORCE_LAW : FORCE_LAW + 3].ravel().tolist():
+    for law in S.forces.laws.ravel().tolist():
         if law >= 0:
             program = S.code[law + 2 : law + 2 + 2 * S.code[law]].reshape(-1, 2)
             if (program == (INPUT, 0)).all(axis=1).any():

@@ -148,8 +148,8 @@ class Variation:
         self.start, self.clock, self.sizes = start, clock, np.array(sizes, float)
         c = start.assembly.compiled
         self.c, s, S = c, c.structure, c.values.system
-        self.nq, self.nv, self.nz, self.nr, self.n = s.nq, s.nv, len(s.states), len(S.row_i), len(values)
-        self.prescribed = [int(S.body_i[b, V0]) for b in s.prescribed.values()]
+        self.nq, self.nv, self.nz, self.nr, self.n = s.nq, s.nv, len(s.states), len(S.rows.law), len(values)
+        self.prescribed = [int(S.tree.v[b]) for b in s.prescribed.values()]
         self.R: Tableau = tableau(method)
         self.own_width = 1 + len(start.y) + self.nv + self.nr + len(self.prescribed)
         self.width = self.own_width + self.n * (4 * self.nv + self.nr + self.nz)

@@ -143,16 +143,16 @@ def _unsound(c: Compiled, a: Assembly) -> str | None:
     while its neighbour keeps its place. The factorisation then divides by rounding errors, or by zero.
     """
     s, S = c.structure, c.values.system
-    if S.glob[SEMIDEFINITE] == 0.0 or S.kinds[SOLVER] != COUPLED or not s.nv:
+    if S.semidefinite[0] == 0.0 or S.solver[0] != COUPLED or not s.nv:
         return None
     q, v = c.take(a.compiled, a.t, a.q, a.v)
     c.at(a.t, q, v, MOTION)
     names = [*s.tree_joints, *s.place]
-    roots = [(b,) if b >= 0 and S.body_i[b, TREE] <= POINT else () for b in s.place.values()]
+    roots = [(b,) if b >= 0 and S.tree.joint[b] <= POINT else () for b in s.place.values()]
     of = np.full(s.nv, -1)
     for k, links in enumerate([*(t.links for t in s.tree_joints.values()), *roots]):
         for b in links:
-            of[S.body_i[b, V0] : S.body_i[b, V0] + S.body_i[b, NV]] = k
+            of[S.tree.v[b] : S.tree.v[b] + S.tree.nv[b]] = k
     row, column, _ = S.mass_i.T
     own = of[row] == of[column]
     M: dict[int, dict[tuple[int, int], float]] = {}
@@ -163,7 +163,7 @@ def _unsound(c: Compiled, a: Assembly) -> str | None:
         strict=True,
     ):
         M.setdefault(int(of[i]), {})[i, j] = x
-    size = S.body_x[:, MASS].sum() * c.values.length**2
+    size = S.bodies.mass.sum() * c.values.length**2
     for k in sorted(M):
         first = min(i for i, _ in M[k])
         block = np.zeros((max(i for i, _ in M[k]) - first + 1,) * 2)

@@ -156,12 +156,12 @@ def _driving(c: Compiled) -> list[tuple[Any, int, bool]]:
     """Drivers, where the law of each begins, and whether whole turns count for nothing."""
     s, S = c.structure, c.values.system
     laws: list[tuple[Any, int, bool]] = [
-        (row.element, int(S.row_i[k, ROW_LAW]), bool(S.row_i[k, ROW_WRAP]))
+        (row.element, int(S.rows.law[k]), bool(S.rows.wrapped[k]))
         for k, row in enumerate(s.rows)
         if isinstance(row.element, Driver)
     ]
     return laws + [
-        (s.model[name], int(S.body_i[b, BODY_LAW]), bool(S.body_i[b, TREE] == REVOLUTE))
+        (s.model[name], int(S.tree.law[b]), bool(S.tree.joint[b] == REVOLUTE))
         for name, b in s.prescribed.items()
     ]
 
@@ -280,16 +280,16 @@ def broken_force(c: Compiled, t: float) -> str:
     with np.errstate(all="ignore"):
         for k, e in enumerate(forces):
             if isinstance(e, Touch):
-                if not math.isfinite(W.sensed[LOAD, S.force_i[k, FORCE_LOAD]]):
+                if not math.isfinite(W.sensed[LOAD, S.forces.load[k]]):
                     return f"what {e.title} presses with is no number"
                 continue
-            F, M, par = load(W.FK, S.force_i[k, FORCE_F]), load(W.FK, S.force_i[k, FORCE_M]), wide(S.force_x, k)
+            F, M, par = load(W.FK, S.forces.F[k]), load(W.FK, S.forces.M[k]), wide(S.force_x, k)
             x, y = inputs_of(c, k)
             if not math.isfinite(x) or not math.isfinite(y):
                 return f"what {e.title} measures is no number. {e.fails}"
             laws = [
                 float(evaluate(S.code, S.const, at, stack, (t, x, y), W.sensed)) if at >= 0 else 0.0
-                for at in S.force_i[k, FORCE_LAW : FORCE_LAW + 3].tolist()
+                for at in S.forces.laws[k].tolist()
             ]
             if not np.isfinite(laws).all():
                 given = (
@@ -301,7 +301,7 @@ def broken_force(c: Compiled, t: float) -> str:
                     f"{f', as {part}' if part else ''}. Look for a division by zero or a range that it leaves"
                     f"{_texts(e)}"
                 )
-            pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
+            pressed = W.sensed[LOAD, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
             out = (
                 e.effort(par, x, y, laws, pressed)
                 if isinstance(e, CoordinateForce)
@@ -374,7 +374,7 @@ def _jammed(a: Assembly, clock: ex.Clock) -> str:
     W = a.compiled.work
     if W.info[STATUS] != motion.JAMMED:
         return ""
-    loads = int((a.compiled.system.force_i[:, FORCE_LOAD] >= 0).sum())
+    loads = int((a.compiled.system.forces.load >= 0).sum())
     return jam(a.compiled.structure.forces[int(W.info[GUILTY])], float(clock.real[ex.T]), loads == 1)
 
 

@@ -66,7 +66,7 @@ def _accelerations(result: Result, c: Compiled) -> np.ndarray:
         if b < 0:
             continue
         _, R, _, _, alpha, a = result.records.body(result.values.structure.place[name])
-        v0, n = int(c.values.system.body_i[b, V0]), int(c.values.system.body_i[b, NV])
+        v0, n = int(c.values.system.tree.v[b]), int(c.values.system.tree.nv[b])
         turns = [alpha[2]] if planar else [sum(R[3 * i + k] * alpha[i] for i in range(3)) for k in range(3)]
         out[:, v0 : v0 + n] = np.stack([*(a[:2] if planar else a), *turns][:n], axis=1)
     return out

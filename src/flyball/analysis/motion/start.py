@@ -134,7 +134,7 @@ def _worked_out(
     base = _base(model, t, parameters, before)
     if part.later and before is not None:
         return replace(_as_it_came(base, parameters, before, switches), part=part)
-    if base.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
+    if base.compiled.values.system.semidefinite[0] > 0.0:
         mobility(model, base, inertia=True)
     return replace(begin_at(base, parameters, coordinates, before, switches=switches), part=part)
 
@@ -248,7 +248,7 @@ def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before
     plain = compiled(model, parameters=parameters)
     q, v = plain.take(c, t, q, v)
     for name, more in before.wound.items():
-        q[plain.values.system.body_i[plain.structure.place[name], Q0] + 2] -= more
+        q[plain.values.system.tree.q[plain.structure.place[name]] + 2] -= more
     return Assembly(plain, t, q, v)
 
 

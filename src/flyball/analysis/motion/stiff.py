@@ -193,7 +193,7 @@ def limited_by(fast: complex, clock: ex.Clock, lately: Lately) -> bool:
 
 def on_corner(c: Compiled) -> bool:
     """Whether a law is held on its corner: its side follows from accelerations, which implicit steps do not find."""
-    if not len(c.system.switch_i):
+    if not len(c.system.switches.row):
         return False
-    kinds, modes = c.system.switch_i[:, SWITCH_KIND], c.work.switch[MODE]
+    kinds, modes = c.system.switches.kind, c.work.switch[MODE]
     return bool(((kinds == BRANCH) & (modes != OFF)).any())

@@ -104,7 +104,7 @@ def _unbounded_law(a: Assembly, clock: ex.Clock) -> str:
         if isinstance(e, Touch):
             continue
         x, rate = inputs_of(now, k)
-        for law in filter(lambda at: at >= 0, S.force_i[k, FORCE_LAW : FORCE_LAW + LAWS].tolist()):
+        for law in filter(lambda at: at >= 0, S.forces.laws[k].tolist()):
             before, here, then = (
                 abs(evaluate_law(S.code, S.const, law, stack, *of))
                 for of in (

@@ -26,7 +26,7 @@ LONGEST = 100  # characters of a part of a law in a message
 def inputs_of(c: Compiled, k: int) -> tuple[float, float]:
     """What the laws of force k may depend on besides time, at the kinematics in the scratch."""
     S, W, e = c.values.system, c.work, c.structure.forces[k]
-    F, M = S.force_i[k, FORCE_F], S.force_i[k, FORCE_M]
+    F, M = S.forces.F[k], S.forces.M[k]
     if isinstance(e, CoordinateForce):
         return float(W.sensed[VALUE, F]), float(W.sensed[RATE, F])
     x, y = e.inputs(wide(S.force_x, k), load(W.FK, F), load(W.FK, M))

@@ -57,7 +57,7 @@ def settled(model: Model, base: Assembly, parameters: Mapping[str, float] | None
     refuse_surfaces(scene)
     free = len(scene.carriers.mass) - len(found.held)
     held = held_apart(values, base.t, parameters, found, free)
-    gravity = float(np.linalg.norm(values.system.glob[:3]))
+    gravity = float(np.linalg.norm(values.system.gravity))
     h = PART * math.sqrt(smallest(scene, values) / gravity) if gravity > 0.0 else 5e-3
     o = Stepping(step=h, tolerance=1e-9 * (gravity or 1.0) * h, iterations=ITERATIONS, position_iterations=ITERATIONS)
     still = Assembly(base.compiled, base.t, base.q, 0.0 * base.v)

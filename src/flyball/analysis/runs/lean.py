@@ -87,7 +87,7 @@ def _shared(question: Question, point: np.ndarray, points: np.ndarray) -> Shared
     begun = begin(model, start_time(o.t_start, None), o.parameters, None, o.coordinates, switches=True)
     c = begun.assembly.compiled
     s, S = c.structure, c.values.system
-    if s.switches or s.guards or s.functions or s.loads or S.glob[SEMIDEFINITE] or leaves_no_freedom(begun):
+    if s.switches or s.guards or s.functions or s.loads or S.semidefinite[0] or leaves_no_freedom(begun):
         return None
     if s.sampled or laws_of_time(c):
         return None

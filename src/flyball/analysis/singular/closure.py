@@ -158,9 +158,9 @@ class Closure:
         """The step from x to y; whole turns do not count."""
         S = self.c.values.system
         d = np.append(tangent_step(self.c, x.q, y.q), y.a - x.a)
-        for b in range(len(S.body_i)):
-            if S.body_i[b, TREE] == PLANAR:
-                turn = S.body_i[b, V0] + 2
+        for b in range(len(S.tree.parent)):
+            if S.tree.joint[b] == PLANAR:
+                turn = S.tree.v[b] + 2
                 d[turn] = np.arctan2(np.sin(d[turn]), np.cos(d[turn]))
         d[:-1] /= self.scale
         if self.turning:

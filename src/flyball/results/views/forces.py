@@ -33,7 +33,7 @@ class ForceView(View):
         k = self._index()
         F, M, par = self._frames
         a, b = (np.broadcast_to(i, (self._result.records.n,)) for i in e.inputs(par, F, M))
-        laws = tuple(self._law(int(S.force_i[k, FORCE_LAW + i]), a, b) for i in range(3))
+        laws = tuple(self._law(int(S.forces.laws[k, i]), a, b) for i in range(3))
         force, torque = e.wrench(par, F, M, laws, (a, b))
         return (a, b), force, torque
 
@@ -55,23 +55,23 @@ class ForceView(View):
 
     def pushes(self) -> tuple[int, np.ndarray]:
         """Of a force along a measured quantity: number of that, and its effort along it over time; without its row."""
-        return int(self._x.system.force_i[self._index(), FORCE_F]), self._along()[2]
+        return int(self._x.system.forces.F[self._index()]), self._along()[2]
 
     def _along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(value, rate, effort) over time, of a force along a measured quantity."""
         e, S = self.element, self._x.system
         k = self._index()
-        x, rate = self._result.measured.quantity(int(S.force_i[k, FORCE_F]))
-        laws = (self._law(int(S.force_i[k, FORCE_LAW]), x, rate), 0.0 * x, self._way(k, rate))
+        x, rate = self._result.measured.quantity(int(S.forces.F[k]))
+        laws = (self._law(int(S.forces.laws[k, 0]), x, rate), 0.0 * x, self._way(k, rate))
         load = 0.0 * x
-        if S.force_i[k, FORCE_LOAD] >= 0:
+        if S.forces.load[k] >= 0:
             force, torque = self._result.reactions.of(e.joint)
-            load = e.load(wide(S.force_x, k), self._result.records.frame(int(S.force_i[k, FORCE_M])), force, torque)
+            load = e.load(wide(S.force_x, k), self._result.records.frame(int(S.forces.M[k])), force, torque)
         return x, rate, e.effort(wide(S.force_x, k), x, rate, laws, load) + 0.0 * x
 
     def _way(self, k: int, rate: np.ndarray) -> np.ndarray:
         """Which way it slides: as its switch said then; where there is none by the sign of the rate."""
-        s = int(self._x.system.force_i[k, FORCE_SWITCH])
+        s = int(self._x.system.forces.switch[k])
         stretches = self._result.stretches
         if s < 0 or stretches is None:
             return sign(rate)
@@ -176,7 +176,7 @@ class ForceView(View):
             if not any(f is e for f in self._x.structure.forces):
                 return self._result.records.zeros()
             S, k = self._x.system, self._index()
-            x = self._result.measured.quantity(int(S.force_i[k, FORCE_F]))[0]
+            x = self._result.measured.quantity(int(S.forces.F[k]))[0]
             return self._in_force() * e.energy(wide(S.force_x, k), x)
         F, M, par = self._frames
         return e.energy(par, F, M)

@@ -51,7 +51,7 @@ class JointView(View):
         s, S = self._x.structure, self._x.system
         row = step_of(s, self.element.name, what)
         if row is not None:
-            return self.element.coordinates[what].sign * self._result.q[:, S.body_i[row, Q0]]
+            return self.element.coordinates[what].sign * self._result.q[:, S.tree.q[row]]
         name = f"{self.element.name}.{what}"
         if name in s.state_at:
             return self._result.states[:, s.state_at[name]]

@@ -32,7 +32,7 @@ class IMUView(View):
     def specific_force(self) -> np.ndarray:
         """Acceleration of its origin less gravity, along its own axes [m/s^2], (n, 3)."""
         _, R, _, _, _, a = self._axes()
-        gravity = tuple(self._x.system.glob[:3])
+        gravity = tuple(self._x.system.gravity)
         return np.stack(mtv(R, sub(a, gravity)), axis=1)
 
     @property

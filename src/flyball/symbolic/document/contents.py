@@ -50,7 +50,7 @@ def mechanism(eq: Equations) -> Section:
     rows = []
     for e in m.bodies:
         b = s.place[e.name]
-        weight = [S.body_x[b, MASS], *moments(S.body_x[b, INERTIA : INERTIA + 9], m.planar)]
+        weight = [S.bodies.mass[b], *moments(S.bodies.inertia[b], m.planar)]
         rows.append(
             (e.name, *map(value, simplified(weight if e.name not in s.points else weight[:1] + [0.0] * len(names))))
         )

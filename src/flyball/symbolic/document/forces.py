@@ -20,7 +20,7 @@ def along(x: Formulated) -> list[tuple[str, np.ndarray]]:
     weightless[:3] = 0.0
     turning = _gathered(S._replace(glob=weightless), W, None)
     out = [("Centrifugal, Coriolis and gyroscopic forces", turning)]
-    if any(c != 0.0 for c in S.glob[:3]):
+    if any(c != 0.0 for c in S.gravity):
         out.append(("Weight", _gathered(S, W, None) - turning))
     for k, e in enumerate(T.structure.forces):
         one = S._replace(force_i=S.force_i[k : k + 1], force_x=S.force_x[k : k + 1], own=S.own[k : k + 1])
@@ -33,7 +33,7 @@ def _gathered(S: System, W: Work, t: Any) -> np.ndarray:
     f = np.empty(W.vel.shape[1], object)
     f[:] = 0.0
     W.FB[:] = 0.0
-    rates = np.zeros(len(S.force_i) + W.y.size, object)
+    rates = np.zeros(len(S.forces.F) + W.y.size, object)
     if t is None:
         inertial(S, W)
         gather(S, W, f)

@@ -41,10 +41,10 @@ def constraints(x: Traced) -> Constraints:
     later = sorted(s.prescribed, key=lambda name: s.slices[name].start) if there else list(s.prescribed)
     G, g, nu, gamma = zeros(n, s.nv), zeros(n), zeros(n), zeros(n)
     for k, b in enumerate(s.prescribed[name] for name in later[:n]):
-        law = S.body_i[b, BODY_LAW]
+        law = S.tree.law[b]
         value, rate, second = evaluate_jet(S.code, S.const, law, W.stack, x.t, W.sensed, BY_TIME)
-        G[k, S.body_i[b, V0]] = 1.0
-        g[k] = x.q[S.body_i[b, Q0]] - (value - S.body_x[b, OFFSET])
+        G[k, S.tree.v[b]] = 1.0
+        g[k] = x.q[S.tree.q[b]] - (value - S.bodies.offset[b])
         nu[k], gamma[k] = rate, second
     return Constraints(
         [r.element.name for r in s.rows] + later,

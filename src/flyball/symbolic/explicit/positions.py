@@ -90,7 +90,7 @@ def solved_positions(
 def _given(x: Traced, unknown: Sequence[int]) -> list[Node]:
     """Coordinates that are not asked for; where drivers move all, the coordinate that a driver gives."""
     known = [s for k, s in enumerate(x.q) if k not in unknown]
-    return known or [x.q[x.system.body_i[b, Q0]] for b in x.structure.prescribed.values()]
+    return known or [x.q[x.system.tree.q[b]] for b in x.structure.prescribed.values()]
 
 
 def _implicit(g: Sequence[Node], w: Sequence[Node], probe: Probe) -> list[Definition]:

@@ -57,7 +57,7 @@ def solution(x: Traced) -> Solution:
     ModelError
         If a force is no linear function of the load of a joint with friction.
     """
-    once = coupled(x) if len(x.system.mass_i) else schur(x)
+    once = coupled(x) if len(x.system.mass_entries.row) else schur(x)
     if not x.loads:
         return Solution(*_refined(x, once, x.f, x.gamma), zeros(0))
     return _loaded(x, once)
@@ -65,8 +65,8 @@ def solution(x: Traced) -> Solution:
 
 def _refined(x: Traced, once: Once, f: np.ndarray, gamma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A solution, put right by what it misses of the true equations."""
-    light = x.system.glob[SEMIDEFINITE] > 0.0
-    balanced = not len(x.system.mass_i) and not light  # each step fulfils M vdot = f + G^T lam then
+    light = x.system.semidefinite[0] > 0.0
+    balanced = not len(x.system.mass_entries.row) and not light  # each step fulfils M vdot = f + G^T lam then
     vdot, lam = once(f, gamma)
     for _ in range(LIGHT if light else REFINEMENTS if len(lam) else 1):
         left = zeros(len(f)) if balanced else f - x.M @ vdot + _forces(x.G, lam)
@@ -94,8 +94,8 @@ def schur(x: Traced) -> Once:
 
     def once(f: np.ndarray, gamma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         dx = zeros(len(f))
-        for b in range(len(S.body_i)):
-            inverse_mass(S, b, f, S.body_i[b, V0], dx, S.body_i[b, V0])
+        for b in range(len(S.tree.parent)):
+            inverse_mass(S, b, f, S.tree.v[b], dx, S.tree.v[b])
         mu = solved(S.ldl, L, D, gamma - x.G @ dx) if nr else gamma
         for e, k in enumerate(rows):
             dx[S.col_i[e]] = dx[S.col_i[e]] + W.H[e] * mu[k]
@@ -110,12 +110,12 @@ def coupled(x: Traced) -> Once:
     K = np.zeros((nv + nr, nv + nr), object)
     K[:nv, :nv] = x.M
     K[nv:, :nv] = x.G
-    lever = min(1.0, float(x.system.glob[LENGTH].real)) ** 2
+    lever = min(1.0, float(x.system.length[0].real)) ** 2
     for k in range(nr):
         size: Any = 0.0
         for d in weighed(x, k):
             size = size + (x.G[k, d] * x.G[k, d] + lever) / x.M[d, d]
-        K[nv + k, nv + k] = -x.system.glob[REGULARISE] * (1.0 if size == 0.0 else size)
+        K[nv + k, nv + k] = -x.system.regularization[0] * (1.0 if size == 0.0 else size)
     below = [(i, j) for i in range(nv + nr) for j in touched(K[i, :i])]
     i, j = np.array(below, np.int64).reshape(-1, 2).T
     P, place = analyse(nv + nr, i, j)
@@ -134,10 +134,10 @@ def coupled(x: Traced) -> Once:
 def weighed(x: Traced, k: int) -> list[int]:
     """Velocities whose inertia says how large row k is: all that it could touch, without those prescribed."""
     S = x.system
-    if k >= len(S.row_i):  # of a driver that prescribes a velocity
+    if k >= len(S.rows.law):  # of a driver that prescribes a velocity
         return touched(x.G[k])
     entries = range(S.row_p[k], S.row_p[k + 1])
-    return [int(S.col_i[e]) for e in entries if S.pair_i[e, 3] < len(S.ldl.Ai)]
+    return [int(S.col_i[e]) for e in entries if S.pairs.place[e] < len(S.ldl.Ai)]
 
 
 def touched(row: np.ndarray) -> list[int]:

@@ -126,7 +126,7 @@ def _turning(m: Mechanics) -> np.ndarray:
     """N: changes of rotations have components along axes that turn."""
     nv = len(m.x.v)
     N = zeros(nv, nv)
-    for b in range(len(m.x.system.body_i)):
+    for b in range(len(m.x.system.tree.parent)):
         _, w0 = quaternion_at(m.x.system, b)
         if w0 >= 0:
             x, y, z = m.x.v[w0 : w0 + 3]

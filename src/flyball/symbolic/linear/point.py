@@ -126,8 +126,8 @@ def coordinates(m: Mechanics) -> dict[str, Place]:
     for t, row, step in steps(s):
         if step.coordinate in t.joint.coordinates:
             name = f"{t.joint.name}.{step.coordinate}"
-            out[name] = Place(int(S.body_i[row, Q0]), False, S.body_x[row, OFFSET])
-            out[f"{name} rate"] = Place(int(S.body_i[row, V0]), True)
+            out[name] = Place(int(S.tree.q[row]), False, S.bodies.offset[row])
+            out[f"{name} rate"] = Place(int(S.tree.v[row]), True)
     for d, own in enumerate(m.names):
         if own.name not in out:
             k = _plain_coordinate(m, d)

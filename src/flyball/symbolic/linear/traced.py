@@ -185,7 +185,7 @@ def _prescribed(x: Traced) -> list[tuple[int, int, Node, Node]]:
     stack = zeros(s.depth + 1, 3)
     out = []
     for b in s.prescribed.values():
-        f, f1, _ = evaluate_jet(S.code, S.const, int(S.body_i[b, BODY_LAW]), stack, x.t, zeros(3, 0), BY_TIME)
-        law = x.graph.node(f - S.body_x[b, OFFSET])
-        out.append((int(S.body_i[b, Q0]), int(S.body_i[b, V0]), law, x.graph.node(f1)))
+        f, f1, _ = evaluate_jet(S.code, S.const, int(S.tree.law[b]), stack, x.t, zeros(3, 0), BY_TIME)
+        law = x.graph.node(f - S.bodies.offset[b])
+        out.append((int(S.tree.q[b]), int(S.tree.v[b]), law, x.graph.node(f1)))
     return out

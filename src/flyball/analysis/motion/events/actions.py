@@ -219,7 +219,7 @@ def crossed(here: Here, before: Mapping[int, float]) -> np.ndarray:
     if before:
         here.evaluate()
     for g, was in before.items():
-        now, way = expression(here, g), here.c.system.guard_i[g, GUARD_WAY]
+        now, way = expression(here, g), here.c.system.guards.direction[g]
         most = max(CLEAR * max(abs(was), abs(now)), here.nothing.get(g, 0.0))
         rises, falls = was <= -most and now > most, was >= most and now < -most
         if (rises and way >= 0) or (falls and way <= 0):

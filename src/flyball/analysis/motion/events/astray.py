@@ -24,7 +24,7 @@ def astray(here: Here, loop: Loop) -> frozenset[int]:
         if kind == G_CORNER:
             out.add(s)
         elif kind in DISTANCES:
-            before, now = np.abs(loop.desk.moving[:, 1, S.switch_i[s, SWITCH_MEASURED]])
+            before, now = np.abs(loop.desk.moving[:, 1, S.switches.measured[s]])
             if before <= HARDLY * now:
                 out.add(s)
     return frozenset(out)

@@ -50,7 +50,7 @@ def _gradient(here: Here, text: str) -> np.ndarray:
     """Gradient of a measured coordinate, (nv,)."""
     s, S = here.structure, here.c.system
     out = np.zeros(s.nv)
-    row = len(S.row_i) + s.measured[text]
+    row = len(S.rows.law) + s.measured[text]
     at = slice(S.row_p[row], S.row_p[row + 1])
     np.add.at(out, S.col_i[at], here.c.work.G[at])
     return out
@@ -80,8 +80,8 @@ def _along(here: Here, b: int, point: Three, force: Three, torque: Three) -> np.
     out = np.zeros(here.structure.nv)
     while b >= 0:
         arm = point - W.O[b]
-        for k in range(S.body_i[b, NV]):
+        for k in range(S.tree.nv[b]):
             turn, shift = (np.array(part) for part in column(S, W, b, k))
-            out[S.body_i[b, V0] + k] = force @ (shift + np.cross(turn, arm)) + torque @ turn
-        b = int(S.body_i[b, PARENT])
+            out[S.tree.v[b] + k] = force @ (shift + np.cross(turn, arm)) + torque @ turn
+        b = int(S.tree.parent[b])
     return out

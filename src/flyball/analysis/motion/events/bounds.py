@@ -58,7 +58,7 @@ def beyond(here: Here, near: np.ndarray) -> dict[int, float]:
     S, W, out = here.c.system, here.c.work, dict[int, float]()
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :]
     for s, spec in enumerate(here.structure.switches):
-        x, kind = W.sensed[VALUE, spec.measured], S.switch_i[s, SWITCH_KIND]
+        x, kind = W.sensed[VALUE, spec.measured], S.switches.kind[s]
         if kind == RATCHET and W.switch[MODE, s] == HELD:
             tooth, pitch = S.switch_x[s, [SWITCH_TOOTH, SWITCH_PITCH]]
             off = (W.switch[HOLD, s] - tooth) / pitch

@@ -60,7 +60,7 @@ def begin(here: Here) -> None:
     if here.start.before is None and not (s.switches or s.events or s.model.events):
         return
     acts = act_at_start(here)
-    if len(here.c.system.switch_i) or here.kick is not None:
+    if len(here.c.system.switches.row) or here.kick is not None:
         n = instant_of(here)
         corners = Corners(n)
         corners.begin()
@@ -94,7 +94,7 @@ def _happen(here: Here, fired: np.ndarray) -> None:
     """Events, jumps and modes, as long as expressions of events pass zero by what was done."""
     for _ in range(ROUNDS if len(fired) else 0):
         acts = act(here, fired.tolist())
-        if len(here.c.system.switch_i) or here.kick is not None:
+        if len(here.c.system.switches.row) or here.kick is not None:
             n = instant_of(here)
             settled(n, Corners(n), fired)
         acts.told(["start"])

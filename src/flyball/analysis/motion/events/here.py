@@ -135,7 +135,7 @@ class Here:
     def group(self) -> Sharing:
         """What holds together and shares its forces: `sharing`, made when it is first asked for."""
         if self.sharing is None:
-            self.sharing = sharing(len(self.c.system.switch_i), len(self.c.system.row_i))
+            self.sharing = sharing(len(self.c.system.switches.row), len(self.c.system.rows.law))
         return self.sharing
 
     @property

@@ -44,10 +44,10 @@ def hold(here: Here, e: Event, a: Lock) -> str:
     for k in switches(here, held.coordinates, held.joint, held.element):
         if held.element:
             W.switch[SPARE, k] = 0.0
-            W.switch[LOWER, k], W.switch[UPPER, k] = S.switch_x[k, SWITCH_LOWER], S.switch_x[k, SWITCH_UPPER]
+            W.switch[LOWER, k], W.switch[UPPER, k] = S.switch_values.lower[k], S.switch_values.upper[k]
             here.given += stored(here, k)
             continue
-        x = W.sensed[VALUE, S.switch_i[k, SWITCH_MEASURED]]
+        x = W.sensed[VALUE, S.switches.measured[k]]
         if held.joint and abs(x) > CLOSED * here.c.values.length:
             raise SimulationError(
                 f"at t = {here.t:.9g} s {a.title} in {e.title}: it is open by {abs(x):.3g}, and holds again only where "
@@ -64,7 +64,7 @@ def let_go(here: Here, e: Event, a: Release) -> str:
     """Let coordinates, a joint, a limit or a rope go."""
     W = here.c.work
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :]
-    held, kinds = held_by(here.structure.model, e, a), here.c.system.switch_i[:, SWITCH_KIND]
+    held, kinds = held_by(here.structure.model, e, a), here.c.system.switches.kind
     every = switches(here, held.coordinates, held.joint, held.element)
     if not any(W.switch[SPARE, k] == 0.0 if held.element else W.switch[MODE, k] != OFF for k in every):
         return f"{a.what} was {'released already' if held.element else 'not locked'}"
@@ -80,16 +80,16 @@ def let_go(here: Here, e: Event, a: Release) -> str:
 def stored(here: Here, k: int) -> float:
     """Energy [J] in an elastic switch at the state last evaluated; it goes when that is released."""
     S, W = here.c.system, here.c.work
-    if S.switch_i[k, SWITCH_KIND] != ELASTIC:
+    if S.switches.kind[k] != ELASTIC:
         return 0.0
-    x = W.sensed[VALUE, S.switch_i[k, SWITCH_MEASURED]]
+    x = W.sensed[VALUE, S.switches.measured[k]]
     depth = max(W.switch[LOWER, k] - x, x - W.switch[UPPER, k], 0.0)
-    return float(0.5 * S.switch_x[k, SWITCH_STIFFNESS] * depth**2)
+    return float(0.5 * S.switch_values.stiffness[k] * depth**2)
 
 
 def switches(here: Here, coordinates: tuple[str, ...], joint: str, element: str) -> list[int]:
     """Numbers of the rows that hold these coordinates, or are those of a joint or element."""
-    kinds = here.c.system.switch_i[:, SWITCH_KIND]
+    kinds = here.c.system.switches.kind
     out = []
     for k, spec in enumerate(here.structure.switches):
         own = isinstance(spec.element, Event)

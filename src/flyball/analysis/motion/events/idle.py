@@ -101,8 +101,8 @@ def tied(n: Instant, found: Decided) -> frozenset[tuple[int, int]]:
 def _driven(n: Instant, B: Bench, i: int, others: tuple[list[int], np.ndarray]) -> bool:
     """Whether row i, less what holds it, does work on what drivers prescribe: these move it then."""
     held, c = others
-    axes = n.S.body_i[n.S.body_i[:, BODY_LAW] >= 0, V0]
-    rows = n.S.row_i[:, ROW_WORK] >= 0
+    axes = n.S.tree.v[n.S.tree.law >= 0]
+    rows = n.S.rows.work >= 0
     for part in (B.E[:, axes], B.L[:, rows]):
         size = max(np.abs(part[i]).max(initial=0.0), np.abs(part[held]).max(initial=0.0))
         if np.abs(part[i] - c @ part[held]).max(initial=0.0) > SAME * size:

@@ -96,10 +96,10 @@ class Instant:
         c, self.here = here.c, here
         self.S, self.W = c.system, c.work
         S, s = self.S, c.structure
-        self.m = S.switch_i[:, SWITCH_MEASURED]
-        self.force = S.switch_i[:, SWITCH_FORCE]
+        self.m = S.switches.measured
+        self.force = S.switches.force
         self.first = self.W.sensed.shape[1] - len(self.m)
-        ny, width = len(here.y), max(s.nv, len(S.row_i), len(S.guard_i), 1)
+        ny, width = len(here.y), max(s.nv, len(S.rows.law), len(S.guards.kind), 1)
         none, y = np.zeros(0, np.int64), np.zeros((STATES, ny))
         seen = np.zeros((here.clock.seen.shape[0], 0))
         self.desk = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, ny)), none, seen)
@@ -110,13 +110,13 @@ class Instant:
         )
         self.asked = StructBuffer(Desk(np.array([self.engine.address]), R, self.desk, self.sheet))
         self.units = units(s)
-        self.tempo = float(S.glob[TEMPO].real)
+        self.tempo = float(S.rate[0].real)
         self.unit, metric = sizes(s, c.values.length), [unit == "m" for unit in self.units]
-        mass, spin = S.body_x[:, MASS].sum(), np.trace(S.body_x[:, INERTIA : INERTIA + 9].reshape(-1, 3, 3).sum(axis=0))
+        mass, spin = S.bodies.mass.sum(), np.trace(S.bodies.inertia.reshape(-1, 3, 3).sum(axis=0))
         turning = mass * c.values.length**2 + spin
         self.inertia = np.array([mass if m else turning for m in metric])
         self.pace = slowest(here)
-        fall = np.linalg.norm(S.glob[:3]) / c.values.length + self.pace**2
+        fall = np.linalg.norm(S.gravity) / c.values.length + self.pace**2
         self.energy = mass * c.values.length**2 * fall
         self.tiny = MOTIONLESS * self.unit * fall
         self.near, self.least = NEAR * self.unit, REST * self.unit * self.pace
@@ -131,7 +131,7 @@ class Instant:
     def begin(self) -> None:
         """At another instant, where other elements may have been released."""
         self.over = np.nan
-        self.kind = np.where(self.W.switch[SPARE] == GONE, NO_KIND, self.S.switch_i[:, SWITCH_KIND])
+        self.kind = np.where(self.W.switch[SPARE] == GONE, NO_KIND, self.S.switches.kind)
         self.kinds = self.kind.tolist()
         self.decided = [s for s in self.of(*DECIDED) if self.m[s] >= 0]
 
@@ -147,7 +147,7 @@ class Instant:
     def room(self, n: int) -> Room:
         """Room for a small problem of n rows."""
         if n not in self.rooms:
-            B, P = bench(n, self.here.structure.nv, len(self.S.row_i)), dense(n)
+            B, P = bench(n, self.here.structure.nv, len(self.S.rows.law)), dense(n)
             self.rooms[n] = Room(B, P, BoundKernel(instant, *self.tables, self.asked, StructBuffer(B), StructBuffer(P)))
         return self.rooms[n]
 
@@ -186,12 +186,12 @@ class Instant:
         """Let friction that is no row of the problem slide as it does; that of its rows acts by them alone."""
         ways, own = self.ways(), {p.switch for p in parts}
         for s in self.of(FRICTION):
-            loaded = self.S.force_i[self.force[s], FORCE_LOAD] >= 0
+            loaded = self.S.forces.load[self.force[s]] >= 0
             ways[s] = 0.0 if s in own or loaded else np.sign(self.rate[s])
 
     def response(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What a generalised force does at the state last looked at: accelerations, multipliers, efforts of drivers."""
-        out, nv, nr = self.sheet.rows, len(force), len(self.S.row_i)
+        out, nv, nr = self.sheet.rows, len(force), len(self.S.rows.law)
         out[:2] = 0.0
         out[0, :nv] = force
         self.ask(SOLVE)
@@ -199,7 +199,7 @@ class Instant:
 
     def gradients(self, which: np.ndarray) -> np.ndarray:
         """Gradients of the quantities of these switches, (n, nv)."""
-        S, nr = self.S, len(self.S.row_i)
+        S, nr = self.S, len(self.S.rows.law)
         out = np.zeros((len(which), self.here.structure.nv))
         for i, s in enumerate(which.tolist()):
             at = slice(S.row_p[nr + self.m[s]], S.row_p[nr + self.m[s] + 1])
@@ -250,7 +250,7 @@ class Instant:
     def guards(self) -> np.ndarray:
         """What is watched, (ng,)."""
         self.ask(WATCH)
-        out = self.sheet.rows[0, : len(self.S.guard_i)].copy()
+        out = self.sheet.rows[0, : len(self.S.guards.kind)].copy()
         if self.shares:
             out[-1] = margin_kernel(self.S, self.W, self.here.t, self.here.group)
         return out
@@ -271,7 +271,7 @@ def slowest(here: Here) -> float:
     That of the mechanism itself, or a change in the whole time of a motion where that is slower. A time that is short
     makes nothing small: a force of the weight of a body at rest presses, however little it would move the body.
     """
-    return min(float(here.c.system.glob[TEMPO].real), 1.0 / float(here.clock.real[SPAN]))
+    return min(float(here.c.system.rate[0].real), 1.0 / float(here.clock.real[SPAN]))
 
 
 def instant_of(here: Here) -> Instant:

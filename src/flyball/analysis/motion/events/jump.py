@@ -114,17 +114,17 @@ def finish(
 
 def add(n: Instant, out: Jump, B: Bench, x: np.ndarray) -> None:
     """Count further impulses along the rows of a problem to those of a jump; velocities have them already."""
-    S, nr = n.S, len(n.S.row_i)
+    S, nr = n.S, len(n.S.rows.law)
     out.rows[:nr] += x @ B.L
-    out.rows[nr:] += (x @ B.E)[S.body_i[S.body_i[:, BODY_LAW] >= 0, V0]]
+    out.rows[nr:] += (x @ B.E)[S.tree.v[S.tree.law >= 0]]
     for s, more in zip(B.which.tolist(), x.tolist(), strict=True):
-        out.rows[S.switch_i[s, SWITCH_ROW]] += more
+        out.rows[S.switches.row[s]] += more
         out.impulse[s] = out.impulse.get(s, 0.0) + more
 
 
 def nothing(n: Instant) -> Jump:
     """No jump."""
-    return Jump(rows=np.zeros(len(n.S.row_i)), along=np.zeros(n.here.structure.nv))
+    return Jump(rows=np.zeros(len(n.S.rows.law)), along=np.zeros(n.here.structure.nv))
 
 
 def kicked(n: Instant, kick: np.ndarray, out: Jump, B: Bench, drive: np.ndarray) -> np.ndarray:
@@ -144,7 +144,7 @@ def expanded(
     """Impulses and velocities with what restitution gives back."""
     x, u = hit
     bounces = [n.kind[p.switch] in STOPS and p.switch not in n.here.astray for p in parts]
-    bounce = np.where(bounces, n.S.switch_x[[p.switch for p in parts], SWITCH_BOUNCE], 0.0)
+    bounce = np.where(bounces, n.S.switch_values.restitution[[p.switch for p in parts]], 0.0)
     least = np.where((P.rule == PUSHES) & (x > 0.0), bounce * x, 0.0)
     if not least.any():
         return x, u
@@ -187,13 +187,13 @@ def driven(n: Instant, out: Jump, drive: np.ndarray) -> None:
     """What drivers do: their impulses, which go behind those of the rows, times the rates that they prescribe."""
     S, W, y, rows = n.S, n.W, n.here.y, out.rows
     for s, x in out.impulse.items():
-        rows[S.switch_i[s, SWITCH_ROW]] = x
+        rows[S.switches.row[s]] = x
     z = y[n.here.structure.nq + n.here.structure.nv :]
-    for k in np.flatnonzero(S.row_i[:, ROW_WORK] >= 0).tolist():
-        z[S.row_i[k, ROW_WORK]] += rows[k] * W.row[NU, k]
+    for k in np.flatnonzero(S.rows.work >= 0).tolist():
+        z[S.rows.work[k]] += rows[k] * W.row[NU, k]
     efforts: list[float] = []
-    for b in np.flatnonzero(S.body_i[:, BODY_LAW] >= 0).tolist():
-        d = S.body_i[b, V0]
-        z[S.body_i[b, BODY_WORK]] += drive[d] * n.here.v[d]
+    for b in np.flatnonzero(S.tree.law >= 0).tolist():
+        d = S.tree.v[b]
+        z[S.tree.work[b]] += drive[d] * n.here.v[d]
         efforts.append(drive[d])
     out.rows = np.r_[rows, efforts]

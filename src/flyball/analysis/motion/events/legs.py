@@ -39,11 +39,11 @@ def laws_of_time(c: Compiled) -> Timed:
 def _timed(c: Compiled) -> Timed:
     """All laws that forces, rows, guards have by time."""
     S = c.system
-    guards = S.guard_i[S.guard_i[:, GUARD_KIND] == G_LAW, GUARD_OF]
-    forces = S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel()
-    corners = S.switch_i[S.switch_i[:, SWITCH_KIND] == BRANCH, SWITCH_LAW]
+    guards = S.guards.of[S.guards.kind == G_LAW]
+    forces = S.forces.laws.ravel()
+    corners = S.switches.law[S.switches.kind == BRANCH]
     starts = np.concatenate(
-        [forces, S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW], guards, corners, S.control_i[:, CONTROL_RATE]]
+        [forces, S.rows.law, S.tree.law, guards, corners, S.controls.rate_law]
     )
     return timed(S.code.tolist(), starts.tolist())
 

@@ -58,7 +58,7 @@ def of_velocities(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarra
             out.append(Part(s, PUSHES, state=EVEN))
         elif kind == LOCK and n.m[s] >= 0 and n.mode[s] != OFF:
             out.append(Part(s, HOLDS))
-        elif kind == FRICTION and n.S.force_i[n.force[s], FORCE_LOAD] >= 0:
+        elif kind == FRICTION and n.S.forces.load[n.force[s]] >= 0:
             held = bool(still[s]) or n.mode[s] != OFF
             out.append(
                 Part(s, GRIPS, 1.0, STATIC if held else _sign(n.rate[s]), 0.0 if held else n.rate[s], state=EVEN)
@@ -80,7 +80,7 @@ def of_accelerations(n: Instant, at: dict[int, tuple[float, ...]], still: np.nda
         elif kind == FRICTION:
             if still[s]:
                 out.append(Part(s, GRIPS, way=STATIC, state=EVEN))
-            elif n.S.force_i[n.force[s], FORCE_LOAD] >= 0:
+            elif n.S.forces.load[n.force[s]] >= 0:
                 sign = _sign(n.rate[s])
                 out.append(Part(s, DRIVEN, way=sign, rate=float(n.rate[s]), lean=sign))
     return out

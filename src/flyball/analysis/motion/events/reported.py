@@ -26,9 +26,9 @@ def share(here: Here, rows: np.ndarray) -> None:
     none, R = np.zeros(0, np.int64), tableau("rk45")
     seen, state = np.zeros((ROWS, 0)), np.zeros((STATES, ny))
     own = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), state, np.zeros((1, ny)), none, seen)
-    sheet = Sheet(np.zeros((4, max(s.nv, len(S.row_i), 1))))
+    sheet = Sheet(np.zeros((4, max(s.nv, len(S.rows.law), 1))))
     address = engine.address
-    lam = slice(1 + ny + s.nv, 1 + ny + s.nv + len(S.row_i))
+    lam = slice(1 + ny + s.nv, 1 + ny + s.nv + len(S.rows.law))
     for row in rows:
         again.z = row[1 + s.nq + s.nv : 1 + ny].copy()
         again.at(row[0], row[1 : 1 + s.nq], row[1 + s.nq : 1 + s.nq + s.nv], MOTION)

@@ -94,8 +94,8 @@ class Run:
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
         self.counts = Counts()
-        self.guarded = len(here.c.system.guard_i) > 0
-        watched = self.guarded or len(here.c.system.switch_i) or here.structure.model.events
+        self.guarded = len(here.c.system.guards.kind) > 0
+        watched = self.guarded or len(here.c.system.switches.row) or here.structure.model.events
         here.seen = Segments() if watched else None
         self.sampling = self._sampling(here.t)
         self.loop = self._loop()

@@ -57,7 +57,7 @@ def _quiet(here: Here, rows: np.ndarray) -> None:
     S, W, s = here.c.system, here.c.work, here.structure
     first, ny = 1 + s.nq, 1 + len(here.y)
     for k in np.flatnonzero(W.switch[MODE] == HELD).tolist():
-        row = S.switch_i[k, SWITCH_ROW]
+        row = S.switches.row[k]
         if row >= 0 and S.row_p[row + 1] - S.row_p[row] == 1:
             column = S.col_i[S.row_p[row]]
             rows[:, [first + column, ny + column]] = 0.0

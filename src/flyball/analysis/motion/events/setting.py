@@ -74,7 +74,7 @@ def _move_bounds(here: Here, old: Values) -> None:
     S, W = here.c.system, here.c.work
     now, then, pair = S.switch_x, old.system.switch_x, [SWITCH_LOWER, SWITCH_UPPER]
     for s in np.flatnonzero((W.switch[SPARE] == 0.0) & (now[:, pair] != then[:, pair]).any(axis=1)).tolist():
-        if S.switch_i[s, SWITCH_KIND] in (STOP, ELASTIC, RATCHET):
+        if S.switches.kind[s] in (STOP, ELASTIC, RATCHET):
             W.switch[[LOWER, UPPER], s] = now[s, pair]
 
 

@@ -226,7 +226,7 @@ def sliding(n: Instant, parts: list[Part], P: Dense) -> dict[int, Part]:
             for k in own:
                 lean = float(P.u[k]) / speed
                 if n.kind[p.switch] == SLIP:
-                    mu = float(n.S.switch_x[parts[own[0]].switch, SWITCH_SLIDING])
+                    mu = float(n.S.switch_values.kinetic_friction[parts[own[0]].switch])
                     out[k] = parts[k]._replace(rule=DRIVEN, lean=lean, gain=mu)
                     P.gain[k, p.of] = (1.0 - FIRST) * mu
                 else:
@@ -271,7 +271,7 @@ def write_group(n: Instant, parts: list[Part], found: tuple[np.ndarray, ...]) ->
         G.null[j] = z @ B.L
         for i in rows.tolist():
             s = parts[i].switch
-            G.null[j, n.S.switch_i[s, SWITCH_ROW]] += B.sign[i] * z[i]
+            G.null[j, n.S.switches.row[s]] += B.sign[i] * z[i]
             if n.kind[s] == FRICTION:
                 G.bend[j, s] = gain[i] @ z
     G.Q.count[OPEN] = Z.shape[1]

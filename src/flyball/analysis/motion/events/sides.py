@@ -43,7 +43,7 @@ def teeth(n: Instant, still: np.ndarray) -> None:
         elif n.rate[s] > 0.0 and not still[s]:
             _goes_on(n, s)
         elif first or n.way[s] >= 0.0:
-            tooth, pitch = n.S.switch_x[s, SWITCH_TOOTH], n.S.switch_x[s, SWITCH_PITCH]
+            tooth, pitch = n.S.switch_values.tooth[s], n.S.switch_values.pitch[s]
             n.W.switch[LOWER, s] = tooth + pitch * np.floor((n.x[s] - tooth) / pitch + TOOTH)
             n.ways()[s] = n.way[s] = -1.0
 
@@ -71,7 +71,7 @@ def _goes_on(n: Instant, s: int) -> None:
 def _acceleration(n: Instant, s: int) -> float:
     """Second derivative of a quantity with the modes as they stand."""
     n.ask(MOTION)
-    nq = n.S.kinds[COORDINATES]
+    nq = n.S.coordinates[0]
     vdot = n.desk.K[0, nq : nq + n.here.structure.nv]
     return float(n.gradients(np.array([s]))[0] @ vdot + n.W.sensed[BIAS, n.m[s]])
 
@@ -88,7 +88,7 @@ def pressed(n: Instant, fired: np.ndarray, ways: np.ndarray) -> None:
 
 def _side(n: Instant, s: int, old: float, hit: set[int]) -> float:
     """1 if pressed at the lower side, -1 at the upper, 0 if open; `BY_ITSELF` less `FROZEN` where nothing tells."""
-    k, c = n.S.switch_x[s, SWITCH_STIFFNESS], n.S.switch_x[s, SWITCH_DAMPING]
+    k, c = n.S.switch_values.stiffness[s], n.S.switch_values.damping[s]
     now = 0.0
     for side, bound, guard in ((1.0, LOWER, G_PRESS_LOWER), (-1.0, UPPER, G_PRESS_UPPER)):
         depth, rate = side * (n.W.switch[bound, s] - n.x[s]), -side * n.rate[s]

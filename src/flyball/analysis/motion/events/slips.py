@@ -33,20 +33,20 @@ SLOW = 1e3  # times what is still: slower where the end of a slip in space was f
 
 def slips_of(n: Instant, gap: int) -> list[int]:
     """Slips of the place of a gap: none, one or two in a row."""
-    return [s for s in n.of(SLIP) if n.S.switch_i[s, SWITCH_OTHER] == gap]
+    return [s for s in n.of(SLIP) if n.S.switches.other[s] == gap]
 
 
 def astray(n: Instant) -> set[int]:
     """Gaps of corners that leave their face: at its end, and going on."""
     leaving = (n.x <= n.near) & ((n.rate < -n.still) | (n.x < -n.near))
-    return {int(n.S.switch_i[s, SWITCH_OTHER]) for s in n.of(EDGE) if leaving[s]}
+    return {int(n.S.switches.other[s]) for s in n.of(EDGE) if leaving[s]}
 
 
 def ended(n: Instant, fired: np.ndarray, still: np.ndarray) -> None:
     """Whether slips are over, into ``still``: of a pair both or none."""
     done = n.fired(fired, G_TURNS)
     for s in n.of(SLIP):
-        other = int(n.S.switch_i[s, SWITCH_PARTNER])
+        other = int(n.S.switches.partner[s])
         if other < 0:
             still[s] |= s in done
         elif s < other:
@@ -61,7 +61,7 @@ def stop_slips(n: Instant, fired: np.ndarray) -> None:
     """
     over = []
     for s in sorted(n.fired(fired, G_TURNS)):
-        pair = [s, int(n.S.switch_i[s, SWITCH_PARTNER])]
+        pair = [s, int(n.S.switches.partner[s])]
         speed, still = np.linalg.norm(n.rate[pair]), n.still[pair].sum()
         if n.kind[s] == SLIP and pair[1] >= 0 and still < speed <= SLOW * still and not _goes_on(n, pair):
             over += pair
@@ -115,7 +115,7 @@ def slide_on(n: Instant, parts: Sequence[Part], P: Dense, resting: np.ndarray) -
     other = False
     for i, p in enumerate(parts):
         if n.kind[p.switch] == SLIP and P.rule[i] != WITH and P.state[i] != EVEN and not resting[i]:
-            mu = float(n.S.switch_x[p.switch, SWITCH_SLIDING])
+            mu = float(n.S.switch_values.kinetic_friction[p.switch])
             other |= P.gain[i, p.of] != mu
             P.gain[i, p.of] = mu
     return other
@@ -135,7 +135,7 @@ def loose(n: Instant, parts: Sequence[Part], found: tuple[np.ndarray, ...], fire
             continue
         size = float(np.linalg.norm(x[own]))
         if size >= reach[i] - least[i]:
-            mu = float(n.S.switch_x[p.switch, SWITCH_SLIDING])
+            mu = float(n.S.switch_values.kinetic_friction[p.switch])
             for k in own:
                 out[k] = parts[k]._replace(rule=DRIVEN, lean=-float(x[k]) / size if size else 0.0, gain=mu)
     return out
@@ -151,7 +151,7 @@ def write_slips(n: Instant, parts: Sequence[Part], found: tuple[np.ndarray, ...]
     slips = n.of(SLIP)
     W.switch[MODE, slips], W.switch[HOLD, slips] = OFF, 0.0
     for i, p in enumerate(parts):
-        own = slips_of(n, int(n.S.switch_i[p.switch, SWITCH_OTHER])) if n.kind[p.switch] == SLIP else [-1]
+        own = slips_of(n, int(n.S.switches.other[p.switch])) if n.kind[p.switch] == SLIP else [-1]
         if p.switch != own[0] or state[p.of] != EVEN:
             continue
         rows = np.arange(i, i + len(own))

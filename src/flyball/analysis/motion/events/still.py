@@ -27,11 +27,11 @@ def still(n: Instant, found: Decided) -> tuple[int, ...]:
     if not named:
         return ()
     B, _, _ = n.problem(found.parts)
-    axes = n.S.body_i[n.S.body_i[:, BODY_LAW] >= 0, V0]
-    rows = n.S.row_i[:, ROW_WORK] >= 0
+    axes = n.S.tree.v[n.S.tree.law >= 0]
+    rows = n.S.rows.work >= 0
     A, out = found.A[np.ix_(held, held)], []
     drives = np.hstack([B.E[held][:, axes], B.L[held][:, rows]])
-    nr, mass = len(n.S.row_i), n.inertia.max()
+    nr, mass = len(n.S.rows.law), n.inertia.max()
     for m in named:
         w, at = np.zeros(n.here.structure.nv), slice(n.S.row_p[nr + m], n.S.row_p[nr + m + 1])
         np.add.at(w, n.S.col_i[at], n.W.G[at])

@@ -48,14 +48,14 @@ class Corner(NamedTuple):
 
 def jet(n: Instant, s: int, seed: int) -> tuple[float, float, float]:
     """The u of a corner and its derivatives, by what ``seed`` says (`laws.evaluation.evaluate_jet`)."""
-    law = int(n.S.switch_i[s, SWITCH_LAW])
+    law = int(n.S.switches.law[s])
     return evaluate_jet(n.S.code, n.S.const, law, n.W.stack, n.here.t, n.W.sensed, seed)
 
 
 def seen(n: Instant, s: int) -> Corner:
     """The corner of switch s."""
     S, W, v = n.S, n.W, n.here.v
-    nm, nr = measured(S), len(S.row_i)
+    nm, nr = measured(S), len(S.rows.law)
     terms, rows = n.here.structure.terms, len(n.here.structure.rows)
     measures = {x.row - rows: x.formula.measure for x in terms if x.measured}
     slopes = np.array([jet(n, s, m)[1] for m in range(2 * nm)])

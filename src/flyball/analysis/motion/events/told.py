@@ -105,12 +105,12 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
 
 def _is_open(n: Instant, s: int) -> bool:
     """Whether the place of a slip parted: it does not slide either."""
-    return bool(n.W.switch[MODE, n.S.switch_i[s, SWITCH_OTHER]] == OFF)
+    return bool(n.W.switch[MODE, n.S.switches.other[s]] == OFF)
 
 
 def _goes_both_ways(n: Instant, s: int) -> bool:
     """Whether a switch slides one way or the other: not a tangent of a place in space."""
-    return bool(n.kind[s] == FRICTION or (n.kind[s] == SLIP and n.S.switch_i[s, SWITCH_PARTNER] < 0))
+    return bool(n.kind[s] == FRICTION or (n.kind[s] == SLIP and n.S.switches.partner[s] < 0))
 
 
 def record(

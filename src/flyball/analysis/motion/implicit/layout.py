@@ -59,7 +59,7 @@ class Layout:
         self.places, self.groups = int(at[-1]), self.terms.groups
         self.pressing = np.union1d(pressing(s), pressed(S)).astype(np.int64)
         self.valued = np.array([r.holonomic for r in s.rows], np.int64).reshape(self.nr)
-        self.turns = np.array([w for w in (quaternion_at(S, b)[1] for b in range(len(S.body_i))) if w >= 0], np.int64)
+        self.turns = np.array([w for w in (quaternion_at(S, b)[1] for b in range(len(S.tree.parent))) if w >= 0], np.int64)
         self.row_p, self.col_i = S.row_p[: self.nr + 1], S.col_i[: S.row_p[self.nr]]
         self._entries()
         P = self.P
@@ -176,8 +176,8 @@ class Layout:
 
 def pressed(S: System) -> np.ndarray:
     """Rows of gaps of places of contact, whose multipliers the friction there follows."""
-    sliding = S.force_i[S.force_i[:, FORCE_ALONG] == SLIDING, FORCE_SWITCH]
-    return np.asarray(S.switch_i[S.switch_i[sliding, SWITCH_OTHER], SWITCH_ROW], np.int64)
+    sliding = S.forces.switch[S.forces.family == SLIDING]
+    return np.asarray(S.switches.row[S.switches.other[sliding]], np.int64)
 
 
 def layout(s: Structure, S: System, index_3: bool = False) -> Layout:
@@ -188,13 +188,13 @@ def layout(s: Structure, S: System, index_3: bool = False) -> Layout:
 def metric(c: Compiled, t: float, y: np.ndarray) -> np.ndarray:
     """Of each velocity the inverse of its inertia, (nv,), which is at least a small part of the largest."""
     s, S, W = c.structure, c.system, c.work
-    if S.kinds[SOLVER] == SCHUR:
+    if S.solver[0] == SCHUR:
         inertia = c.mass().diagonal()
     else:
         c.at(t, y[: s.nq].copy(), y[s.nq : s.nq + s.nv].copy(), MOTION)
-        own = S.mass_i[:, 0] == S.mass_i[:, 1]
+        own = S.mass_entries.row == S.mass_entries.column
         inertia = np.zeros(s.nv)
-        inertia[S.mass_i[own, 0]] = W.M[own]
+        inertia[S.mass_entries.row[own]] = W.M[own]
     size = c.sizes**2
     return 1.0 / (size * np.maximum(inertia / size, THIN * (inertia / size).max(initial=0.0)))
 
@@ -206,9 +206,9 @@ def light(c: Compiled) -> np.ndarray:
     part of the body's own mass, at the mechanism's length, does.
     """
     S, out = c.system, np.zeros(c.structure.nv)
-    if S.kinds[SOLVER] != SCHUR:  # moving masses are those of what hangs on each other
+    if S.solver[0] != SCHUR:  # moving masses are those of what hangs on each other
         return out[:0]
-    inertia, mass = S.body_x[:, INERTIA : INERTIA + 9].reshape(-1, 3, 3), S.body_x[:, MASS]
+    inertia, mass = S.bodies.inertia.reshape(-1, 3, 3), S.bodies.mass
     if c.structure.model.planar:
         inertia = inertia[:, 2:, 2:]
     own = np.linalg.eigvalsh(inertia)
@@ -217,6 +217,6 @@ def light(c: Compiled) -> np.ndarray:
         return out[:0]
     least = mass[mass > 0.0].min(initial=1.0)
     for b in np.flatnonzero(missing):
-        at = slice(S.body_i[b, V0], S.body_i[b, V0] + S.body_i[b, NV])
+        at = slice(S.tree.v[b], S.tree.v[b] + S.tree.nv[b])
         out[at] = SLIGHT * max(mass[b], least) * (c.values.length / c.sizes[at]) ** 2
     return out

@@ -59,7 +59,7 @@ class Implicit:
         if len(s.rows):
             self.own.array("plan.metric")[:] = metric(c, float(clock.real[ex.T]), clock.y[ex.NOW])
         self.count = self.own.array("desk.count")
-        self._settle(self.own.array("desk.real"), len(S.angle_i) > 0)
+        self._settle(self.own.array("desk.real"), len(S.angles.F) > 0)
 
     def bind(
         self, tables: StructBuffer, scratch: StructBuffer, own: StructBuffer, going: StructBuffer, doors: np.ndarray
@@ -80,7 +80,7 @@ class Implicit:
                  if isinstance(y, np.ndarray)]  # fmt: skip
         plan = Plan(
             x.first, x.pick, x.mass.pick, np.ones(x.nv), x.valued, x.valued.copy(), x.turns, x.pressing,
-            np.array([int(S.kinds[SOLVER] == SCHUR)], np.int64), x.negative, self.light, x.own_mass,
+            np.array([int(S.solver[0] == SCHUR)], np.int64), x.negative, self.light, x.own_mass,
         )  # fmt: skip
         springy = x.spring[self.light[x.spring[:, 0]] == 0.0] if len(self.light) else x.spring
         desk = self._desk(len(self.compiled.structure.states), springy)

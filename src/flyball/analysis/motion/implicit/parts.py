@@ -56,9 +56,9 @@ class Parts:
     """
 
     def __init__(self, s: Structure, S: System, nx: int) -> None:
-        self.S, self.nv, self.nr, self.nx = S, s.nv, len(S.row_i), nx
+        self.S, self.nv, self.nr, self.nx = S, s.nv, len(S.rows.law), nx
         nm = len(S.row_p) - 1 - self.nr
-        self.body = np.repeat(np.arange(len(S.body_i)), S.body_i[:, NV])
+        self.body = np.repeat(np.arange(len(S.tree.parent)), S.tree.nv)
         self.chain: list[np.ndarray] = []
         for row in S.body_i:
             own = np.arange(row[V0], row[V0] + row[NV])
@@ -103,7 +103,7 @@ class Parts:
                 continue
             columns = [FORCE_F, FORCE_M] if force[FORCE_ALONG] == SLIDING else [FORCE_F]
             lines = [self.nr + m for m in force[columns] if m >= 0]
-            loading = [self.S.term_i[x, TERM_ROW] for n, x in self.S.load_i if n == force[FORCE_LOAD] and x >= 0]
+            loading = [self.S.terms.row[x] for n, x in self.S.load_i if n == force[FORCE_LOAD] and x >= 0]
             depends = self._law(force, _union([self.row[n] for n in [*lines, *loading]]))
             out += [(self.entries[n], depends) for n in lines]
         return out

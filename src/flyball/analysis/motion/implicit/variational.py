@@ -42,9 +42,9 @@ class Variational:
         nv, nr, nz = s.nv, len(s.rows), len(s.states)
         self.clock = clock
         self.width = nv + 3 * nr + 3 * len(s.measured)
-        turns = [w for w in (quaternion_at(S, b)[1] for b in range(len(S.body_i))) if w >= 0]
+        turns = [w for w in (quaternion_at(S, b)[1] for b in range(len(S.tree.parent))) if w >= 0]
         real, count = np.zeros(ds.REALS), np.zeros(ds.COUNTS, np.int64)
-        real[ds.NEWTON], real[ds.ROUGH] = TIGHT * S.glob[LENGTH], CLOSED * S.glob[LENGTH]
+        real[ds.NEWTON], real[ds.ROUGH] = TIGHT * S.length[0], CLOSED * S.length[0]
         n, z = int(S.row_p[nr]), np.zeros
         self.desk = VariationalDesk(
             count, real, z((4, nv)), z((4, nv)), z((4, nv)), z((4, nr)), z(nr), z((4, nz)), z((4, nz)), z((2, nv)),
@@ -86,11 +86,11 @@ def refuse_unknown(begun: Start) -> None:
             f"method={VARIATIONAL!r} does not know rows that restrain velocities alone ({', '.join(rolling)}); leave "
             f"method out, or give method='radau'"
         )
-    if S.glob[SEMIDEFINITE] > 0.0:
+    if S.semidefinite[0] > 0.0:
         thin = [
             n
             for n, b in s.place.items()
-            if b >= 0 and (S.body_x[b, EXCESS_MASS] or S.body_x[b, EXCESS : EXCESS + 9].any())
+            if b >= 0 and (S.bodies.excess_mass[b] or S.bodies.excess_inertia[b].any())
         ]
         raise ModelError(
             f"method={VARIATIONAL!r} needs masses and inertias about all axes, which {', '.join(map(repr, thin))} does "

@@ -84,7 +84,7 @@ def result_of(
         "warnings": lambda: doubts.warnings_of_impulses(result),
     }
     states = np.zeros((len(t), len(values.structure.states)))
-    lam = np.zeros((len(t), len(values.system.row_i)))
+    lam = np.zeros((len(t), len(values.system.rows.law)))
     if kept.held:
         states, lam = kept.held.into(values, q, v, vdot)
         health.violation, health.velocity_violation = max(kept.held.gaps), max(kept.held.slips)

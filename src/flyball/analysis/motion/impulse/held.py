@@ -69,7 +69,7 @@ class Held:
         for name, k in s.state_at.items():
             if name in own.state_at:
                 states[:, k] = y[:, own.nq + own.nv + own.state_at[name]]
-        out = np.zeros((len(y), len(whole.system.row_i)))
+        out = np.zeros((len(y), len(whole.system.rows.law)))
         for name, rows in s.slices.items():
             out[:, rows] = lam[:, own.slices[name]]
         return states, out

@@ -58,7 +58,7 @@ def tables(
     rows = [s.place[name] for name in bodies]
     y = np.zeros((STATES, len(start.y)))
     y[0] = start.y
-    width = max(len(start.y) + 1, s.nv, len(S.row_i), 1)
+    width = max(len(start.y) + 1, s.nv, len(S.rows.law), 1)
     clock = Clock(
         np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, np.int64)
     )
@@ -72,7 +72,7 @@ def tables(
         S, c.work, tableau("rk45"), clock, Sheet(np.zeros((4, width))), Sheet(slopes), np.zeros(1, np.int64),
         real=np.zeros(8), count=np.zeros(16, np.int64),
         mover=np.array([(b, of[b]) for b in rows], np.int64).reshape(-1, 2),
-        group=group, wide=np.zeros((8, s.nv)), lam=np.zeros((3, len(S.row_i))),
+        group=group, wide=np.zeros((8, s.nv)), lam=np.zeros((3, len(S.rows.law))),
         spring_x=np.zeros((springs, 10)), spring_J=np.zeros((springs, s.nv)), spring_Y=np.zeros((springs, s.nv)),
         stiff=np.zeros((springs, springs)), mixing=np.zeros((MIXING, s.nv)), weight=np.zeros((MIXED + 1, MIXED + 1)),
         line=line, line_x=line_x, active=np.zeros((2 * len(line), 3), np.int64),
@@ -102,7 +102,7 @@ def lines(s: Structure, S: System, stops: Mapping[str, Stop]) -> tuple[np.ndarra
             S.force_x[k, 0] = 0.0
         else:
             continue
-        line.append((kind, S.force_i[k, FORCE_F], k))
+        line.append((kind, S.forces.F[k], k))
         line_x.append(x)
     return np.array(line, np.int64).reshape(-1, 3), np.array(line_x).reshape(-1, 8)
 
@@ -131,12 +131,12 @@ def groups(S: System, nv: int) -> tuple[np.ndarray, np.ndarray]:
             a, b = sorted((root(several[0]), root(d)))
             part[b] = a
 
-    movers = [_moving(S, b) for b in range(len(S.body_i))]
+    movers = [_moving(S, b) for b in range(len(S.tree.parent))]
     for own in movers:
         join(own)
     for r in range(len(S.row_p) - 1):
         join(S.col_i[S.row_p[r] : S.row_p[r + 1]])
-    for f in S.force_i[S.force_i[:, FORCE_ALONG] == 0]:
+    for f in S.force_i[S.forces.family == 0]:
         ends = [S.frame_i[f[k]] for k in (FORCE_F, FORCE_M)]
         join(d for b in ends if b >= 0 for d in movers[b])
     of = np.array([root(d) for d in range(nv)], np.int64)
@@ -151,6 +151,6 @@ def _moving(S: System, b: int) -> list[int]:
     """Velocities that move a body."""
     out: list[int] = []
     while b >= 0:
-        out += range(S.body_i[b, V0], S.body_i[b, V0] + S.body_i[b, NV])
-        b = S.body_i[b, PARENT]
+        out += range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b])
+        b = S.tree.parent[b]
     return out

@@ -30,7 +30,7 @@ class Parts:
 def parts(model: Model, values: Values) -> Parts:
     """Tell free bodies from those of the mechanism, by what the tables of absolute coordinates say acts on them."""
     S = values.system
-    between = S.force_i[S.force_i[:, FORCE_ALONG] == 0]
+    between = S.force_i[S.forces.family == 0]
     frames = np.concatenate([S.term_i[:, [TERM_F, TERM_M]].ravel(), between[:, [FORCE_F, FORCE_M]].ravel()])
     used = set(S.frame_i[frames[frames >= 0]].tolist())
     place = values.structure.place

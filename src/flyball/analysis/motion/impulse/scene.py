@@ -71,7 +71,7 @@ def begin(scene: Touching, M: Movers, values: Values, o: Stepping, held: Held | 
     """The stepper at the start."""
     planar = values.structure.model.planar
     real, count = np.zeros(REALS), np.zeros(COUNTS, np.int64)
-    real[GRAVITY : GRAVITY + 3] = values.system.glob[:3]
+    real[GRAVITY : GRAVITY + 3] = values.system.gravity
     size = smallest(scene, values)
     real[SLOWEST], real[FLAT] = SLOW, FLATTEST * size
     real[ENOUGH_V], real[ENOUGH_X] = o.tolerance, o.tolerance
