@@ -137,7 +137,7 @@ def _touched(model: Model) -> tuple[set[str], set[str]]:
 def _of_inertia(x: Values, name: str, b: BodyReport) -> Iterator[str]:
     """Inertia against the body's size: where joints, forces and shapes attach, how far from the centre of mass."""
     k = x.structure.place[name]
-    arms = x.system.frame_x[x.system.frame_i == k, :3]
+    arms = x.system.frames.position[x.system.frame_body == k]
     size = float(np.sqrt((arms**2).sum(axis=1)).max(initial=0.0))
     radius = float(np.sqrt(max(b.moments) / b.mass)) if b.mass > 0.0 else 0.0
     if size > 0.0 and radius > FAR * size:

@@ -19,7 +19,7 @@ from ..numerics.integrators.tableaux import tableau
 from ..results.comparison import Comparison, Formulation
 from ..results.result import Result
 from ..tables.branches import bent_laws
-from ..tables.system import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU, SEMIDEFINITE, WORST_G, WORST_V
+from ..tables.system import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU, WORST_G, WORST_V
 from .compiled import Compiled, compiled
 from .motion import partition
 from .motion.ahead import refuse_missing

@@ -27,7 +27,7 @@ from ..tables.forest import steps
 from ..tables.names import velocity_names
 from ..tables.specs import Structure
 from ..tables.structure import Choices, structure
-from ..tables.system import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, System, Work
+from ..tables.system import PASS, STABILIZE, System, Work
 from ..tables.values import Values, values
 from .uncollected import uncollected
 
@@ -69,7 +69,7 @@ class Compiled:
     @cached_property
     def work(self) -> Work:
         """Scratch of its own."""
-        if self.system.body_x.dtype.kind in "fc":
+        if self.system.const.dtype.kind in "fc":
             return self.scratch.fields  # type: ignore[no-any-return]
         w = work(self.structure, self.system)
         w.option[STABILIZE], w.option[PASS] = NONE, 1e-13
@@ -78,7 +78,7 @@ class Compiled:
     @cached_property
     def scratch(self) -> PooledBuffer:
         """The same as compiled code has it."""
-        made = scratch(self.structure, self.system, self.system.body_x.dtype)
+        made = scratch(self.structure, self.system, self.system.const.dtype)
         option = made.array("option")
         option[STABILIZE], option[PASS] = NONE, 1e-13
         return made
@@ -118,7 +118,7 @@ class Compiled:
         Turns and places are those nearest to the last ones.
         """
         s = self.structure
-        if np.iscomplexobj(self.values.system.body_x):
+        if np.iscomplexobj(self.values.system.const):
             raise TypeError("the compiled code takes floats; complex tables are for the formulas")
         if len(q) != s.nq or len(v) != s.nv:  # compiled code would read beyond them
             raise ValueError(f"the state has {len(q)} + {len(v)} numbers; these coordinates have {s.nq} + {s.nv}")
@@ -197,7 +197,7 @@ class Compiled:
         """Angles of joints that are coordinates, by name, as the states that count turns have them."""
         s = self.structure
         return {
-            f"{t.joint.name}.{p.coordinate}": t.joint.coordinates[p.coordinate].sign * q[s.tables["body_i"][row, Q0]]
+            f"{t.joint.name}.{p.coordinate}": t.joint.coordinates[p.coordinate].sign * q[s.tables["tree"].q[row]]
             for t, row, p in steps(s)
             if p.kind == "R" and p.coordinate in t.joint.coordinates
         }
@@ -205,10 +205,10 @@ class Compiled:
     def jacobian(self) -> np.ndarray:
         """Dense copy of the constraint Jacobian last evaluated, (nr, nv)."""
         S = self.values.system
-        nr, row_p = len(S.rows.law), S.row_p[: len(S.rows.law) + 1]
+        nr, row_p = len(S.rows.law), S.row_start[: len(S.rows.law) + 1]
         n = row_p[-1]
         out = np.zeros((nr, self.structure.nv))
-        np.add.at(out, (np.repeat(np.arange(nr), np.diff(row_p)), S.col_i[:n]), self.work.G[:n])
+        np.add.at(out, (np.repeat(np.arange(nr), np.diff(row_p)), S.column[:n]), self.work.G[:n])
         return out
 
     def sparse_jacobian(self):
@@ -216,13 +216,14 @@ class Compiled:
         import scipy.sparse as sp
 
         S = self.values.system
-        row_p = S.row_p[: len(S.rows.law) + 1]
+        row_p = S.row_start[: len(S.rows.law) + 1]
         n = row_p[-1]
-        return sp.csr_matrix((self.work.G[:n].copy(), S.col_i[:n], row_p), shape=(len(S.rows.law), self.structure.nv))
+        return sp.csr_matrix((self.work.G[:n].copy(), S.column[:n], row_p), shape=(len(S.rows.law), self.structure.nv))
 
     def mass(self):
         """Sparse mass matrix of absolute coordinates, (nv, nv)."""
-        return self._blocks(INERTIA, self.values.system.bodies.mass)
+        table = self.values.system.bodies
+        return self._blocks(table.inertia, table.mass)
 
     def kinetic_energy(self, v: np.ndarray) -> float:
         """Kinetic energy [J] at velocities v (nv,) of absolute coordinates."""
@@ -233,19 +234,20 @@ class Compiled:
 
     def mass_entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows, columns and entries of the mass matrix of absolute coordinates."""
-        x = self.values
-        return x.kept.get("mass", None, 1, lambda: self._entries(INERTIA, x.system.bodies.mass))
+        x, table = self.values, self.values.system.bodies
+        return x.kept.get("mass", None, 1, lambda: self._entries(table.inertia, table.mass))
 
     def inverse_mass_root(self, movable: np.ndarray, dense: bool = False):
         """R, sparse if not told, with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.
 
         Missing inertias have stand-ins.
         """
-        return self._blocks(INVERSE, self.values.system.bodies.inverse_mass, movable, dense)
+        table = self.values.system.bodies
+        return self._blocks(table.inverse_inertia, table.inverse_mass, movable, dense)
 
-    def _blocks(self, column: int, translation: np.ndarray, root: np.ndarray | None = None, dense: bool = False):
+    def _blocks(self, turning: np.ndarray, shifting: np.ndarray, root: np.ndarray | None = None, dense: bool = False):
         """The matrix of `_entries`, sparse if not told. With ``root`` its square root, rows times these numbers."""
-        rows, columns, entries = self._entries(column, translation, root is not None)
+        rows, columns, entries = self._entries(turning, shifting, root is not None)
         entries = entries if root is None else entries * root[rows]
         nv = self.structure.nv
         if dense:
@@ -257,20 +259,20 @@ class Compiled:
         return sp.csr_matrix((entries, (rows, columns)), shape=(nv, nv))
 
     def _entries(
-        self, column: int, translation: np.ndarray, root: bool = False
+        self, turning: np.ndarray, shifting: np.ndarray, root: bool = False
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows, columns and entries of a matrix with one block a body, or of its square root.
 
-        A block is ``translation`` times the identity, and the 3 x 3 matrix from ``column`` of the body table.
+        A block is ``shifting`` (nb,) times the identity, and the matrix of ``turning`` (nb, 9).
         """
         S = self.values.system
-        J = S.body_x[:, column : column + 9].reshape(-1, 3, 3)
+        J = turning.reshape(-1, 3, 3)
         if root:
             if np.iscomplexobj(J):
                 raise TypeError("the root of complex inertias is not known; give real parameters")
             w, V = np.linalg.eigh(J)
             J = (V * np.sqrt(np.maximum(w, 0.0))[:, None, :]) @ V.transpose(0, 2, 1)
-            translation = np.sqrt(translation)
+            shifting = np.sqrt(shifting)
         none = np.zeros(0, np.int64)
         i, j, x = [none], [none], [np.zeros(0)]
         plane = self.structure.model.planar
@@ -282,7 +284,7 @@ class Compiled:
             at = v0[:, None] + shifts
             i += [at.ravel(), np.repeat(v0[:, None] + turns, len(turns), axis=1).ravel()]
             j += [at.ravel(), np.tile(v0[:, None] + turns, len(turns)).ravel()]
-            x += [np.repeat(translation[b], len(shifts)), J[b, used, used].ravel() if len(turns) else np.zeros(0)]
+            x += [np.repeat(shifting[b], len(shifts)), J[b, used, used].ravel() if len(turns) else np.zeros(0)]
         return np.concatenate(i), np.concatenate(j), np.concatenate(x)
 
 

@@ -16,7 +16,6 @@ from ..model.model import Model
 from ..numerics.sparse_rank import DENSE, null_spaces
 from ..results.freedoms import FreeMotion, Geometry, RedundantSet
 from ..results.mobility import Mobility
-from ..tables.system import SEMIDEFINITE
 from .assembly.start import Assembly, assembled
 from .freedom.freedoms import free_motions
 from .freedom.geometry import geometry

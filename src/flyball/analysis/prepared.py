@@ -24,7 +24,7 @@ from ..results.records import TURN
 from ..results.result import Result
 from ..tables.names import velocity_names
 from ..tables.points import points
-from ..tables.system import BODY_LAW, EFFORT, F_APPLIED, G_VALUE, LAM, NU, NV, OFFSET, PARENT, Q0, V0, X_SOLVED
+from ..tables.system import EFFORT, F_APPLIED, G_VALUE, LAM, NU, X_SOLVED
 from .assembly.start import Assembly
 from .compiled import Compiled, compiled
 from .motion.start import Start
@@ -109,7 +109,7 @@ class Prepared:
         c = self._scratch("bare")
         self._at(c, 0.0, q, np.zeros(len(self.v)), MOTION)
         M = np.zeros((len(self.v), len(self.v)))
-        row, at, _ = c.values.system.mass_i.T
+        row, at, _ = c.values.system.mass_entries
         M[row, at] = c.work.M
         M[at, row] = c.work.M
         return M
@@ -288,7 +288,9 @@ class Prepared:
         c.at(0.0, q, np.zeros(s.nv))
         angles = turned_angles(c.values, c.work, q)
         of = {-1: 0.0} | {s.place[name]: float(angle) for name, angle in angles.items()}
-        return np.array([of[int(S.frame_i[M])] - of[int(S.frame_i[F])] for F, M, _ in S.angle_i.tolist()])
+        return np.array(
+            [of[int(S.frame_body[M])] - of[int(S.frame_body[F])] for F, M, _ in zip(*S.angles, strict=True)]
+        )
 
     def _state(self, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
         """Copies as floats, refused if there are more or less than there must be."""

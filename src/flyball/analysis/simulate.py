@@ -19,7 +19,7 @@ from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.departure import changed_velocities, not_allowed
 from ..results.result import Result
-from ..tables.system import ALPHA, BETA, LATER, MASS, PASS, STABILIZE, TOL_G, TOL_V, System
+from ..tables.system import ALPHA, BETA, LATER, PASS, STABILIZE, TOL_G, TOL_V, System
 from .assembly.start import Assembly
 from .compiled import Compiled
 from .motion import partition
@@ -283,7 +283,7 @@ def energy_size(a: Assembly, span: float) -> float:
 
 def _weight(S: System) -> tuple[float, float]:
     """Mass of all bodies [kg], and gravity [m/s^2]."""
-    return float(S.bodies.mass.sum()), float(np.sqrt((S.gravity ** 2).sum()))
+    return float(S.bodies.mass.sum()), float(np.sqrt((S.gravity**2).sum()))
 
 
 def lifted(weight: tuple[float, float], length: float, span: float) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..equations.tree import lengths, quaternion_at
-from ..tables.system import Q0, V0
 from .compiled import Compiled
 
 HALF_TURN = 1e-3  # cosine of half an angle below which it counts as half a turn

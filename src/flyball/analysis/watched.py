@@ -15,7 +15,7 @@ from ..constraints.modes import FRICTION, ONE_WAY, STOP
 from ..errors import ModelError
 from ..results.result import Result
 from ..tables.switches import SwitchSpec
-from ..tables.system import SWITCH_LOWER, SWITCH_UPPER, VALUE
+from ..tables.system import VALUE
 from .compiled import compiled
 
 KNOWN = frozenset({FRICTION, STOP, ONE_WAY})
@@ -86,7 +86,8 @@ def _seen(result: Result) -> Seen:
         for n, spec in enumerate(specs):
             x[n, k] = c.work.sensed[VALUE, spec.measured]
             rate[n, k] = _rate(c, spec, result.v[k])
-    bounds = c.values.system.switch_x[which][:, [SWITCH_LOWER, SWITCH_UPPER]]
+    numbers = c.values.system.switch_numbers
+    bounds = np.stack([numbers.lower[which], numbers.upper[which]], axis=1)
     return Seen(specs, x, rate, bounds, NEAR * np.maximum(c.values.length, np.abs(rate).max(axis=1, initial=0.0)))
 
 
@@ -119,8 +120,8 @@ def _rate(c, spec: SwitchSpec, v: np.ndarray) -> float:
     """Rate of a switch's quantity."""
     S = c.values.system
     row = len(S.rows.law) + spec.measured
-    entries = slice(S.row_p[row], S.row_p[row + 1])
-    return float(c.work.G[entries] @ v[S.col_i[entries]])
+    entries = slice(S.row_start[row], S.row_start[row + 1])
+    return float(c.work.G[entries] @ v[S.column[entries]])
 
 
 def _refuse(t: np.ndarray, seen: Seen, analysis: str) -> None:

@@ -21,7 +21,6 @@ from __future__ import annotations
 from ..compiler.formulas import formula
 from ..math.scalar import positive
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, put3, put9, scale, sub, symmetric
-from ..tables.system import BODY_LAW, NV, PARENT, V0
 from .mass import load6, plus, put6, rigid, root_columns
 
 # columns of W.IC: parts of an inertia, after J; whether any waits there; a wrench or acceleration that does

@@ -17,16 +17,10 @@ from ..compiler.formulas import call, formula
 from ..compiler.layout import Float1, Float2, Int1
 from ..math.scalar import absolute
 from ..tables.system import (
-    BODY_LAW,
-    BODY_WORK,
     EFFORT,
-    FORCE_WORK,
     GIVEN,
     LAM,
     NU,
-    Q0,
-    ROW_WORK,
-    V0,
     X_SOLVED,
 )
 from .asking import ENGINE, OWN, R_, S_, SHEET, W_
@@ -152,9 +146,7 @@ def change(A, P, k, dq, dv, rate, powers):
         if S.tree.law[b] >= 0:
             d = S.tree.v[b]
             found[d] = WC.vel[GIVEN, d].imag / STEP
-            powers[S.tree.work[b]] = (
-                found[nv + nr + d] * A[BENCH].state[P.size[NQ] + d].real + P.effort[d] * dv[d]
-            )
+            powers[S.tree.work[b]] = found[nv + nr + d] * A[BENCH].state[P.size[NQ] + d].real + P.effort[d] * dv[d]
     for d in range(nv):
         rate[d] = dv[d]
         rate[nv + d] = found[d]
@@ -199,8 +191,8 @@ def press(A, P):
         B.lam[r] = complex(W.row[LAM, r], STEP)
         step_along(A, P.zero, P.zero, STEPS)
         B.lam[r] = complex(W.row[LAM, r], 0.0)
-        for e in range(S.row_p[r], S.row_p[r + 1]):  # less what the reaction itself does
-            B.out[0, S.col_i[e]] += complex(0.0, STEP * W.G[e])
+        for e in range(S.row_start[r], S.row_start[r + 1]):  # less what the reaction itself does
+            B.out[0, S.column[e]] += complex(0.0, STEP * W.G[e])
         solved(A, P, P.by_press[j], 0.0)
         for i in range(P.by_power.shape[1]):
             P.by_power[j, i] = 0.0

@@ -9,22 +9,22 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..laws.evaluation import evaluate
-from ..tables.system import CONTROL_RATE, RATE, VALUE
+from ..tables.system import RATE, VALUE
 
 
 @formula
 def column_of(S, W, c):
     """Column of W.sensed in which state c of a controller stands."""
-    return W.sensed.shape[1] - S.switches.row.shape[0] - S.controls.rate_law.shape[0] + c
+    return W.sensed.shape[1] - S.switches.row.shape[0] - S.control_laws.shape[0] + c
 
 
 @formula
 def control(S, W, t, z, dz):
     """Show the states z to the laws; their rates into ``dz``, and where laws' derivatives look for them."""
-    for c in range(S.controls.rate_law.shape[0]):
+    for c in range(S.control_laws.shape[0]):
         W.sensed[VALUE, column_of(S, W, c)] = z[c]
-    for c in range(S.controls.rate_law.shape[0]):
-        law = S.controls.rate_law[c]
+    for c in range(S.control_laws.shape[0]):
+        law = S.control_laws[c]
         o = 0.0 * t
         rate = evaluate(S.code, S.const, law, W.stack, (t, o, o), W.sensed) if law >= 0 else o
         W.sensed[RATE, column_of(S, W, c)] = rate

@@ -27,11 +27,11 @@ def unit_rows(S, W, scale):
     """Rows of unit size in W.H, of velocities counted in lengths; what they were divided by in W.row[DIAGONAL]."""
     for k in range(S.rows.law.shape[0]):
         s = 0.0
-        for e in range(S.row_p[k], S.row_p[k + 1]):
-            W.H[e] = W.G[e] * scale[S.col_i[e]]
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            W.H[e] = W.G[e] * scale[S.column[e]]
             s += W.H[e] * W.H[e]
         s = s**0.5 if s > 0.0 else 1.0
-        for e in range(S.row_p[k], S.row_p[k + 1]):
+        for e in range(S.row_start[k], S.row_start[k + 1]):
             W.H[e] /= s
         W.row[DIAGONAL, k] = s
 
@@ -65,9 +65,9 @@ def each(address, S, W, R, clock, sheet, states, scale, block, kept, out):
             for i in range(3):
                 out[n, i] = np.nan
             continue
-        out[n, 0] = strongest(S.row_p, S.col_i, W.H, block[last + 1], W.vel[V1])
+        out[n, 0] = strongest(S.row_start, S.column, W.H, block[last + 1], W.vel[V1])
         X = block[: last + 1]
-        out[n, 1], out[n, 2] = weakest(S.ldl, W.L, W.D[0], S.row_p, S.col_i, W.H, X, W.vel[V1], W.D[2])
+        out[n, 1], out[n, 2] = weakest(S.ldl, W.L, W.D[0], S.row_start, S.column, W.H, X, W.vel[V1], W.D[2])
         for i in range(last):
             for k in range(S.rows.law.shape[0]):
                 kept[n, k, i] = X[i, k] / W.row[DIAGONAL, k]

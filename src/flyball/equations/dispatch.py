@@ -10,7 +10,7 @@ from ..compiler.formulas import formula, has_formula
 from ..compiler.sources import generated, ladder
 from ..constraints.registry import KINDS, RARE
 from ..forces import BRANCHES, EFFORTS, FORMS, INPUTS, WRENCHES
-from ..tables.system import FORCE_KIND, TERM_KINDS
+from ..tables.system import TERM_KINDS
 from . import rows, turns
 
 NAN = "nan + 0.0 * par[0]"
@@ -53,7 +53,7 @@ effort = ladder(__name__, "effort", FORMS[EFFORT].arguments, EFFORTS, NAN, EFFOR
 @formula
 def kind_of(S, k):
     """What the formulas above know force k by: the number of its kind, or the address of its class's code table."""
-    return S.own[k] if S.own[k] != 0 else S.forces.kind[k]
+    return S.force_code[k] if S.force_code[k] != 0 else S.forces.kind[k]
 
 
 _LOOPS = {name: getattr(rows, name) for name in ("begin", "end", "begin_biases", "end_biases")}

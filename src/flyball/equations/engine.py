@@ -14,7 +14,7 @@ from ..numerics.integrators.clock import COUNTS, GROW, NEXT, REALS, SPAN, STATES
 from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
-from ..tables.system import COORDINATES, System, Work
+from ..tables.system import System, Work
 from .dispatch import remember
 from .follow import follow
 from .guards import watch

@@ -30,7 +30,7 @@ from ..numerics.integrators.clock import (
     H,
     T,
 )
-from ..tables.system import BODY_LAW, COORDINATES, LENGTH, NV, REVOLUTE, ROW_LAW, ROW_WRAP, TREE, V0
+from ..tables.system import REVOLUTE
 from .motion import arrive, write_row
 from .rows import BY_TIME
 from .tree import retract

@@ -16,11 +16,6 @@ from ..math.vec import add
 from ..tables.system import (
     DIAGONAL,
     F_APPLIED,
-    FORCE_ALONG,
-    FORCE_F,
-    FORCE_LOAD,
-    FORCE_M,
-    FORCE_SWITCH,
     GAMMA,
     GAP_BEFORE,
     GUILTY,
@@ -32,8 +27,6 @@ from ..tables.system import (
     MOVED,
     RETURNED,
     SLIDING,
-    SWITCH_OTHER,
-    SWITCH_ROW,
     TOLD,
     VALUE,
 )
@@ -78,7 +71,7 @@ def reaction_loads(S, W):
             if S.load_terms.load[x] == n:
                 f, m = on_second(S, W, S.load_terms.term[x])
                 force, torque = add(force, f), add(torque, m)
-        W.sensed[RETURNED, n] = pressed(wide(S.force_x, k), load(W.FK, S.forces.M[k]), force, torque)
+        W.sensed[RETURNED, n] = pressed(wide(S.force_parameters, k), load(W.FK, S.forces.M[k]), force, torque)
 
 
 @formula
@@ -96,7 +89,7 @@ def dry(S, W, k, t, rate, arm, load):
 @formula
 def dry_part(S, W, k, x, arm, load, way):
     """What the arm adds to the effort of force k for the inputs x = (t, value, rate) of its law."""
-    par, kind = wide(S.force_x, k), kind_of(S, k)
+    par, kind = wide(S.force_parameters, k), kind_of(S, k)
     laws = (law(S, W, k, 0, x), 0.0, way)
     whole = effort(kind, (arm, *par[1:]), x[1], x[2], laws, load)
     return abs(whole - effort(kind, (0.0, *par[1:]), x[1], x[2], laws, load))

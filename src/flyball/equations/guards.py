@@ -23,8 +23,6 @@ from ..laws.evaluation import evaluate, evaluate_jet
 from ..laws.opcodes import BY_TIME, SENSOR
 from ..math.scalar import magnitude
 from ..tables.system import (
-    FORCE_F,
-    FORCE_LOAD,
     G_BACK,
     G_CONE,
     G_CORNER,
@@ -38,8 +36,6 @@ from ..tables.system import (
     G_SLIDES,
     G_TURNS,
     G_UPPER,
-    GUARD_KIND,
-    GUARD_OF,
     LAM,
     LOWER,
     MODE,
@@ -47,15 +43,6 @@ from ..tables.system import (
     RATE,
     RETURNED,
     SHARED,
-    SWITCH_DAMPING,
-    SWITCH_FORCE,
-    SWITCH_KIND,
-    SWITCH_LAW,
-    SWITCH_MEASURED,
-    SWITCH_PARTNER,
-    SWITCH_ROW,
-    SWITCH_STIFFNESS,
-    UNIT,
     UPPER,
     VALUE,
 )
@@ -251,7 +238,7 @@ def pressing(S, W, s, kind, way):
     m, side = S.switches.measured[s], 1.0 if kind == G_PRESS_LOWER else -1.0
     bound = W.switch[LOWER, s] if kind == G_PRESS_LOWER else W.switch[UPPER, s]
     depth = side * (bound - W.sensed[VALUE, m])
-    push = S.switch_values.stiffness[s] * depth - S.switch_values.damping[s] * side * W.sensed[RATE, m]
+    push = S.switch_numbers.stiffness[s] * depth - S.switch_numbers.damping[s] * side * W.sensed[RATE, m]
     told = way > -1.5  # an interpolated one is not exact; one that looks where it is by itself is far below
     if told and way * side > 0.5:
         return push
@@ -261,7 +248,7 @@ def pressing(S, W, s, kind, way):
         return GRAZED * S.units[m] - depth
     # where it goes out faster than it is pushed it is open: without a jump as it leaves, so that nothing else that
     # happens there takes it for a zero
-    return max(-depth, -push / S.switch_values.stiffness[s])
+    return max(-depth, -push / S.switch_numbers.stiffness[s])
 
 
 @formula
@@ -270,7 +257,7 @@ def most(S, W, t, k):
     x = W.sensed[VALUE, S.forces.F[k]]
     load = W.sensed[RETURNED, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
     laws = (law(S, W, k, 0, (t, x, 0.0)), 0.0, STATIC)
-    return magnitude(effort(kind_of(S, k), wide(S.force_x, k), x, 0.0, laws, load))
+    return magnitude(effort(kind_of(S, k), wide(S.force_parameters, k), x, 0.0, laws, load))
 
 
 @formula

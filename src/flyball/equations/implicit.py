@@ -22,15 +22,11 @@ from ..numerics.integrators.implicit.radau import enter as enter_radau
 from ..numerics.integrators.implicit.step import between as between_radau
 from ..numerics.integrators.loop import BEGIN
 from ..tables.system import (
-    COORDINATES,
     DIAGONAL,
-    FORCE_WORK,
     LAM,
     MODE,
     NU,
-    ROW_WORK,
     STEADY,
-    SWITCH_ROW,
     VALUE,
     ComplexSystem,
     ComplexWork,
@@ -143,8 +139,8 @@ def missed(t, k, A, K, c):
         if P.valued[r] == 1 and K.count[INDEX_3] == 1:
             out[2 * nv + r], out[2 * nv + nr + r] = rows[0, nv + r], K.mu[k, r]
         elif P.valued[r] == 1 and K.mu[k, r] != 0.0:
-            for e in range(S.row_p[r], S.row_p[r + 1]):
-                i = S.col_i[e]
+            for e in range(S.row_start[r], S.row_start[r + 1]):
+                i = S.column[e]
                 out[i] += P.metric[i] * W.G[e] * K.mu[k, r]
     for n in range(K.tol_x.shape[0]):
         out[2 * nv + 2 * nr + n] = K.xd[k, n] - W.y[1, n]
@@ -179,7 +175,7 @@ def powers(A, K, k):
         return
     S, W = A[S_], A[W_]
     rate = K.rate[k]
-    for n in range(S.controls.rate_law.shape[0]):
+    for n in range(S.control_laws.shape[0]):
         rate[n] = W.y[1, n]
     for f in range(S.forces.F.shape[0]):
         i = S.forces.work[f]
@@ -231,10 +227,10 @@ def rows_of(S, W, K, P, k):
     """
     J = K.J[k]
     for r in range(S.rows.law.shape[0]):
-        for e in range(S.row_p[r], S.row_p[r + 1]):
+        for e in range(S.row_start[r], S.row_start[r + 1]):
             g = W.G[e]
             J[P.first[ROWS] + e] = g
-            J[P.first[ROWS_METRIC] + e] = -P.metric[S.col_i[e]] * g * P.valued[r]
+            J[P.first[ROWS_METRIC] + e] = -P.metric[S.column[e]] * g * P.valued[r]
             J[P.first[ROWS_HELD] + e] = g * P.valued[r]
         size = W.row[DIAGONAL, r]
         J[P.first[SIZES] + r] = K.real[SOFT] * (size if size > 0.0 else 1.0)

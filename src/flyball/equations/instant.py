@@ -22,15 +22,10 @@ from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.tableaux import Tableau
 from ..tables.system import (
     BIAS,
-    COORDINATES,
     EFFORT,
-    FORCE_F,
-    FORCE_LOAD,
     LAM,
     RATE,
     RETURNED,
-    SWITCH_FORCE,
-    SWITCH_MEASURED,
     VALUE,
     X_SOLVED,
     System,
@@ -109,8 +104,8 @@ def bare(address, S, W, R, clock, sheet, B, P):
         size = magnitude(W.sensed[BIAS, m])
         P.b[i] = B.sign[i] * (W.sensed[BIAS, m] + along(S, W, m, B.free))
         r = S.rows.law.shape[0] + m
-        for e in range(S.row_p[r], S.row_p[r + 1]):
-            size += magnitude(W.G[e] * B.free[S.col_i[e]])
+        for e in range(S.row_start[r], S.row_start[r + 1]):
+            size += magnitude(W.G[e] * B.free[S.column[e]])
         P.grain[i] = GRAIN * size
         for j in range(B.which.shape[0]):
             P.A[i, j] = B.sign[i] * along(S, W, m, B.Y[j])
@@ -125,8 +120,8 @@ def along(S, W, m, a):
     """Gradient of measured quantity m times a."""
     s = 0.0
     r = S.rows.law.shape[0] + m
-    for e in range(S.row_p[r], S.row_p[r + 1]):
-        s += W.G[e] * a[S.col_i[e]]
+    for e in range(S.row_start[r], S.row_start[r + 1]):
+        s += W.G[e] * a[S.column[e]]
     return s
 
 
@@ -138,8 +133,8 @@ def respond(address, S, W, R, clock, sheet, B, i):
     for d in range(out.shape[1]):
         out[0, d] = out[1, d] = 0.0
     r = nr + S.switches.measured[B.which[i]]
-    for e in range(S.row_p[r], S.row_p[r + 1]):
-        out[0, S.col_i[e]] += B.sign[i] * W.G[e]
+    for e in range(S.row_start[r], S.row_start[r + 1]):
+        out[0, S.column[e]] += B.sign[i] * W.G[e]
     call(address, S, W, R, clock, sheet, SOLVE)
     for d in range(nv):
         B.Y[i, d], B.E[i, d] = out[2, d], W.vel[EFFORT, d]
@@ -153,7 +148,7 @@ def held_by(S, W, t, B, i, load):
     k = S.switches.force[B.which[i]]
     x = W.sensed[VALUE, S.forces.F[k]]
     first = law(S, W, k, 0, (t, x, B.rate[i]))
-    kind, par = kind_of(S, k), wide(S.force_x, k)
+    kind, par = kind_of(S, k), wide(S.force_parameters, k)
     if B.asks[IMPULSES] == OF_A_STEP:
         load = load / B.step[0]
     elif B.asks[IMPULSES] != 0:
@@ -297,8 +292,8 @@ def look(S, W, y, B):
         if m >= 0:
             B.now[i], B.rate[i] = W.sensed[VALUE, m], W.sensed[RATE, m]
             r = S.rows.law.shape[0] + m
-            for e in range(S.row_p[r], S.row_p[r + 1]):
-                B.seen[i] += magnitude(W.G[e]) * (STILL * magnitude(y[nq + S.col_i[e]]) + SILENT * most)
+            for e in range(S.row_start[r], S.row_start[r + 1]):
+                B.seen[i] += magnitude(W.G[e]) * (STILL * magnitude(y[nq + S.column[e]]) + SILENT * most)
 
 
 @kernel

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..math.vec import load3, load9
-from ..tables.system import FRAMES, GROUND_FRAMES
 from .records import at_rest, carried, load, store_motion, store_pose
 from .tree import motion, pose
 
@@ -15,7 +14,9 @@ def poses(S, W, q):
     for b in range(S.tree.parent.shape[0]):
         pose(S, W, b, q)
     for k in range(S.ground_frames[0], S.moving_frames[0]):
-        p, R, _, _, _, _ = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
+        p, R, _, _, _, _ = carried(
+            load(W.BK, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
+        )
         store_pose(W.FK, k, p, R)
 
 
@@ -31,7 +32,9 @@ def motions(S, W, v):
 def frame_motions(S, W):
     """Those of the frames, from their bodies'."""
     for k in range(S.ground_frames[0], S.moving_frames[0]):
-        _, _, w, u, alpha, a = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
+        _, _, w, u, alpha, a = carried(
+            load(W.BK, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
+        )
         store_motion(W.FK, k, w, u, alpha, a)
 
 
@@ -39,7 +42,9 @@ def frame_motions(S, W):
 def frames(S, W):
     """Poses and motions of the frames in one pass."""
     for k in range(S.ground_frames[0], S.moving_frames[0]):
-        p, R, w, u, alpha, a = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
+        p, R, w, u, alpha, a = carried(
+            load(W.BK, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
+        )
         store_pose(W.FK, k, p, R)
         store_motion(W.FK, k, w, u, alpha, a)
 
@@ -48,6 +53,8 @@ def frames(S, W):
 def ground_frames(S, W):
     """Records of the frames on ground, written once."""
     for k in range(S.ground_frames[0]):
-        p, R, w, v, alpha, a = at_rest(load3(S.frame_x, k, 0), load9(S.frame_x, k, 3), 0.0 * S.frame_x[k, 0])
+        p, R, w, v, alpha, a = at_rest(
+            load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0), 0.0 * S.frames.position[k, 0]
+        )
         store_pose(W.FK, k, p, R)
         store_motion(W.FK, k, w, v, alpha, a)

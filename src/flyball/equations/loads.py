@@ -14,21 +14,9 @@ from ..math.vec import add, cross, dot, load3, load9, mtv, mv, neg, put3, scale,
 from ..tables.system import (
     ALONG,
     BETWEEN,
-    FORCE_ALONG,
-    FORCE_F,
-    FORCE_LAW,
-    FORCE_LOAD,
-    FORCE_M,
-    FORCE_SWITCH,
-    FORCE_WORK,
-    INERTIA,
     LOAD,
-    MASS,
-    NV,
-    PARENT,
     RATE,
     SLIDING,
-    V0,
     VALUE,
 )
 from .dispatch import effort, inputs, kind_of, wrench
@@ -111,7 +99,7 @@ def acting(S, W, t, k):
     kind = kind_of(S, k)
     F = load(W.FK, S.forces.F[k])
     M = load(W.FK, S.forces.M[k])
-    par = wide(S.force_x, k)
+    par = wide(S.force_parameters, k)
     a, b = inputs(kind, par, F, M)
     x = (t + 0.0 * a, a, b)
     force, torque = wrench(kind, par, F, M, (law(S, W, k, 0, x), law(S, W, k, 1, x), law(S, W, k, 2, x)), (a, b))
@@ -127,10 +115,10 @@ def forces(S, W, t, work):
         i = S.forces.F[k]
         j = S.forces.M[k]
         F, M, force, torque = acting(S, W, t, k)
-        if S.frame_i[j] >= 0:
-            act(W, S.frame_i[j], 1.0, force, torque, M[0])
-        if S.frame_i[i] >= 0:
-            act(W, S.frame_i[i], -1.0, force, torque, M[0])
+        if S.frame_body[j] >= 0:
+            act(W, S.frame_body[j], 1.0, force, torque, M[0])
+        if S.frame_body[i] >= 0:
+            act(W, S.frame_body[i], -1.0, force, torque, M[0])
         if S.forces.work[k] >= 0:
             work[S.forces.work[k]] = power(F, M, force, torque)
 
@@ -169,7 +157,7 @@ def effort_of(S, W, t, k):
     o = 0.0 * x
     pressed = W.sensed[LOAD, S.forces.load[k]] if S.forces.load[k] >= 0 else o
     laws = (law(S, W, k, 0, (t + o, x, rate)), o, way(S, W, k, rate))
-    return effort(kind_of(S, k), wide(S.force_x, k), x, rate, laws, pressed), rate
+    return effort(kind_of(S, k), wide(S.force_parameters, k), x, rate, laws, pressed), rate
 
 
 @formula
@@ -182,8 +170,8 @@ def efforts(S, W, t, work, f):
             continue
         s, rate = effort_of(S, W, t, k)
         r = S.rows.law.shape[0] + S.forces.F[k]
-        for e in range(S.row_p[r], S.row_p[r + 1]):
-            f[S.col_i[e]] += s * W.G[e]
+        for e in range(S.row_start[r], S.row_start[r + 1]):
+            f[S.column[e]] += s * W.G[e]
         if S.forces.work[k] >= 0:
             work[S.forces.work[k]] = s * rate
 

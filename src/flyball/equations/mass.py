@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..math.vec import add, cross, dot, load3, load9, put3, scale, sub, symmetric
-from ..tables.system import INERTIA, MASS, NV, PARENT, POINT, REVOLUTE, TREE, V0
+from ..tables.system import POINT, REVOLUTE
 from .tree import column
 
 
@@ -131,7 +131,7 @@ def composite(S, W):
 
 @formula
 def mass_entries(S, W):
-    """Entries of M, in the order of S.mass_i: for each velocity of each body, itself and those of its ancestors.
+    """Entries of M, in the order of `MassEntries`: for each velocity of each body, itself and those of its ancestors.
 
     The momentum that a unit of the velocity gives all that hangs on the body, taken along the ancestors' columns.
     """

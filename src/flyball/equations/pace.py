@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..math.scalar import magnitude
-from ..tables.system import LENGTH, RATE, TEMPO, UNIT
+from ..tables.system import RATE
 from .rows import measured
 
 

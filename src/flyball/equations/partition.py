@@ -53,6 +53,6 @@ def column(S, W, i, out):
     """Minus column i of G into ``out``."""
     for k in range(out.shape[0]):
         out[k] = 0.0
-        for e in range(S.row_p[k], S.row_p[k + 1]):
-            if S.col_i[e] == i:
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            if S.column[e] == i:
                 out[k] -= W.G[e]

@@ -12,11 +12,6 @@ from ..math.vec import load3
 from ..tables.system import (
     ALONG,
     BETWEEN,
-    FORCE_ALONG,
-    FORCE_F,
-    FORCE_M,
-    NV,
-    PARENT,
     SLIDING,
 )
 from .loads import acting, effort_of, inertial
@@ -46,8 +41,8 @@ def parts(S, W, t, lam, out):
     for k in range(S.forces.F.shape[0]):
         if S.forces.family[k] == BETWEEN:
             _, M, force, torque = acting(S, W, t, k)
-            at = spread(S, W, S.frame_i[S.forces.M[k]], out, at, -1.0, force, torque, M[0])
-            at = spread(S, W, S.frame_i[S.forces.F[k]], out, at, 1.0, force, torque, M[0])
+            at = spread(S, W, S.frame_body[S.forces.M[k]], out, at, -1.0, force, torque, M[0])
+            at = spread(S, W, S.frame_body[S.forces.F[k]], out, at, 1.0, force, torque, M[0])
     nr = S.rows.law.shape[0]
     for r in range(nr):
         at = along(S, W, r, -lam[r], out, at)
@@ -76,7 +71,7 @@ def spread(S, W, b, out, at, sign, force, torque, point):
 @formula
 def along(S, W, r, s, out, at):
     """The force s along row r. Returns the next place."""
-    for e in range(S.row_p[r], S.row_p[r + 1]):
+    for e in range(S.row_start[r], S.row_start[r + 1]):
         out[at] = s * W.G[e]
         at += 1
     return at

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..laws.evaluation import evaluate_jet
-from ..tables.system import BODY_LAW, GIVEN, MADE, OFFSET, PREPARE, Q0, V0
+from ..tables.system import GIVEN, MADE, PREPARE
 from .made import run
 from .rows import BY_TIME
 from .tree import normalise

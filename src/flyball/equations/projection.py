@@ -5,14 +5,11 @@ from __future__ import annotations
 from ..compiler.formulas import formula
 from ..math.scalar import larger, magnitude
 from ..tables.system import (
-    BODY_LAW,
-    COORDINATES,
     DRIFT,
     EVALUATIONS,
     F_APPLIED,
     G_VALUE,
     GUILTY,
-    LENGTH,
     MADE,
     MOVE,
     NU,
@@ -25,8 +22,6 @@ from ..tables.system import (
     RESIDUAL,
     SHOW,
     STABILIZE,
-    TEMPO,
-    V0,
     V3,
 )
 from .dispatch import row_biases, row_values
@@ -113,8 +108,8 @@ def drift(S, W, v, out):
     size = 0.0
     for k in range(out.shape[0]):
         r = W.row[NU, k]
-        for e in range(S.row_p[k], S.row_p[k + 1]):
-            p = W.G[e] * v[S.col_i[e]]
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            p = W.G[e] * v[S.column[e]]
             r -= p
             size = larger(size, magnitude(p))
         out[k] = r

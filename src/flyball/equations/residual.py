@@ -19,8 +19,6 @@ from ..compiler.kernels import first_order_kernel
 from ..math.vec import add, cross, load3, load9, mv, put3, scale, sub
 from ..tables.system import (
     BIAS,
-    BODY_LAW,
-    COORDINATES,
     F_APPLIED,
     FREE,
     G_VALUE,
@@ -29,12 +27,9 @@ from ..tables.system import (
     LAM,
     LOAD,
     NU,
-    NV,
     PLANAR,
     RATE,
     RETURNED,
-    TREE,
-    V0,
     V2,
     VALUE,
     ComplexSystem,
@@ -157,8 +152,8 @@ def missed(S, W, t, p, lam, out):
     for d in range(nv):
         out[d] = -f[d]
     for k in range(nr):
-        for e in range(S.row_p[k], S.row_p[k + 1]):
-            out[S.col_i[e]] -= W.G[e] * lam[k]
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            out[S.column[e]] -= W.G[e] * lam[k]
 
 
 @formula

@@ -20,26 +20,12 @@ from ..tables.system import (
     GAMMA,
     HOLD,
     LAM,
-    MIX_COUNT,
-    MIX_FROM,
-    MIX_ROW,
-    MIX_SLOT,
-    MIX_TO,
     MODE,
     NU,
     NU_DOT,
     OFF,
     RATE,
-    ROW_LAW,
-    ROW_WRAP,
     STEADY,
-    SWITCH_ROW,
-    TERM_F,
-    TERM_HINT,
-    TERM_M,
-    TERM_ROW,
-    TERM_SEG,
-    TERM_SEG_END,
     VALUE,
 )
 from .records import load
@@ -58,13 +44,13 @@ def parameters(T, k):
 @formula
 def measured(S):
     """Number of measured quantities."""
-    return S.row_p.shape[0] - 1 - S.rows.law.shape[0]
+    return S.row_start.shape[0] - 1 - S.rows.law.shape[0]
 
 
 @formula
 def carried(S, W, k):
     """What the multiplier of term k's row does through it: (force, torque) on its second body, about M's origin."""
-    c = W.row[LAM, S.terms.row[k]] * S.term_x[k, COEFFICIENT]
+    c = W.row[LAM, S.terms.row[k]] * S.term_parameters[k, COEFFICIENT]
     return scale(c, load3(W.T, k, 0)), scale(c, load3(W.T, k, 3))
 
 
@@ -101,7 +87,7 @@ def hint_of(S, z, k, o):
 @formula
 def add_value(S, W, k, g, force, torque_M, torque_F, from_F, from_M):
     """Add term k, of which F and M are at the given points, to its row or measured quantity."""
-    c = S.term_x[k, COEFFICIENT]
+    c = S.term_parameters[k, COEFFICIENT]
     r = S.terms.row[k]
     nr = S.rows.law.shape[0]
     if r < nr:
@@ -124,41 +110,41 @@ def add_bias(S, W, k, bias):
     r = S.terms.row[k]
     nr = S.rows.law.shape[0]
     if r < nr:
-        W.row[GAMMA, r] -= S.term_x[k, COEFFICIENT] * bias
+        W.row[GAMMA, r] -= S.term_parameters[k, COEFFICIENT] * bias
     else:
-        W.sensed[BIAS, r - nr] += S.term_x[k, COEFFICIENT] * bias
+        W.sensed[BIAS, r - nr] += S.term_parameters[k, COEFFICIENT] * bias
 
 
 @formula
 def each_value(S, W, z, kind, row):
     """Add every term of one kind to its row: value and Jacobian entries, from the poses."""
-    for k in range(S.kinds[kind], S.kinds[kind + 1]):
+    for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
         F = load(W.FK, S.terms.F[k])
         M = load(W.FK, S.terms.M[k])
-        hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
-        g, force, torque_M, torque_F, _ = row(parameters(S.term_x, k), F, M, hint, S.const)
+        hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
+        g, force, torque_M, torque_F, _ = row(parameters(S.term_parameters, k), F, M, hint, S.const)
         add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
 
 
 @formula
 def each_bias(S, W, z, kind, row):
     """Take every term's acceleration bias of one kind from its row's gamma; add it to its measured quantity."""
-    for k in range(S.kinds[kind], S.kinds[kind + 1]):
+    for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
         F = load(W.FK, S.terms.F[k])
         M = load(W.FK, S.terms.M[k])
-        hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
-        _, _, _, _, bias = row(parameters(S.term_x, k), F, M, hint, S.const)
+        hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
+        _, _, _, _, bias = row(parameters(S.term_parameters, k), F, M, hint, S.const)
         add_bias(S, W, k, bias)
 
 
 @formula
 def each_row(S, W, z, whole, kind, row):
     """``each_value`` and ``each_bias`` in one; what is measured has no bias unless ``whole``."""
-    for k in range(S.kinds[kind], S.kinds[kind + 1]):
+    for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
         F = load(W.FK, S.terms.F[k])
         M = load(W.FK, S.terms.M[k])
-        hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
-        g, force, torque_M, torque_F, bias = row(parameters(S.term_x, k), F, M, hint, S.const)
+        hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
+        g, force, torque_M, torque_F, bias = row(parameters(S.term_parameters, k), F, M, hint, S.const)
         add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
         if whole or S.terms.row[k] < S.rows.law.shape[0]:
             add_bias(S, W, k, bias)
@@ -168,11 +154,11 @@ def each_row(S, W, z, whole, kind, row):
 def rare_values(S, W, z, first, last, row):
     """``each_value`` for kinds that share one loop, ``row(kind, par, F, M, hint, data)``: less to compile."""
     for kind in range(first, last):
-        for k in range(S.kinds[kind], S.kinds[kind + 1]):
+        for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
             F = load(W.FK, S.terms.F[k])
             M = load(W.FK, S.terms.M[k])
-            hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
-            g, force, torque_M, torque_F, _ = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
+            hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
+            g, force, torque_M, torque_F, _ = row(kind, parameters(S.term_parameters, k), F, M, hint, S.const)
             add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
 
 
@@ -180,11 +166,11 @@ def rare_values(S, W, z, first, last, row):
 def rare_biases(S, W, z, first, last, row):
     """``each_bias`` for kinds that share one loop."""
     for kind in range(first, last):
-        for k in range(S.kinds[kind], S.kinds[kind + 1]):
+        for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
             F = load(W.FK, S.terms.F[k])
             M = load(W.FK, S.terms.M[k])
-            hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
-            _, _, _, _, bias = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
+            hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
+            _, _, _, _, bias = row(kind, parameters(S.term_parameters, k), F, M, hint, S.const)
             add_bias(S, W, k, bias)
 
 
@@ -192,11 +178,11 @@ def rare_biases(S, W, z, first, last, row):
 def rare_rows(S, W, z, first, last, row):
     """``each_row`` for kinds that share one loop, biases always."""
     for kind in range(first, last):
-        for k in range(S.kinds[kind], S.kinds[kind + 1]):
+        for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
             F = load(W.FK, S.terms.F[k])
             M = load(W.FK, S.terms.M[k])
-            hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
-            g, force, torque_M, torque_F, bias = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
+            hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
+            g, force, torque_M, torque_F, bias = row(kind, parameters(S.term_parameters, k), F, M, hint, S.const)
             add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
             add_bias(S, W, k, bias)
 
@@ -239,7 +225,7 @@ def end(S, W, t):
     for x in range(S.sensor_drivers.row.shape[0]):
         law = S.rows.law[S.sensor_drivers.row[x]]
         _, slope, _ = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, S.sensor_drivers.slot[x])
-        for i in range(S.sensor_drivers.count[x]):
+        for i in range(S.sensor_drivers.entries[x]):
             W.G[S.sensor_drivers.to[x] + i] -= slope * W.G[S.sensor_drivers.start[x] + i]
 
 
@@ -257,7 +243,7 @@ def switch_rows(S, W):
         if k < 0:
             continue
         if W.switch[MODE, s].real == OFF:
-            for e in range(S.row_p[k], S.row_p[k + 1]):
+            for e in range(S.row_start[k], S.row_start[k + 1]):
                 W.G[e] = 0.0
             W.row[G_VALUE, k] = 0.0
         elif W.switch[MODE, s].real == STEADY:
@@ -301,8 +287,8 @@ def rates(S, W, v):
     nm = measured(S)
     for m in range(nm):
         s = 0.0 * W.sensed[VALUE, m]
-        for e in range(S.row_p[nr + m], S.row_p[nr + m + 1]):
-            s += W.G[e] * v[S.col_i[e]]
+        for e in range(S.row_start[nr + m], S.row_start[nr + m + 1]):
+            s += W.G[e] * v[S.column[e]]
         W.sensed[RATE, m] = s
         W.sensed[VALUE, nm + m] = s
 
@@ -324,6 +310,6 @@ def end_biases(S, W, t):
 def row_times(S, W, k, x):
     """G[k] . x."""
     s = 0.0 * W.row[G_VALUE, k]
-    for e in range(S.row_p[k], S.row_p[k + 1]):
-        s += W.G[e] * x[S.col_i[e]]
+    for e in range(S.row_start[k], S.row_start[k + 1]):
+        s += W.G[e] * x[S.column[e]]
     return s

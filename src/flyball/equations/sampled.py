@@ -42,7 +42,7 @@ from ..numerics.integrators.clock import (
     T,
 )
 from ..numerics.integrators.tableaux import Tableau
-from ..tables.system import COORDINATES, VALUE, System, Work
+from ..tables.system import VALUE, System, Work
 from .control import column_of
 from .engine import engine
 from .tasks import INTEGRATE, MOTION, Sheet

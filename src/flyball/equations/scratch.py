@@ -13,14 +13,11 @@ from ..tables.reads import width
 from ..tables.specs import Structure
 from ..tables.system import (
     FLAT,
-    GROUND_FRAMES,
     INVERSE_JACOBIAN,
     INVERSE_SLOPES,
     LOWER,
     MADE,
     SCRATCH,
-    SWITCH_LOWER,
-    SWITCH_UPPER,
     UPPER,
     System,
     Work,
@@ -32,11 +29,11 @@ MOST = 4  # kinds of scratch, and tables, of a structure that are known
 
 def work(s: Structure, system: System, dtype: Any = None) -> Work:
     """Scratch arrays for one run: of the tables' own kind of numbers, if not told."""
-    dtype = np.dtype(system.body_x.dtype if dtype is None else dtype)
+    dtype = np.dtype(system.const.dtype if dtype is None else dtype)
     if dtype.kind in "fc":
         return scratch(s, system, dtype).fields  # type: ignore[no-any-return]
     W = blank(s, system, dtype)
-    W.switch[LOWER], W.switch[UPPER] = system.switch_values.lower, system.switch_values.upper
+    W.switch[LOWER], W.switch[UPPER] = system.switch_numbers.lower, system.switch_numbers.upper
     ground_frames(system, W)
     return W
 
@@ -51,9 +48,9 @@ def scratch(s: Structure, system: System, dtype: Any) -> PooledBuffer:
 
 def fill(s: Structure, system: System, array: Callable[[str], np.ndarray]) -> None:
     """Put into blank scratch, whose arrays are found by name, what the tables say of it."""
-    if len(system.switch_values.lower):
+    if len(system.switch_numbers.lower):
         switch = array("switch")
-        switch[LOWER], switch[UPPER] = system.switch_values.lower, system.switch_values.upper
+        switch[LOWER], switch[UPPER] = system.switch_numbers.lower, system.switch_numbers.upper
     if n := system.ground_frames[0]:
         _, at_rest = s.kept.get("ground", id(system), MOST, lambda: (system, on_ground(system)))  # told by its address
         array("FK")[:n] = at_rest
@@ -66,7 +63,7 @@ def tables(s: Structure, system: System) -> StructBuffer:
 
 def on_ground(system: System) -> np.ndarray:
     """Records of the frames on ground: they stand first in `Work.FK`, and nothing writes them again."""
-    W = Records(np.zeros((system.ground_frames[0], 24), system.frame_x.dtype))
+    W = Records(np.zeros((system.ground_frames[0], 24), system.const.dtype))
     ground_frames(system, W)
     return W.FK
 
@@ -79,16 +76,17 @@ class Records(NamedTuple):
 
 def blank(s: Structure, system: System, dtype: Any) -> Work:
     """Scratch of zeros."""
-    nb, nf, nr, nv = len(system.tree.parent), len(system.frame_i), len(system.rows.law), s.nv
+    nb, nf, nr, nv = len(system.tree.parent), len(system.frame_body), len(system.rows.law), s.nv
     n, ny, nl, nw = len(system.ldl.perm), s.nq + nv + len(s.states), len(s.loads), len(s.switches)
-    nc, ne = len(system.controls.rate_law), width(s)
+    nc, ne = len(system.control_laws), width(s)
 
     def z(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype)
 
     return Work(
-        z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_entries.row)), z(len(system.col_i)),
-        z(len(system.col_i)), z(len(s.terms) if s.loads or s.reads else 0, 6), z(9, nr), z(8, nv),
+        z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_entries.row)),
+        z(len(system.column)), z(len(system.column)), z(len(s.terms) if s.loads or s.reads else 0, 6), z(9, nr),
+        z(8, nv),
         z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl + ne + nc + nw), z(INVERSE_SLOPES + nw, nw),
         z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n), z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny),
         np.zeros(11), np.zeros(MADE + FLAT, np.int64), z(system.flat[SCRATCH]),

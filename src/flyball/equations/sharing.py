@@ -28,12 +28,6 @@ from ..numerics.integrators.watching import TERMS, Watch
 from ..tables.system import (
     LAM,
     SHARED,
-    SWITCH_FORCE,
-    SWITCH_KIND,
-    SWITCH_OTHER,
-    SWITCH_PARTNER,
-    SWITCH_REST,
-    SWITCH_ROW,
     VALUE,
     System,
     Work,
@@ -77,7 +71,7 @@ def cell_of(S, W, t, G, s, c):
         for j in range(k + 1):
             D[c, i, j] = 0.0
     if kind == SLIP:
-        mu, gap = S.switch_values.static_friction[s], S.switches.row[S.switches.other[s]]
+        mu, gap = S.switch_numbers.static_friction[s], S.switches.row[S.switches.other[s]]
         D[c, 0, 0], D[c, 1, 0] = mu * W.row[LAM, gap], W.row[LAM, row]
         for j in range(k):
             D[c, 0, 1 + j], D[c, 1, 1 + j] = mu * G.null[j, gap], G.null[j, row]
@@ -180,10 +174,10 @@ def renewed(address, S, W, R, own, sheet, G):
             out[0, d] = out[1, d] = out[2, d] = 0.0
         for k in range(nr):
             if G.null[j, k] != 0.0:
-                for e in range(S.row_p[k], S.row_p[k + 1]):
+                for e in range(S.row_start[k], S.row_start[k + 1]):
                     p = G.null[j, k] * W.G[e]
-                    out[0, S.col_i[e]] += p
-                    out[2, S.col_i[e]] += magnitude(p)
+                    out[0, S.column[e]] += p
+                    out[2, S.column[e]] += magnitude(p)
         for d in range(W.vel.shape[1]):
             left, terms = max(left, magnitude(out[0, d])), max(terms, out[2, d])
         if left > BALANCED * terms:

@@ -9,23 +9,12 @@ from __future__ import annotations
 from ..compiler.formulas import formula
 from ..math.scalar import exp, sqrt
 from ..tables.system import (
-    FORCE_F,
-    FORCE_LOAD,
-    FORCE_M,
-    FORCE_SWITCH,
-    FORCE_WORK,
     G_ASTRAY,
     G_CONE,
     LOAD,
     MODE,
     OFF,
     RATE,
-    SWITCH_MEASURED,
-    SWITCH_OTHER,
-    SWITCH_PARTNER,
-    SWITCH_REST,
-    SWITCH_ROW,
-    SWITCH_SLIDING,
     VALUE,
 )
 from .pace import own_speed
@@ -101,8 +90,8 @@ def slide(S, W, k, work, f):
         if m < 0:
             continue
         r = S.rows.law.shape[0] + m
-        for j in range(S.row_p[r], S.row_p[r + 1]):
-            f[S.col_i[j]] += (a if side == 0 else b) * W.G[j]
+        for j in range(S.row_start[r], S.row_start[r + 1]):
+            f[S.column[j]] += (a if side == 0 else b) * W.G[j]
 
 
 @formula
@@ -113,7 +102,7 @@ def friction(S, W, k):
         o = 0.0 * W.sensed[LOAD, S.forces.load[k]]
         return o, o, o
     d, e, speed = heading(S, W, W.sensed, s)
-    pressed, mu = W.sensed[LOAD, S.forces.load[k]], S.switch_values.kinetic_friction[s]
+    pressed, mu = W.sensed[LOAD, S.forces.load[k]], S.switch_numbers.kinetic_friction[s]
     if pressed.real < 0.0 and mu.real > 1.0:  # past where it opens, to the end of the step: it must not run away
         mu = 1.0 + 0.0 * mu
     push = -mu * pressed
@@ -133,7 +122,7 @@ def watched_place(S, W, sensed, lam, kind, s):
         pressed = lam[S.switches.row[S.switches.other[s]]]
         a = lam[S.switches.row[s]]
         b = lam[S.switches.row[other]] if other >= 0 else 0.0
-        return S.switch_values.static_friction[s] * pressed - sqrt(a * a + b * b)
+        return S.switch_numbers.static_friction[s] * pressed - sqrt(a * a + b * b)
     if not slides(S, W, s):
         return NOT_WATCHED
     u = sensed[RATE, S.switches.measured[s]]

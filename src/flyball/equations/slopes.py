@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..math.vec import add, col, cross, dot, norm, scale, sub
-from ..tables.system import FORCE_ALONG, FORCE_F, FORCE_LOAD, FORCE_M, LENGTH, LOAD, RATE, VALUE
+from ..tables.system import LOAD, RATE, VALUE
 from .dispatch import effort, inputs, kind_of, wrench
 from .loads import law, way, wide
 from .records import load
@@ -44,7 +44,7 @@ def along(S, W, t, k, out):
         dx = d if j == 1 else -d if j == 2 else 0.0
         dr = e if j == 3 else -e if j == 4 else 0.0
         laws = (law(S, W, k, 0, (t, x + dx, rate + dr)), 0.0, way(S, W, k, rate))
-        s = effort(kind_of(S, k), wide(S.force_x, k), x + dx, rate + dr, laws, pressed)
+        s = effort(kind_of(S, k), wide(S.force_parameters, k), x + dx, rate + dr, laws, pressed)
         if j == 0:
             out[k, ALONG] = s
         out[k, STIFFNESS] -= s * dx / (2.0 * d * d)
@@ -55,7 +55,7 @@ def along(S, W, t, k, out):
 def between(S, W, t, k, out):
     """Of a force between frames, one of the two states of M after the other."""
     kind = kind_of(S, k)
-    par = wide(S.force_x, k)
+    par = wide(S.force_parameters, k)
     F = load(W.FK, S.forces.F[k])
     p, R, w, v, alpha, a = load(W.FK, S.forces.M[k])
     d = STEP * min(1.0, S.length[0])

@@ -17,37 +17,23 @@ from ..math.scalar import choose, larger, magnitude, minimum
 from ..math.vec import load9, mv
 from ..numerics.ldl import ldl_factor, ldl_solve
 from ..tables.system import (
-    BODY_LAW,
     COUPLED,
     DIAGONAL,
     EFFORT,
-    EXCESS,
-    EXCESS_MASS,
     FACTOR,
     FACTORISATIONS,
     GIVEN,
-    INVERSE,
-    LENGTH,
     MADE,
-    MASS,
-    NV,
     PARTED,
     PARTITION,
     PASS,
-    PER_BULK,
-    PER_COMPACT,
-    PER_MASS,
     R1,
     REFINE,
-    REGULARISE,
     REUSE,
     SCHUR,
-    SEMIDEFINITE,
-    SOLVER,
     SOLVES,
     STEP,
     STEP_UNLOADED,
-    V0,
     V1,
     V2,
 )
@@ -183,10 +169,10 @@ def factor_coupled(S, W):
         W.A[S.mass_entries.place[e]] = W.M[e]
     for k in range(S.rows.law.shape[0]):
         s = 0.0 * W.row[DIAGONAL, k]
-        for e in range(S.row_p[k], S.row_p[k + 1]):
+        for e in range(S.row_start[k], S.row_start[k + 1]):
             W.A[S.pairs.place[e]] = W.G[e]
             if S.pairs.place[e] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
-                s += (W.G[e] * W.G[e] + lever) * per[S.col_i[e]]
+                s += (W.G[e] * W.G[e] + lever) * per[S.column[e]]
         s = choose(s, s, s + 1.0)
         W.row[DIAGONAL, k] = s
         W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.regularization[0] * s
@@ -277,8 +263,8 @@ def pass_schur(S, W, rhs, x, lam, loaded):
     for k in range(r.shape[0]):
         mu = z[S.ldl.perm[k]]
         lam[k] += mu
-        for e in range(S.row_p[k], S.row_p[k + 1]):
-            dx[S.col_i[e]] += W.H[e] * mu
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            dx[S.column[e]] += W.H[e] * mu
     for d in range(x.shape[0]):
         x[d] += dx[d]
         rhs[d] = 0.0
@@ -326,8 +312,8 @@ def residual(S, W, gamma, x):
     for k in range(gamma.shape[0]):
         s = gamma[k]
         a = magnitude(gamma[k])
-        for e in range(S.row_p[k], S.row_p[k + 1]):
-            p = W.G[e] * x[S.col_i[e]]
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            p = W.G[e] * x[S.column[e]]
             s -= p
             a += magnitude(p)
         W.row[R1, k] = s
@@ -359,8 +345,8 @@ def remainder(S, W, f, gamma, x, lam, rhs, loaded):
     for k in range(lam.shape[0]):
         s = gamma[k]
         a = magnitude(s)
-        for e in range(S.row_p[k], S.row_p[k + 1]):
-            d = S.col_i[e]
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            d = S.column[e]
             p = W.G[e] * lam[k]
             rhs[d] += p
             size = larger(size, magnitude(p))

@@ -16,7 +16,6 @@ from ..constraints.modes import BRANCH
 from ..laws.evaluation import evaluate_jet
 from ..tables.system import (
     BIAS,
-    CONTROL_RATE,
     DRIFT_BEFORE,
     DRIFT_OFF,
     INVERSE_SLOPES,
@@ -27,8 +26,6 @@ from ..tables.system import (
     SIDE_MOVED,
     SIDE_TOLD,
     STEADY,
-    SWITCH_KIND,
-    SWITCH_LAW,
     VALUE,
     X_SOLVED,
 )
@@ -63,13 +60,13 @@ def drifts(S, W, t):
     nm = measured(S)
     for m in range(nm):
         a = W.sensed[BIAS, m]
-        for e in range(S.row_p[nr + m], S.row_p[nr + m + 1]):
-            a += W.G[e] * W.vel[X_SOLVED, S.col_i[e]]
+        for e in range(S.row_start[nr + m], S.row_start[nr + m + 1]):
+            a += W.G[e] * W.vel[X_SOLVED, S.column[e]]
         W.sensed[RATE, nm + m] = a
         W.sensed[BIAS, nm + m] = W.sensed[BIAS, m]
         W.sensed[BIAS, m] = a
-    for c in range(S.controls.rate_law.shape[0]):
-        law = S.controls.rate_law[c]
+    for c in range(S.control_laws.shape[0]):
+        law = S.control_laws[c]
         at = column_of(S, W, c)
         W.sensed[BIAS, at] = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, WHOLE)[1] if law >= 0 else 0.0
     for s in range(S.switches.row.shape[0]):

@@ -31,23 +31,12 @@ from ..math.vec import (
     sub,
 )
 from ..tables.system import (
-    BODY_P,
-    BODY_R,
-    BODY_TURNS,
     FREE,
-    NV,
-    PARENT,
     PLANAR,
     POINT,
     PRISMATIC,
-    Q0,
     REVOLUTE,
     SPHERICAL,
-    TREE,
-    TREE_P,
-    TREE_R,
-    TREE_TURNS,
-    V0,
     WELD,
 )
 from .records import load, store_motion, store_pose
@@ -58,7 +47,7 @@ def pose(S, W, b, q):
     """Position and rotation of body b, its reference point and what its twist columns need, from its parent's pose."""
     kind = S.tree.joint[b]
     q0 = S.tree.q[b]
-    o = 0.0 * S.body_x[b, 0]
+    o = 0.0 * S.bodies.mass[b]
     if kind == PLANAR:
         c = cos(q[q0 + 2])
         s = sin(q[q0 + 2])

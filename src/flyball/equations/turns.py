@@ -5,7 +5,6 @@ from __future__ import annotations
 from ..compiler.formulas import formula
 from ..constraints.angle import row as angle
 from ..math.vec import dot, sub
-from ..tables.system import TERM_F, TERM_HINT, TERM_M
 from .records import load
 from .rows import parameters
 
@@ -23,10 +22,10 @@ def turn(S, W, z, dz):
 @formula
 def move_on(S, W, z, dz, kind, foot, progress):
     """Rates of the states that say where the terms of a kind are on their curves."""
-    for k in range(S.kinds[kind], S.kinds[kind + 1]):
+    for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
         F = load(W.FK, S.terms.F[k])
         M = load(W.FK, S.terms.M[k])
-        par = parameters(S.term_x, k)
+        par = parameters(S.term_parameters, k)
         s = foot(par, F, M, z[S.terms.hint[k]], S.const)
         dz[S.terms.hint[k]] = progress(par, F, M, s, S.const)[0]
 
@@ -44,8 +43,8 @@ def remember_turns(S, W, z):
 @formula
 def remember_places(S, W, z, kind, foot):
     """Put the places of a kind's terms where the poses in W say they are."""
-    for k in range(S.kinds[kind], S.kinds[kind + 1]):
+    for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
         F = load(W.FK, S.terms.F[k])
         M = load(W.FK, S.terms.M[k])
         h = S.terms.hint[k]
-        z[h] = foot(parameters(S.term_x, k), F, M, z[h], S.const)
+        z[h] = foot(parameters(S.term_parameters, k), F, M, z[h], S.const)

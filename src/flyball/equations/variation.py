@@ -19,7 +19,7 @@ from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau
-from ..tables.system import BODY_LAW, ComplexSystem, ComplexWork, System, Work
+from ..tables.system import ComplexSystem, ComplexWork, System, Work
 from .asking import OWN, S_, SHEET, W_, inspect, through
 from .changes import COUNT, NQ, NZ, POWERS, Plan, change, closed, press, settle_at
 from .tasks import ARRIVE, MOTION, REPORT, TANGENT, Bench, Sheet

@@ -14,7 +14,7 @@ from ..numerics.integrators.clock import T
 from ..numerics.integrators.implicit.desk import VariationalDesk
 from ..numerics.integrators.implicit.hermite import between
 from ..numerics.integrators.implicit.variational import answer
-from ..tables.system import COORDINATES, G_VALUE, INERTIA, MASS, NV, V0, System, Work
+from ..tables.system import G_VALUE, System, Work
 from .asking import OWN, S_, SHEET, W_, inspect, through
 from .callbacks import Going, Own
 from .implicit import compose, land
@@ -160,8 +160,8 @@ def push(t, y, lam, f, A):
             for k in range(3):
                 f[i + k] += g[k]
     for r in range(lam.shape[0]):
-        for e in range(S.row_p[r], S.row_p[r + 1]):
-            f[S.col_i[e]] -= W.G[e] * lam[r]
+        for e in range(S.row_start[r], S.row_start[r + 1]):
+            f[S.column[e]] -= W.G[e] * lam[r]
 
 
 @formula
@@ -202,8 +202,8 @@ def pull(G, lam, by, p, A):
     """Add by G^T lam to momenta."""
     S = A[S_]
     for r in range(lam.shape[0]):
-        for e in range(S.row_p[r], S.row_p[r + 1]):
-            p[S.col_i[e]] += by * G[e] * lam[r]
+        for e in range(S.row_start[r], S.row_start[r + 1]):
+            p[S.column[e]] += by * G[e] * lam[r]
 
 
 @formula

@@ -11,7 +11,7 @@ from ..math.scalar import atan2
 from ..math.vec import add, cross, scale
 from ..tables.coordinates import REST, BodyState, free_velocities, whole_turns
 from ..tables.forest import TreeJoint
-from ..tables.system import NV, PARENT, PLANAR, Q0, TREE, V0
+from ..tables.system import PLANAR
 from ..tables.values import Values
 from .tree import column
 
@@ -21,11 +21,11 @@ def velocities(x: Values, bodies: Mapping[str, BodyState], W: Any) -> np.ndarray
 
     Those of tree joints are the least squares of each body's motion relative to its parent's, at the poses in W.
     """
-    s, body_i = x.structure, x.structure.tables["body_i"]
+    s = x.structure
     v = free_velocities(x, bodies)
     names = {b: name for name, b in s.place.items()}
     for t in s.tree_joints.values():
-        parent = names[int(body_i[t.links[0], PARENT])]
+        parent = names[int(x.system.tree.parent[t.links[0]])]
         _rates(x, W, t, bodies[names[t.child]], bodies.get(parent, REST), v)
     return v
 

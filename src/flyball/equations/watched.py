@@ -29,14 +29,9 @@ from ..tables.system import (
     G_BACK,
     G_SHARED,
     G_TURNS,
-    GUARD_KIND,
-    GUARD_OF,
-    GUARD_WAY,
     LAM,
     RATE,
     RETURNED,
-    SWITCH_PARTNER,
-    SWITCH_ROW,
     VALUE,
     X_SOLVED,
     System,
@@ -121,8 +116,8 @@ def note(A, K, row):
     end = 0 if row == START else 1
     for m in range(measured(S)):
         a = W.sensed[BIAS, m]
-        for e in range(S.row_p[nr + m], S.row_p[nr + m + 1]):
-            a += W.G[e] * W.vel[X_SOLVED, S.col_i[e]]
+        for e in range(S.row_start[nr + m], S.row_start[nr + m + 1]):
+            a += W.G[e] * W.vel[X_SOLVED, S.column[e]]
         K.moving[end, 0, m], K.moving[end, 1, m], K.moving[end, 2, m] = W.sensed[VALUE, m], W.sensed[RATE, m], a
     levels(A, K, 0 if row == START else K.levels.shape[0] - 1)
     balanced(A)
@@ -225,7 +220,7 @@ def keeps(S: System) -> np.ndarray:
 
 def _desk(S: System, expected: Work, c: np.ndarray, stages: int) -> Watch:
     """What a loop keeps that watches."""
-    nm = len(S.row_p) - 1 - len(S.rows.law)
+    nm = len(S.row_start) - 1 - len(S.rows.law)
     rows = np.unique(S.switches.row[S.switches.row >= 0])
     columns = np.arange(2 * nm, expected.sensed.shape[1])
     loads = columns[: len(columns) - len(S.switches.row)]

@@ -21,15 +21,8 @@ from ..numerics.integrators.clock import AT_END, AT_START, FROM, FROM_RATE, TO, 
 from ..tables.system import (
     ALONG,
     BETWEEN,
-    BODY_LAW,
-    FORCE_ALONG,
-    FORCE_F,
-    FORCE_LAW,
-    FORCE_LOAD,
-    FORCE_M,
     MADE,
     RATE,
-    ROW_LAW,
     SAMPLED,
     SLIDING,
     VALUE,
@@ -79,7 +72,7 @@ def kept(S, sampled: Collection[int] | None = None) -> np.ndarray:
     if not any(look) and not breaking(S):
         return np.zeros((ROWS, 0))
     loads = int((S.forces.load >= 0).sum())
-    sensed = 2 * measured(S) + loads + len(S.controls.rate_law) + len(S.switches.row)
+    sensed = 2 * measured(S) + loads + len(S.control_laws) + len(S.switches.row)
     seen = np.zeros((ROWS, max(sensed, noted(S), NODES, len(laws))))
     seen[LOOK, : len(laws)] = look
     return seen
@@ -147,9 +140,9 @@ def take_note(S, W, seen, row):
         else:
             F = load(W.FK, S.forces.F[f])
             M = load(W.FK, S.forces.M[f])
-            a, b = inputs(kind_of(S, f), wide(S.force_x, f), F, M)
+            a, b = inputs(kind_of(S, f), wide(S.force_parameters, f), F, M)
             if S.forces.family[f] == BETWEEN and breaks(kind_of(S, f)):
-                side = branch(kind_of(S, f), wide(S.force_x, f), F, M)
+                side = branch(kind_of(S, f), wide(S.force_parameters, f), F, M)
                 for i in range(PARTS):
                     seen[row, nm + S.forces.F.shape[0] + PARTS * f + i] = side[i]
         seen[row, nm + f] = a

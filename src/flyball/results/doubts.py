@@ -9,7 +9,6 @@ import numpy as np
 
 from ..equations.loads import wide
 from ..tables.reads import read
-from ..tables.system import FORCE_F
 from .energy import gained
 from .lag import late, perhaps_late
 from .ledger import Ledger, apart, whole
@@ -328,7 +327,7 @@ def creep(result: Result) -> dict[str, tuple[float, float]]:
         if f.stick_speed is None:
             continue
         k = next(k for k, e in enumerate(forces) if e is f)
-        arm, limit = f.sticking(wide(S.force_x, k))
+        arm, limit = f.sticking(wide(S.force_parameters, k))
         x, rate = result.measured.quantity(int(S.forces.F[k]))
         speed = np.abs(arm * rate)
         slow = speed < limit

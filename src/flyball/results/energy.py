@@ -12,7 +12,6 @@ from ..math.vec import dot, load9, mtv, mv
 from ..model.force import Force
 from ..model.quantities import ENERGY, Quantity, quantities
 from ..model.touch import Touch
-from ..tables.system import INERTIA, MASS
 from .booked import GIVEN, basis
 from .views.base import Named
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..numerics.forest import root, unite
-from ..tables.system import BETWEEN, FORCE_ALONG, FORCE_F, FORCE_M, MASS, NV, PARENT, SLIDING, System
+from ..tables.system import BETWEEN, SLIDING, System
 from .booked import GIVEN
 from .energy import EXCHANGED, gravity, kinetic
 
@@ -150,7 +150,7 @@ def connected(S: System) -> np.ndarray:
     first = list(
         range(len(S.tree.parent))
     )  # of what each hangs together with, as far as it is known: a body before it, or itself
-    pairs = [(b, int(row[PARENT])) for b, row in enumerate(S.body_i) if row[PARENT] >= 0]
+    pairs = [(b, parent) for b, parent in enumerate(S.tree.parent.tolist()) if parent >= 0]
     some = [*(_of_line(S, k) for k in range(len(S.rows.law))), *(_of_force(S, k) for k in range(len(S.forces.F)))]
     pairs += [(int(bodies[0]), int(b)) for bodies in some for b in bodies[1:]]
     for i, j in pairs:
@@ -161,16 +161,15 @@ def connected(S: System) -> np.ndarray:
 def _of_line(S: System, k: int) -> np.ndarray:
     """Bodies of a row, or of a measured quantity behind all rows."""
     body = np.repeat(np.arange(len(S.tree.parent)), S.tree.nv)
-    return np.unique(body[S.col_i[S.row_p[k] : S.row_p[k + 1]]])
+    return np.unique(body[S.column[S.row_start[k] : S.row_start[k + 1]]])
 
 
 def _of_force(S: System, k: int) -> np.ndarray:
-    force = S.force_i[k]
-    ends = force[[FORCE_F, FORCE_M]]
-    if force[FORCE_ALONG] == BETWEEN:
-        at = S.frame_i[ends[ends >= 0]]
+    ends, family = np.array([S.forces.F[k], S.forces.M[k]]), S.forces.family[k]
+    if family == BETWEEN:
+        at = S.frame_body[ends[ends >= 0]]
         return np.unique(at[at >= 0])
-    lines = ends[ends >= 0] if force[FORCE_ALONG] == SLIDING else ends[:1]
+    lines = ends[ends >= 0] if family == SLIDING else ends[:1]
     return np.unique(np.concatenate([_of_line(S, len(S.rows.law) + m) for m in lines]))
 
 

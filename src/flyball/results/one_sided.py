@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..model.joint import Joint
-from ..tables.system import MASS
 
 if TYPE_CHECKING:
     from .result import Result

@@ -19,7 +19,6 @@ from ..laws.call import STACK_RESERVE
 from ..laws.evaluation import evaluate_jet
 from ..math.vec import add, cross, load3, load9, mtv, mv, neg, put3, scale, sub
 from ..model.force import CoordinateForce
-from ..tables.system import INERTIA, MASS, PARENT
 from .terms import Wrench, along, coefficient, nothing, term
 
 if TYPE_CHECKING:
@@ -128,7 +127,7 @@ class Reactions:
         """A term of a row or of a measured quantity that pushes with an effort."""
         t = self._result.values.structure.terms[k]
         F, M, (_, force, torque_M, torque_F, _) = term(self._result, k)
-        i, j = (int(self._result.values.system.frame_i[frame]) for frame in (t.F, t.M))
+        i, j = (int(self._result.values.system.frame_body[frame]) for frame in (t.F, t.M))
         if j >= 0:
             act(W, j, effort, force, torque_M, M[0])
         if i >= 0:

@@ -17,7 +17,6 @@ from ..math.products import product
 from ..math.vec import add, cross, load3, load9, mm, put3, scale, sub
 from ..model.body import Frame
 from ..model.joint import Coordinate, Joint
-from ..tables.system import NV, PARENT, V0
 from ..tables.values import Values
 
 Record = tuple
@@ -38,7 +37,9 @@ class Records:
         self.n = len(q)
         S = x.system
         nb, nv = len(S.tree.parent), v.shape[1]
-        numbers = [x for x in (S.body_x, S.frame_x, S.const) if x.dtype != object]  # objects: arrays over time
+        numbers = [
+            x for x in (S.bodies.mass, S.frames.position, S.const) if x.dtype != object
+        ]  # objects: arrays over time
         self.dtype = np.result_type(q, v, *([] if vdot is None else [vdot]), *numbers)  # complex for derivatives
         self.W = SimpleNamespace(BK=self.zeros(nb, 24), X=self.zeros(nv, 6), O=self.zeros(nb, 3))
         for b in range(nb):
@@ -88,8 +89,8 @@ class Records:
         """Record of frame k."""
         if k not in self._frames:
             S = self.x.system
-            offset, turn = load3(S.frame_x, k, 0), load9(S.frame_x, k, 3)
-            b = int(S.frame_i[k])
+            offset, turn = load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
+            b = int(S.frame_body[k])
             self._frames[k] = self.carried(b, offset, turn)
         return self._frames[k]
 

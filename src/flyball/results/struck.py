@@ -19,7 +19,6 @@ from ..errors import ModelError
 from ..math.vec import load3, load9, mtv, mv, neg, put3, scale, sub
 from ..model.touch import Touch
 from ..model.words import suggest
-from ..tables.system import INERTIA, MASS, PARENT
 from ..tables.terms import carrier
 from .reactions import Reactions
 from .terms import along, coefficient, term
@@ -240,7 +239,7 @@ class ImpulseReactions(Reactions):
             at = result.records.frame(M)[0]
             for name, sign in ((driver, 1.0), (owner.name, -1.0)):
                 for frame, way in ((M, sign), (F, -sign)):
-                    if (b := int(result.values.system.frame_i[frame])) >= 0:
+                    if (b := int(result.values.system.frame_body[frame])) >= 0:
                         act(self._onto(out, name), b, way, scale(effort, force), scale(effort, torque), at)
         return out
 

@@ -28,7 +28,7 @@ def term(result: Result, k: int) -> tuple[Record, Record, tuple]:
     t = x.structure.terms[k]
     F, M = result.records.frame(t.F), result.records.frame(t.M)
     hint: Any = result.states[:, t.hint] if t.hint >= 0 else 0.0
-    kind, par = KINDS[t.formula.kind], parameters(x.system.term_x, k)
+    kind, par = KINDS[t.formula.kind], parameters(x.system.term_parameters, k)
     if kind.single:
         return F, M, _one_by_one(kind.row, par, (F, M, hint + result.records.zeros()), x.system.const)
     return F, M, kind.row(par, F, M, hint, x.system.const)
@@ -47,7 +47,7 @@ def _one_by_one(row: Any, par: tuple, over: tuple[Record, Record, np.ndarray], c
 
 def coefficient(result: Result, k: int) -> float:
     """What term k counts in its row or measured quantity."""
-    return result.values.system.term_x[k, COEFFICIENT]
+    return result.values.system.term_parameters[k, COEFFICIENT]
 
 
 def along(result: Result, joint: Joint, what: str) -> Wrench:

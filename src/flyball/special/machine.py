@@ -14,7 +14,7 @@ from ..compiler.layout import DATA, Struct, struct
 from ..compiler.machine import LoadedCode, assembled, baseline, llvm, triple
 from ..graph.printers.llvm import Module
 from ..tables.system import System, Work
-from ..tracing.trace import TABLES
+from ..tracing.trace import TRACED, traced_arrays
 from .linked import ENTRIES, Linked
 
 __all__ = ["Loaded", "assembled", "machine", "module_of", "tables_of"]
@@ -48,7 +48,7 @@ def _based(base: str) -> list[str]:
     if base in ("a", "b", "c", "d"):
         return []
     if base.startswith("C_"):  # one of the tables, whose addresses stand where S does
-        at = 8 * TABLES.index(base.removeprefix("C_"))
+        at = 8 * _constants().index(base.removeprefix("C_"))
         holder = "S"
     else:
         at, holder = offsets()[base], base[0]
@@ -56,6 +56,14 @@ def _based(base: str) -> list[str]:
         f"%at_{base} = getelementptr i8, ptr %{holder}, i64 {at}",
         f"%{base} = load ptr, ptr %at_{base}, !invariant.load !0",
     ]
+
+
+@lru_cache(maxsize=1)
+def _constants() -> list[str]:
+    """Names of the arrays whose addresses ``CONSTANTS`` holds, in their order: see `tables_of`."""
+    numbers = {name: layout for name, layout in struct(System).fields if name in TRACED}
+    fields = {name: [x for x, _ in of.fields] if isinstance(of, Struct) else [] for name, of in numbers.items()}
+    return [full for name in TRACED for full in [f"{name}.{x}" for x in fields[name]] or [name]]
 
 
 @lru_cache(maxsize=1)
@@ -83,4 +91,4 @@ class Loaded:
 
 def tables_of(S: System) -> np.ndarray:
     """Addresses of the tables, for ``CONSTANTS``."""
-    return np.array([getattr(S, name).ctypes.data for name in TABLES], np.int64)
+    return np.array([x.ctypes.data for x in traced_arrays(S).values()], np.int64)

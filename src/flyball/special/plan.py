@@ -11,9 +11,9 @@ import numpy as np
 
 from ..compiler.sources import PACKAGE, TEXTS, compiled_files
 from ..tables.specs import Structure
-from ..tables.system import System
+from ..tables.system import System, arrays
 from ..tables.values import Values
-from ..tracing.trace import TABLES
+from ..tracing.trace import TRACED, traced_arrays
 from .machine import machine
 from .recorder import PLAIN
 
@@ -51,13 +51,12 @@ def plan(x: Values) -> Plan:
 
 def _planned(s: Structure, S: System) -> Plan:
     digest = hashlib.sha256(s.kept.get("code of structure", None, 1, lambda: _structure(s, S)))
-    for name in TABLES:
-        table = getattr(S, name)
+    for table in traced_arrays(S).values():
         for x in PLAIN:
             digest.update(np.packbits(table == x).tobytes())
     size = estimate(S)
     why = ""
-    if np.iscomplexobj(S.body_x):
+    if np.iscomplexobj(S.const):
         why = "its numbers are complex"
     elif s.controls:
         why = "states of controllers are for the tables"
@@ -68,18 +67,16 @@ def _planned(s: Structure, S: System) -> Plan:
 
 def estimate(S: System) -> int:
     """Operations of all procedures, from the tables' sizes (within a factor of two)."""
-    return 30 * len(S.col_i) + 45 * len(S.ldl.Li) + 150 * len(S.frame_i) + 200 * len(S.tree.parent)
+    return 30 * len(S.column) + 45 * len(S.ldl.Li) + 150 * len(S.frame_body) + 200 * len(S.tree.parent)
 
 
 def _structure(s: Structure, S: System) -> bytes:
     """Hash of what parameters cannot change, of sources and processor."""
     digest = hashlib.sha256(machine().encode() + sources())
     digest.update(" ".join("" if x is None else x.content for x in s.own).encode())
-    for name, x in S._replace(own=S.own != 0)._asdict().items():
-        arrays = x if isinstance(x, tuple) else (x,)
-        for a in arrays:
-            told = name in TABLES
-            digest.update(f"{name} {a.shape} {a.dtype}".encode() + (b"" if told else np.ascontiguousarray(a).tobytes()))
+    for name, a in arrays(S._replace(force_code=S.force_code != 0)):
+        number = name.partition(".")[0] in TRACED
+        digest.update(f"{name} {a.shape} {a.dtype}".encode() + (b"" if number else np.ascontiguousarray(a).tobytes()))
     digest.update(f"{s.nq} {s.nv} {len(s.states)} {s.depth} {len(s.measured)} {len(s.loads)}".encode())
     return digest.digest()
 

@@ -12,13 +12,8 @@ from ..equations.scratch import work
 from ..graph.node import Graph, Node, Symbol
 from ..graph.printers.llvm import Place, Procedure
 from ..tables.specs import Structure
-from ..tables.system import (
-    BODY_LAW,
-    V0,
-    System,
-    Work,
-)
-from ..tracing.trace import TABLES
+from ..tables.system import System, Work, with_numbers
+from ..tracing.trace import TRACED
 
 PLAIN = (0.0, 1.0, -1.0)  # entries of tables that the code may know
 SOLVES = (
@@ -35,10 +30,9 @@ TERMS, LOADED, INPUT, INPUT_RATE = range(4)
 def symbols(S: System, graph: Graph, known: Sequence[tuple[str, int]] = ()) -> tuple[System, dict[int, Place]]:
     """The tables with symbols in them, and where each stands; entries that are ``known`` are numbers."""
     places: dict[int, Place] = {}
-    new: dict[str, Any] = {}
     told = set(known)
-    for name in TABLES:
-        table = getattr(S, name)
+
+    def with_symbols(name: str, table: np.ndarray) -> np.ndarray:
         out = np.empty(table.shape, object)
         for k, x in enumerate(table.ravel().tolist()):
             law_zero = name == "const" and x == 0.0  # 0 sqrt(x) has no value where sqrt(x) has none
@@ -48,8 +42,9 @@ def symbols(S: System, graph: Graph, known: Sequence[tuple[str, int]] = ()) -> t
             node = graph.symbol(Symbol(f"{name}[{k}]", "parameter"), x)
             places[node.index] = (f"C_{name}", k)
             out.ravel()[k] = node
-        new[name] = out
-    return S._replace(**new), places
+        return out
+
+    return with_numbers(S, with_symbols, TRACED), places
 
 
 class Recorder:
@@ -149,4 +144,4 @@ class Recorder:
     @property
     def driven(self) -> list[int]:
         """Velocities that drivers prescribe."""
-        return [int(b[V0]) for b in self.S.body_i if b[BODY_LAW] >= 0]
+        return self.S.tree.v[self.S.tree.law >= 0].tolist()

@@ -20,9 +20,6 @@ from ..tables.system import (
     GIVEN,
     R1,
     SCHUR,
-    SEMIDEFINITE,
-    SOLVER,
-    V0,
     V1,
     V2,
 )

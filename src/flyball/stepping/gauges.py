@@ -13,7 +13,7 @@ from ..equations.tasks import POSITION
 from ..equations.tree import retract
 from ..math.rotation import rotation_vector
 from ..math.vec import col, dot, mm, norm, sub, transpose
-from ..tables.system import BIAS, COORDINATES, FORCE_ALONG, FORCE_F, FORCE_M, VALUE
+from ..tables.system import BIAS, VALUE
 from .implicit import dot_rows, solve_springs
 from .joined import BEND, OF_DIRECTION, OF_MANY, REACH, SHARE, SOLVED, SPRING_OF, SPRINGS, STEP, WAY
 

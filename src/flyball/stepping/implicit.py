@@ -22,7 +22,7 @@ from ..equations.solve import inverse_mass
 from ..equations.tasks import SLOPES, SOLVE
 from ..equations.tree import project
 from ..math.scalar import sqrt
-from ..tables.system import FORCE_ALONG, FORCE_F, FORCE_M, NV, PARENT, SCHUR, SOLVER, V0
+from ..tables.system import SCHUR
 from .joined import (
     ADDED,
     BEND,
@@ -55,15 +55,15 @@ def gradient(S, W, k, n, i, row):
         row[d] = 0.0
     if S.forces.family[k] == 1:
         r = S.rows.law.shape[0] + S.forces.F[k]
-        for e in range(S.row_p[r], S.row_p[r + 1]):
-            row[S.col_i[e]] += W.G[e]
+        for e in range(S.row_start[r], S.row_start[r + 1]):
+            row[S.column[e]] += W.G[e]
         return
     F, M = load(W.FK, S.forces.F[k]), load(W.FK, S.forces.M[k])
     axis = direction(F, M[0], n, i)
     zero = (0.0, 0.0, 0.0)
     force, torque = (axis, zero) if i < 3 else (zero, axis)
-    climb(S, W, S.frame_i[S.forces.M[k]], row, 0, 1.0, force, torque, M[0])
-    climb(S, W, S.frame_i[S.forces.F[k]], row, 0, -1.0, force, torque, M[0])
+    climb(S, W, S.frame_body[S.forces.M[k]], row, 0, 1.0, force, torque, M[0])
+    climb(S, W, S.frame_body[S.forces.F[k]], row, 0, -1.0, force, torque, M[0])
 
 
 @formula

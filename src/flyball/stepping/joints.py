@@ -12,17 +12,10 @@ from ..math.vec import load3, load9, put3, put9
 from ..numerics.cone.problem import Problem, State
 from ..numerics.integrators.clock import T
 from ..tables.system import (
-    BODY_LAW,
-    BODY_WORK,
-    COORDINATES,
     EFFORT,
-    FORCE_WORK,
     NU,
     PLACED,
-    ROW_WORK,
     SCHUR,
-    SOLVER,
-    V0,
 )
 from .contact_rows import contact_rows
 from .gauges import put_right

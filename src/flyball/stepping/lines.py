@@ -11,7 +11,7 @@ from ..compiler.formulas import formula
 from ..equations.friction import dry, held_at_rest, reaction_loads
 from ..numerics.cone.problem import BIAS, HIGH, LOW, SOFT
 from ..tables.system import BIAS as BEND_OF
-from ..tables.system import COORDINATES, FORCE_LOAD, FORCE_WORK, LAM, RETURNED, VALUE
+from ..tables.system import LAM, RETURNED, VALUE
 from .joined import (
     CHANGE,
     FRICTION,
@@ -48,9 +48,9 @@ INFINITE = 1e300
 def line_groups(A, k):
     """Group of the quantity that line k acts along; -1 if nothing moves it."""
     r = A.S.rows.law.shape[0] + A.line[k, MEASURED]
-    for e in range(A.S.row_p[r], A.S.row_p[r + 1]):
+    for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
         for g in range(A.queue.shape[0]):
-            if A.group[g] <= A.S.col_i[e] < A.group[g + 1]:
+            if A.group[g] <= A.S.column[e] < A.group[g + 1]:
                 return g
     return -1
 
@@ -60,8 +60,8 @@ def rate_of(A, k, v):
     """Rate of the quantity of line k with velocities v."""
     s = 0.0
     r = A.S.rows.law.shape[0] + A.line[k, MEASURED]
-    for e in range(A.S.row_p[r], A.S.row_p[r + 1]):
-        s += A.W.G[e] * v[A.S.col_i[e]]
+    for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
+        s += A.W.G[e] * v[A.S.column[e]]
     return s
 
 
@@ -112,8 +112,8 @@ def one_row(A, P, k, g, where):
     for d in range(size):
         P.J[at + d] = 0.0
     r = A.S.rows.law.shape[0] + A.line[k, MEASURED]
-    for e in range(A.S.row_p[r], A.S.row_p[r + 1]):
-        P.J[at + A.S.col_i[e] - A.group[g]] += side * A.W.G[e]
+    for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
+        P.J[at + A.S.column[e] - A.group[g]] += side * A.W.G[e]
 
 
 @formula

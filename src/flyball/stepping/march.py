@@ -36,7 +36,6 @@ from ..numerics.cone.problem import (
     Scratch,
     State,
 )
-from ..tables.system import COORDINATES
 from .bounce import ROUNDS, bounce, hits, no_kicks
 from .joined import (
     ASTRAY,

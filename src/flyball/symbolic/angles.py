@@ -23,7 +23,7 @@ from ..math.scalar import atan2
 from ..model.body import Body, Frame
 from ..model.joint import Joint
 from ..tables.forest import step_of
-from ..tables.system import NV, PARENT, Q0, ROW_WRAP, TERM_HINT, System
+from ..tables.system import System
 from ..tables.values import Values
 
 TURN = 2.0 * math.pi
@@ -38,15 +38,15 @@ def counted(x: Values, S: System) -> tuple[System, list[int]]:
         For each state added behind the structure's own: the term that leans on it.
     """
     s = x.structure
-    row_i, term_i, term_x = S.row_i.copy(), S.term_i.copy(), S.term_x.copy()
-    row_i[:, ROW_WRAP] = 0
+    hint, parameters = S.terms.hint.copy(), S.term_parameters.copy()
     more: list[int] = []
     for k, t in enumerate(s.terms):
-        if KINDS[t.formula.kind].turns and term_i[k, TERM_HINT] < 0:
-            term_i[k, TERM_HINT] = len(s.states) + len(more)
-            term_x[k, 0] = 1.0
+        if KINDS[t.formula.kind].turns and hint[k] < 0:
+            hint[k] = len(s.states) + len(more)
+            parameters[k, 0] = 1.0
             more.append(k)
-    return S._replace(row_i=row_i, term_i=term_i, term_x=term_x), more
+    rows = S.rows._replace(wrapped=np.zeros_like(S.rows.wrapped))
+    return S._replace(rows=rows, terms=S.terms._replace(hint=hint), term_parameters=parameters), more
 
 
 class Angles:
@@ -65,10 +65,10 @@ class Angles:
                 return owner.coordinates[what].sign * self.q[S.tree.q[row]]
         if not s.model.planar:
             return None
-        here, there = (self._heading(k) + self._since[int(S.frame_i[k])] for k in (F, M))
+        here, there = (self._heading(k) + self._since[int(S.frame_body[k])] for k in (F, M))
         if isinstance(owner, Body | Frame):
             return there
-        drawn_here, drawn_there = (self._heading(k) + self._drawn(int(S.frame_i[k])) for k in (F, M))
+        drawn_here, drawn_there = (self._heading(k) + self._drawn(int(S.frame_body[k])) for k in (F, M))
         whole = math.floor((_real(drawn_there) - _real(drawn_here)) / TURN + 0.5)
         return there - here - TURN * whole
 
@@ -94,7 +94,7 @@ class Angles:
 
     def _heading(self, frame: int) -> Any:
         """The way that a frame's x axis points in its body."""
-        R = self.x.system.frame_x[frame, 3:]
+        R = self.x.system.frames.rotation[frame]
         return atan2(R[3], R[0])
 
 

@@ -22,7 +22,6 @@ from ..errors import AnalysisError
 from ..graph.values import evaluated
 from ..model.model import Model
 from ..tables.spanning import spanning
-from ..tables.system import MASS, SEMIDEFINITE
 from ..tracing.trace import plain, traced
 
 RANK = 1e-6  # of the largest singular value of the constraints' Jacobian, above which rows surely are independent

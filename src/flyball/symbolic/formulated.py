@@ -20,7 +20,6 @@ from ..graph.arrays import objects
 from ..graph.node import Graph, Node, Symbol
 from ..laws.evaluation import evaluate_jet
 from ..math.vec import mtv, sub
-from ..tables.system import BODY_LAW, BODY_WORK, OFFSET, Q0, TERM_HINT, V0
 from ..tables.values import Values
 from ..tracing.trace import Names, Traced, plain, traced
 from .angles import Angles, Cleaned, counted
@@ -61,7 +60,7 @@ def formulated(x: Values, graph: Graph) -> Formulated:
     graph : Graph
     """
     s = x.structure
-    S = x.system if x.system.body_x.dtype == object else plain(x.system)
+    S = x.system if x.system.const.dtype == object else plain(x.system)
     x = replace(x, system=S)
     S, more = counted(x, S)
     names = called(x)
@@ -99,7 +98,7 @@ def _places(x: Values, T: Traced) -> tuple[list[Place], list[Node]]:
         kind = KINDS[t.formula.kind]
         if kind.foot is None or kind.progress is None:
             continue
-        F, M, par = load(W.FK, t.F), load(W.FK, t.M), parameters(S.term_x, k)
+        F, M, par = load(W.FK, t.F), load(W.FK, t.M), parameters(S.term_parameters, k)
         symbol = T.z[S.terms.hint[k]]
         p = mtv(F[1], sub(M[0], F[0]))
         x0, x1, _, y0, y1, _ = point(par, symbol, S.const)

@@ -17,7 +17,7 @@ from ..model.element import Element
 from ..model.joint import Joint
 from ..tables.names import velocity_names
 from ..tables.specs import Structure
-from ..tables.system import FREE, NQ, NV, Q0, SPHERICAL, TREE, V0
+from ..tables.system import FREE, SPHERICAL
 from ..tables.values import Values
 
 LETTERS = {"displacement": "s", "angle": r"\varphi", "angle_1": r"\varphi_1", "angle_2": r"\varphi_2"}
@@ -73,15 +73,15 @@ def _indexed(letter: str, index: str) -> str:
 def _coordinates(s: Structure, v: list[Symbol]) -> list[Symbol]:
     """Those of every row of the body table."""
     out: list[Symbol] = []
-    for row in s.tables["body_i"]:
-        first, kind = int(row[V0]), int(row[TREE])
+    tree = s.tables["tree"]
+    for b, (first, kind) in enumerate(zip(tree.v.tolist(), tree.joint.tolist(), strict=True)):
         if kind in (FREE, SPHERICAL):
             owner = v[first + (3 if kind == FREE else 0)].element
             out += v[first : first + 3] if kind == FREE else []
             out += [Symbol(f"{owner}.e{k}", "coordinate", rf"e_{{{k},{text(owner)}}}", "1", owner) for k in range(4)]
         else:
-            out += v[first : first + int(row[NV])]
-        assert len(out) == int(row[Q0] + row[NQ])
+            out += v[first : first + int(tree.nv[b])]
+        assert len(out) == int(tree.q[b] + tree.nq[b])
     return out
 
 

@@ -11,7 +11,7 @@ from ..graph.arrays import objects
 from ..graph.node import Undecided
 from ..model.quantities import ENERGY
 from ..results.result import Result
-from ..tables.system import FREE, TREE
+from ..tables.system import FREE
 from .expressions import Expressions
 
 if TYPE_CHECKING:

@@ -52,7 +52,7 @@ def places_at(x: Formulated, places: Sequence[Place], values: Mapping[str, Any])
     for place in places:
         t = x.values.structure.terms[place.term]
         records = [c for k in (t.F, t.M) for part in load(W.FK, k)[:2] for c in part]
-        given = [*x.cleaned(objects([*records, *parameters(S.term_x, place.term)])), *S.const]
+        given = [*x.cleaned(objects([*records, *parameters(S.term_parameters, place.term)])), *S.const]
         numbers = [float(np.real(n)) for n in evaluate(given, values)]
         F, M = ((tuple(n[:3]), tuple(n[3:])) for n in (numbers[:12], numbers[12:24]))
         out[place.symbol.data.name] = nearest(t.formula.kind, tuple(numbers[24:32]), F, M, np.array(numbers[32:]))

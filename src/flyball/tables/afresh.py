@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -14,9 +14,13 @@ from ..model.force import Force
 from ..model.joint import Joint
 from ..model.model import Model
 from .numbers import Numbers
+from .system import changed
 
 if TYPE_CHECKING:
     from .values import Values
+
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -38,11 +42,9 @@ class Afresh:
         other = given.changed | base.given.changed
         return cls(base, other.union(*(stand_on.get(name, ()) for name in other)))
 
-    def table(self, name: str, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
-        """A table of `System` to be filled in: with what is known, or empty."""
-        if self.base is None:
-            return np.zeros(shape, dtype)
-        return getattr(self.base.system, name).astype(dtype)
+    def table(self, name: str, new: T, dtype: Any) -> T:
+        """A table of `System` to be filled in: with what is known, or the ``new`` one."""
+        return new if self.base is None else changed(lambda _, x: x.astype(dtype), getattr(self.base.system, name))
 
     def state(self, name: str, n: int, dtype: Any) -> np.ndarray:
         """The same of the drawn coordinates, "q", or velocities, "v"."""

@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from ..model.controller import Controller
 from ..model.model import Model
 from ..model.wiring import given, signal, wired
-from .specs import Structure, ints
+from .specs import Structure
 
 CONTROLS = -1_000_000_000
 """Place of the first state until columns are known; below those of switches' ways."""
@@ -42,13 +44,13 @@ def slots(s: Structure) -> None:
 
 def table(s: Structure) -> None:
     """The laws of the rates."""
-    rows, s.sampled, s.ordered = [], [], []
+    laws, s.sampled, s.ordered = [], [], []
     for k, x in enumerate(s.controls):
         at = s.law(x.law, (), None if x.controller.sampled else x.controller)
-        rows.append((-1 if x.controller.sampled else at,))
+        laws.append(-1 if x.controller.sampled else at)
         if x.controller.sampled:
             s.sampled.append((x.controller.name, k, at, not x.signal))
-    s.tables["control_i"] = ints(rows, 1)
+    s.tables["control_laws"] = np.array(laws, np.int64)
     for e in s.model.controllers:
         if ordered := e.ordered():
             s.ordered += [(e, ordered, [s.law(given(s.model, e, name), ()) for name in ordered])]

@@ -19,7 +19,7 @@ from ..model.geometry import matrix_to_quaternion
 from .afresh import Afresh
 from .forest import TreeJoint
 from .specs import FrameSpec
-from .system import NQ, NV, POINT, Q0, TREE, V0
+from .system import POINT
 
 if TYPE_CHECKING:
     from .values import Values
@@ -58,8 +58,8 @@ def positions(
     ``hints``: angles of joints, "joint.coordinate", within half a turn; the drawn turns where they are not told.
     ``new``: which are found; the others are those of its tables.
     """
-    s = x.structure
-    q = new.state("q", s.nq, x.system.body_x.dtype)
+    s, tree = x.structure, x.structure.tables["tree"]
+    q = new.state("q", s.nq, x.system.const.dtype)
     hung = {t.child: t for t in s.tree_joints.values()}
     single = {b: t for b, t in hung.items() if len(t.primitives) == 1 and t.primitives[0].kind in "RP"}
     if len(single) < MANY:
@@ -70,9 +70,9 @@ def positions(
             if b not in single and new.asks(hung[b].joint):
                 _read(x, hung[b], bodies, hints or {}, q)
         elif b >= 0 and new.asks(s.model[name]):
-            d, q0 = bodies[name], s.tables["body_i"][b, Q0]
-            if s.tables["body_i"][b, TREE] == POINT:
-                n = s.tables["body_i"][b, NQ]
+            d, q0 = bodies[name], tree.q[b]
+            if tree.joint[b] == POINT:
+                n = tree.nq[b]
                 q[q0 : q0 + n] = d.p[:n]
             elif s.model.planar:
                 q[q0 : q0 + 3] = d.p[0], d.p[1], d.angle
@@ -83,14 +83,14 @@ def positions(
 
 def free_velocities(x: Values, bodies: Mapping[str, BodyState], new: Afresh = ALL) -> np.ndarray:
     """Velocities (nv,) of the bodies that hang on ground by FREE, PLANAR or POINT; zero along all tree joints."""
-    s, body_i = x.structure, x.structure.tables["body_i"]
-    v = new.state("v", s.nv, x.system.body_x.dtype)
+    s, tree = x.structure, x.structure.tables["tree"]
+    v = new.state("v", s.nv, x.system.const.dtype)
     hung = {t.child for t in s.tree_joints.values()}
     for name, b in s.place.items():
         if b >= 0 and b not in hung and new.asks(s.model[name]):
-            d, v0 = bodies[name], body_i[b, V0]
-            if body_i[b, TREE] == POINT:
-                n = body_i[b, NV]
+            d, v0 = bodies[name], tree.v[b]
+            if tree.joint[b] == POINT:
+                n = tree.nv[b]
                 v[v0 : v0 + n] = d.v[:n]
             elif s.model.planar:
                 v[v0 : v0 + 3] = d.v[0], d.v[1], d.w[2]
@@ -105,7 +105,7 @@ def _read_single(
     """The same as `_read` for hinges and slides, all at once."""
     if not joints:
         return
-    at = x.structure.tables["body_i"][[t.child for t in joints], Q0]
+    at = x.structure.tables["tree"].q[[t.child for t in joints]]
     frames = []
     for k, role in enumerate("FM"):
         own = np.array([x.poses.row(FrameSpec(0, t.joint, role)) for t in joints])
@@ -135,13 +135,13 @@ def _ends(x: Values, t: TreeJoint) -> tuple[str, str]:
 
 def _read(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState], hints: Mapping[str, float], q: np.ndarray) -> None:
     """Coordinates of one tree joint from the pose of M in F: slides first, then what turns."""
-    body_i = x.structure.tables["body_i"]
+    first = x.structure.tables["tree"].q
     (pF, RF), (pM, RM) = _frames(x, t, bodies)
     rest = np.array(t.joint.rest or np.eye(3))
     shift, turn = product(RF.T, pM - pF), product(product(RF.T, RM), rest.T)
     way = list(zip(t.links, t.primitives, strict=False))
     for link, step in way[::-1] if t.reversed else way:
-        at = body_i[link, Q0]
+        at = first[link]
         a = AXES[step.axis]
         if step.kind == "P":
             q[at] = inner(a, shift)

@@ -13,7 +13,7 @@ import numpy as np
 from ..model.model import Model
 from .forest import body_table
 from .specs import Structure
-from .system import ARTICULATED, NV, PARENT, POINT, SCHUR, SOLVER, TREE
+from .system import ARTICULATED, POINT, SCHUR
 
 BODY, LINK, TERM, ENTRY, ARTICULATE = 315.0, 112.0, 40.0, 28.0, 12.0
 FACTOR = 1.0  # a product of the factorisation: seen only where a forest's matrix is dense and large
@@ -22,19 +22,19 @@ FACTOR = 1.0  # a product of the factorisation: seen only where a forest's matri
 def counts(s: Structure) -> dict[str, float]:
     """How much there is of each kind of work."""
     t = s.tables
-    body_i, solver = t["body_i"], t["kinds"][SOLVER]
+    tree, solver = t["tree"], t["solver"][0]
     column = np.diff(s.ldl.Lp).astype(float)
-    free = body_i[:, TREE] <= POINT
+    free = tree.joint <= POINT
     return {
         "constant": 1.0,
         "bodies": float(free.sum()),
         "links": float((~free).sum()),
-        "terms": float(len(t["term_i"])),
-        "parts": float(len(t["seg_i"])),
-        "entries": float(len(t["col_i"]) + len(t["mass_i"]) + column.sum()),
+        "terms": float(len(t["terms"].row)),
+        "parts": float(len(t["segments"].body)),
+        "entries": float(len(t["column"]) + len(t["mass_entries"].row) + column.sum()),
         "factor": float((column * (column + 3.0)).sum() / 2.0),
-        "pairs": float(len(t["pair_i"]) if solver == SCHUR else 0.0),
-        "articulated": float(len(body_i) if solver == ARTICULATED else 0.0),
+        "pairs": float(len(t["pairs"].first) if solver == SCHUR else 0.0),
+        "articulated": float(len(free) if solver == ARTICULATED else 0.0),
     }
 
 
@@ -63,12 +63,12 @@ def least(model: Model, tree: Sequence[str]) -> float:
     """
     s = Structure(model, False, tuple(tree))
     body_table(s)
-    body_i = s.tables["body_i"]
+    table = s.tables["tree"]
     if len(tree) == len(model.joints):
         return 0.0
-    above = [0] * (len(body_i) + 1)  # the last one: of ground
+    above = [0] * (len(table.parent) + 1)  # the last one: of ground
     entries = 0
-    for b, (parent, n) in enumerate(body_i[:, [PARENT, NV]].tolist()):
+    for b, (parent, n) in enumerate(zip(table.parent.tolist(), table.nv.tolist(), strict=True)):
         above[b] = above[parent] + n
         entries += n * above[parent] + n * (n + 1) // 2
-    return LINK * float((body_i[:, TREE] > POINT).sum()) + ENTRY * float(2 * entries - body_i[:, NV].sum())
+    return LINK * float((table.joint > POINT).sum()) + ENTRY * float(2 * entries - table.nv.sum())

@@ -19,7 +19,7 @@ from ..model.force import CoordinateForce, Force
 from ..model.sensor import Sensor
 from ..model.touch import Touch
 from .specs import Structure, frame
-from .system import FORCE_LAW, FORCE_WORK, OWN, SLIDING
+from .system import OWN, SLIDING, Forces
 from .terms import coordinate_frames, coordinate_term, measured_term
 
 
@@ -103,26 +103,29 @@ def forces(s: Structure) -> None:
     acting = [(f, formulas_of(type(f))) for f in s.model.acting() if _acts(s, f)]
     acting.sort(key=lambda x: OWN if x[1] is not None else x[0].kind)
     s.forces, s.own = [f for f, _ in acting], [x for _, x in acting]
-    table = np.full((len(s.forces), 10), -1, np.int64)
+    none = np.full(len(s.forces), -1, np.int64)
+    table = Forces(none, none.copy(), np.full((len(s.forces), 3), -1, np.int64), *(none.copy() for _ in range(5)))
     for k, e in enumerate(s.forces):
-        table[k, 7:9] = e.kind if s.own[k] is None else OWN, isinstance(e, CoordinateForce)
+        table.kind[k] = e.kind if s.own[k] is None else OWN
+        table.family[k] = isinstance(e, CoordinateForce)
         if isinstance(e, CoordinateForce):
-            table[k, 0] = _along(s, e)
+            table.F[k] = _along(s, e)
             if hasattr(e, "load"):
-                table[k, 1] = _axis_frame(s, e)
-                table[k, 6] = 2 * len(s.measured) + len(s.loads)
+                table.M[k] = _axis_frame(s, e)
+                table.load[k] = 2 * len(s.measured) + len(s.loads)
                 s.loads.append(e)
         elif isinstance(e, Touch):
-            table[k, :2] = [*(s.measured[f"{e.name}:slip_{i + 1}"] for i in range(len(e.slips))), -1][:2]
-            table[k, 6] = 2 * len(s.measured) + len(s.loads)
-            table[k, 8] = SLIDING
+            slips = [s.measured[f"{e.name}:slip_{i + 1}"] for i in range(len(e.slips))]
+            table.F[k], table.M[k] = [*slips, -1][:2]
+            table.load[k] = 2 * len(s.measured) + len(s.loads)
+            table.family[k] = SLIDING
             s.loads.append(e)
         else:
-            table[k, :2] = frame(s, e, "F") if "F" in e.ends() else 0, frame(s, e, "M")
-        _compile_laws(s, e, table[k])
+            table.F[k], table.M[k] = frame(s, e, "F") if "F" in e.ends() else 0, frame(s, e, "M")
+        _compile_laws(s, e, table.laws[k])
         if not e.conservative() and e.name not in s.model.aside:
-            table[k, 5] = s.state(f"{e.name}.work")
-    s.tables["force_i"] = table
+            table.work[k] = s.state(f"{e.name}.work")
+    s.tables["forces"] = table
 
 
 def formulas_of(cls: type[Force]) -> CodeTable | None:
@@ -163,7 +166,7 @@ def _refuse_names(cls: type[Force]) -> None:
 
 
 def addresses(s: Structure) -> np.ndarray:
-    """Addresses of the code tables of forces: `System.own`."""
+    """Addresses of the code tables of forces: `System.force_code`."""
     return np.array([0 if x is None else x.address for x in s.own], np.int64)
 
 
@@ -178,10 +181,10 @@ def _axis_frame(s: Structure, e: CoordinateForce) -> int:
     return coordinate_frames(s, joint, what)[0]
 
 
-def _compile_laws(s: Structure, e: Force, row: np.ndarray) -> None:
-    if len(e.laws()) > FORCE_WORK - FORCE_LAW:
-        raise ModelError(f"{e.title}: laws() gives {len(e.laws())} laws; a force has up to {FORCE_WORK - FORCE_LAW}")
+def _compile_laws(s: Structure, e: Force, places: np.ndarray) -> None:
+    if len(e.laws()) > len(places):
+        raise ModelError(f"{e.title}: laws() gives {len(e.laws())} laws; a force has up to {len(places)}")
     for name, of in fields_with(e.__class__, LawOf).items():
         for slot, law in enumerate(e.laws()):
             if law is not None:
-                row[2 + slot] = s.law(s.model.law(law, of, f"{name} of {e.title}"), of.inputs, e)
+                places[slot] = s.law(s.model.law(law, of, f"{name} of {e.title}"), of.inputs, e)

@@ -17,7 +17,7 @@ from ..model.body import GROUND
 from ..model.joint import Joint, Primitive
 from ..model.model import Model
 from .points import single
-from .system import FREE, NQ, NV, PLANAR, POINT, PRISMATIC, REVOLUTE, SPHERICAL, TREE_NQ, TREE_NV, WELD
+from .system import FREE, PLANAR, POINT, PRISMATIC, REVOLUTE, SPHERICAL, TREE_NQ, TREE_NV, WELD, Tree
 
 if TYPE_CHECKING:
     from .specs import Structure
@@ -146,12 +146,8 @@ def body_table(s: Structure) -> None:
     nq, nv = np.array(TREE_NQ)[kinds], np.array(TREE_NV)[kinds]
     if model.planar:
         nq[kinds == POINT] = nv[kinds == POINT] = 2
-    body_i = np.full((len(rows), 8), -1, np.int64)
-    body_i[:, 0] = [parent for parent, _ in rows]
-    body_i[:, 1] = kinds
-    body_i[:, 2], body_i[:, 3] = np.cumsum(nq) - nq, np.cumsum(nv) - nv
-    body_i[:, NQ], body_i[:, NV] = nq, nv
-    s.tables["body_i"] = body_i
+    parents, none = np.array([parent for parent, _ in rows], np.int64), np.full(len(rows), -1, np.int64)
+    s.tables["tree"] = Tree(parents, kinds, np.cumsum(nq) - nq, np.cumsum(nv) - nv, nq, nv, none, none.copy())
 
 
 def steps(s: Structure) -> Iterator[tuple[TreeJoint, int, Primitive]]:

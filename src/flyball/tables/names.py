@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from .forest import steps
 from .specs import Structure
-from .system import NV, POINT, TREE, V0
+from .system import POINT
 
 AXES = ("x", "y", "z")
 
@@ -25,12 +25,12 @@ def velocity_names(s: Structure) -> list[Named]:
     the plane, in space ``turn x``, ``turn y``, ``turn z`` about the body's own axes, which point masses do not
     have. Tree joints: the joint's coordinates; what has no name of its own is a ``turn`` or ``shift`` along an axis.
     """
-    body_i = s.tables["body_i"]
+    tree = s.tables["tree"]
     out = [Named("", "m")] * s.nv
     hung = set()
     for t, row, step in steps(s):
         hung.add(row)
-        v0, n = int(body_i[row, V0]), int(body_i[row, NV])
+        v0, n = int(tree.v[row]), int(tree.nv[row])
         for k in range(n):
             told = step.coordinate if n == 1 else ""  # what turns about a point has three velocities
             what = told or f"{'shift' if step.kind == 'P' else 'turn'} {AXES[k] if n > 1 else step.axis}"
@@ -38,7 +38,7 @@ def velocity_names(s: Structure) -> list[Named]:
             out[v0 + k] = Named(f"{t.joint.name}.{what}", unit)
     own = ["x", "y", "angle"] if s.model.planar else [*AXES, *(f"turn {a}" for a in AXES)]
     for name, b in s.place.items():
-        if b >= 0 and b not in hung and int(body_i[b, TREE]) <= POINT:
-            for k, what in enumerate(own[: int(body_i[b, NV])]):
-                out[int(body_i[b, V0]) + k] = Named(f"{name}.{what}", "m" if what in AXES else "rad")
+        if b >= 0 and b not in hung and int(tree.joint[b]) <= POINT:
+            for k, what in enumerate(own[: int(tree.nv[b])]):
+                out[int(tree.v[b]) + k] = Named(f"{name}.{what}", "m" if what in AXES else "rad")
     return out

@@ -9,43 +9,43 @@ import numpy as np
 from ..errors import ModelError
 from ..numerics.ldl import analyse
 from .reads import entries
-from .specs import Structure, ints
-from .system import BODY_LAW, COUPLED, NV, SCHUR, SOLVER, V0
+from .specs import Structure, integers
+from .system import COUPLED, SCHUR, Blocks, LoadTerms, MassEntries, Pairs, Segments, SensorDrivers, Terms, Tree
 from .terms import on_second
 
 
 def patterns(s: Structure, solved: bool = True) -> None:
     """Entries of G, of the matrix that is factored (if something is ``solved``), and who adds to them."""
-    body_i = s.tables["body_i"]
-    parents = body_i[:, 0].tolist()
+    tree = s.tables["tree"]
+    parents = tree.parent.tolist()
     ways = [apart(parents, s.frames[t.F].body, s.frames[t.M].body) for t in s.terms]
     touched = _touched(s, ways)
-    at, row_p, col_i, block_i = _entries(body_i, touched, len(s.rows))
-    term_i: list[tuple] = []
-    seg_i: list[tuple] = []
+    at, row_start, column, blocks = _entries(tree, touched, len(s.rows))
+    terms: list[tuple] = []
+    segments: list[tuple] = []
     for t, (on_F, on_M) in zip(s.terms, ways, strict=True):
-        first = len(seg_i)
-        seg_i += [(b, 1, at[t.row, b]) for b in on_M]
-        seg_i += [(b, -1, at[t.row, b]) for b in on_F]
-        term_i.append((t.row, t.F, t.M, first, len(seg_i), t.hint))
-    mix_i = [
-        (k, m, at[k, b], at[len(s.rows) + m, b], body_i[b, 5])
+        first = len(segments)
+        segments += [(b, 1, at[t.row, b]) for b in on_M]
+        segments += [(b, -1, at[t.row, b]) for b in on_F]
+        terms.append((t.row, t.F, t.M, first, len(segments), t.hint))
+    following = [
+        (k, m, at[k, b], at[len(s.rows) + m, b], tree.nv[b])
         for k, r in enumerate(s.rows)
         for m in r.sensors
         for b in sorted(touched[len(s.rows) + m])
     ]
-    load_i = [(2 * len(s.measured) + k, n) for k, e in enumerate(s.loads) for n in _pressing(s, e)]
-    load_i += entries(s)
+    loads = [(2 * len(s.measured) + k, n) for k, e in enumerate(s.loads) for n in _pressing(s, e)]
+    loads += entries(s)
     s.tables |= {
-        "term_i": ints(term_i, 6),
-        "seg_i": ints(seg_i, 3),
-        "row_p": np.array(row_p, np.int64),
-        "col_i": np.array(col_i, np.int64),
-        "block_i": ints(block_i, 3),
-        "mix_i": ints(mix_i, 5),
-        "load_i": ints(load_i, 2),
+        "terms": integers(Terms, terms),
+        "segments": integers(Segments, segments),
+        "row_start": np.array(row_start, np.int64),
+        "column": np.array(column, np.int64),
+        "blocks": integers(Blocks, blocks),
+        "sensor_drivers": integers(SensorDrivers, following),
+        "load_terms": integers(LoadTerms, loads),
     }
-    solver = s.tables["kinds"][SOLVER]
+    solver = s.tables["solver"][0]
     if not solved:
         _nothing(s)
     elif solver == SCHUR:
@@ -75,20 +75,20 @@ def _touched(s: Structure, ways: list[tuple[list[int], list[int]]]) -> list[set[
 
 
 def _entries(
-    body_i: np.ndarray, touched: list[set[int]], rows: int
+    tree: Tree, touched: list[set[int]], rows: int
 ) -> tuple[dict[tuple[int, int], int], list[int], list[int], list[tuple]]:
     """Where each (row, body) begins in G; first entries of rows; velocities of entries; blocks of the rows."""
-    block_i: list[tuple] = []
-    row_p, at = [0], {}
-    col_i: list[int] = []
+    blocks: list[tuple] = []
+    row_start, at = [0], {}
+    column: list[int] = []
     for k, bodies in enumerate(touched):
         for b in sorted(bodies):
-            at[k, b] = len(col_i)
+            at[k, b] = len(column)
             if k < rows:
-                block_i.append((b, len(col_i), k))
-            col_i.extend(range(body_i[b, 3], body_i[b, 3] + body_i[b, 5]))
-        row_p.append(len(col_i))
-    return at, row_p, col_i, block_i
+                blocks.append((b, len(column), k))
+            column.extend(range(tree.v[b], tree.v[b] + tree.nv[b]))
+        row_start.append(len(column))
+    return at, row_start, column, blocks
 
 
 def apart(parents: list[int], F: int, M: int) -> tuple[list[int], list[int]]:
@@ -107,22 +107,22 @@ def apart(parents: list[int], F: int, M: int) -> tuple[list[int], list[int]]:
 
 def _schur(s: Structure) -> None:
     """S = G M^-1 G^T: for each body, every pair of its rows."""
-    body_i = s.tables["body_i"]
-    block_i = s.tables["block_i"]
-    block_i = block_i[np.argsort(block_i[:, 0], kind="stable")]
-    first, count = np.unique(block_i[:, 0], return_index=True, return_counts=True)[1:]
+    order = np.argsort(s.tables["blocks"].body, kind="stable")
+    blocks = Blocks(*(x[order] for x in s.tables["blocks"]))
+    first, count = np.unique(blocks.body, return_index=True, return_counts=True)[1:]
     one, other = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
     for n in np.unique(count).tolist():  # bodies with as many rows have the same pairs
         i, j = np.tril_indices(n)
         starts = first[count == n, None]
         one.append((starts + i).ravel())
         other.append((starts + j).ravel())
-    a, b = block_i[np.concatenate(one)], block_i[np.concatenate(other)]
-    s.ldl, place = analyse(len(s.rows), a[:, 2], b[:, 2])
-    table = np.column_stack([a[:, 1], b[:, 1], body_i[a[:, 0], NV], place[: len(a)]])
-    table = table[np.argsort(a[:, 0], kind="stable")]
-    s.tables["pair_i"] = np.ascontiguousarray(table[np.argsort(table[:, 3], kind="stable")])
-    s.tables["mass_i"] = np.zeros((0, 3), np.int64)
+    a, b = np.concatenate(one), np.concatenate(other)
+    s.ldl, place = analyse(len(s.rows), blocks.row[a], blocks.row[b])
+    table = Pairs(blocks.entry[a], blocks.entry[b], s.tables["tree"].nv[blocks.body[a]], place[: len(a)])
+    order = np.argsort(blocks.body[a], kind="stable")
+    order = order[np.argsort(table.place[order], kind="stable")]
+    s.tables["pairs"] = Pairs(*(x[order] for x in table))
+    s.tables["mass_entries"] = integers(MassEntries, [])
 
 
 def _coupled(s: Structure, parents: list[int]) -> None:
@@ -130,32 +130,32 @@ def _coupled(s: Structure, parents: list[int]) -> None:
 
     What couples a prescribed velocity to others goes to an entry behind the matrix that nobody reads: it is no unknown.
     """
-    body_i = s.tables["body_i"]
-    own = [range(v0, v0 + n) for v0, n in zip(body_i[:, V0].tolist(), body_i[:, NV].tolist(), strict=True)]
+    tree = s.tables["tree"]
+    own = [range(v0, v0 + n) for v0, n in zip(tree.v.tolist(), tree.nv.tolist(), strict=True)]
     entries = []
-    for b in range(len(body_i)):
+    for b in range(len(own)):
         for k in own[b]:
             a = b
             while a >= 0:
                 entries += [(k, i) for i in own[a] if i <= k]
                 a = parents[a]
-    row_p, nv = s.tables["row_p"][: len(s.rows) + 1], s.nv
-    col_i = s.tables["col_i"][: row_p[-1]]
-    rows = np.repeat(np.arange(len(s.rows)), np.diff(row_p)) + nv
-    M = ints(entries, 2)
-    i, j = np.r_[M[:, 0], rows], np.r_[M[:, 1], col_i]
+    row_start, nv = s.tables["row_start"][: len(s.rows) + 1], s.nv
+    column = s.tables["column"][: row_start[-1]]
+    rows = np.repeat(np.arange(len(s.rows)), np.diff(row_start)) + nv
+    row_of_M, column_of_M = np.array(entries, np.int64).reshape(-1, 2).T
+    i, j = np.r_[row_of_M, rows], np.r_[column_of_M, column]
     unknown = np.ones(nv + len(s.rows), bool)
-    unknown[body_i[body_i[:, BODY_LAW] >= 0, 3]] = False
+    unknown[tree.v[tree.law >= 0]] = False
     counted = (unknown[i] & unknown[j]) | (i == j)
     s.ldl, found = analyse(nv + len(s.rows), i[counted], j[counted])
     place = np.full(len(i), len(s.ldl.Ai))
     place[counted] = found[: counted.sum()]
-    s.tables["mass_i"] = np.ascontiguousarray(np.column_stack([M, place[: len(M)]]))
-    e = np.arange(len(col_i))
-    s.tables["pair_i"] = np.ascontiguousarray(np.column_stack([e, e, 0 * e + 1, place[len(M) :]]))
+    n, e = len(entries), np.arange(len(column))
+    s.tables["mass_entries"] = MassEntries(*map(np.ascontiguousarray, (row_of_M, column_of_M, place[:n])))
+    s.tables["pairs"] = Pairs(e, e, np.ones_like(e), place[n:].copy())
 
 
 def _nothing(s: Structure) -> None:
     """No rows on a forest of tree joints: sweeps over articulated bodies need no matrix."""
     s.ldl, _ = analyse(0, np.zeros(0, int), np.zeros(0, int))
-    s.tables["pair_i"], s.tables["mass_i"] = np.zeros((0, 4), np.int64), np.zeros((0, 3), np.int64)
+    s.tables["pairs"], s.tables["mass_entries"] = integers(Pairs, []), integers(MassEntries, [])

@@ -1,7 +1,7 @@
 """Forces that events name: their columns among what is sensed, behind the loads of joints, and what they are made of.
 
 A joint has eight columns (`carried.WRENCH`), anything else two: its effort, and that the other way round. They are
-filled in `equations.readings` from the rows of ``load_i`` that begin with the first of them. What follows is a term
+filled in `equations.readings` from the rows of `LoadTerms` that begin with the first of them. What follows is a term
 of the joint's rows, that plus the number of terms where it is seen from the joint's other side, or below -1 what adds
 to an effort: a row, a force along a quantity, a velocity that a driver prescribes.
 """
@@ -15,7 +15,6 @@ from ..model.joint import Joint
 from ..model.model import Model
 from .events import names
 from .specs import Structure
-from .system import V0
 from .terms import on_second
 
 READS = -2_000_000_000
@@ -52,7 +51,7 @@ def _made_of(s: Structure, e: Element) -> list[int]:
         return [on_second(s, k) for k in s.terms_of.get(e.name, ())]
     if isinstance(e, Driver):
         if e.name in s.prescribed:
-            return [-2 - rows - forces - int(s.tables["body_i"][s.prescribed[e.name], V0])]
+            return [-2 - rows - forces - int(s.tables["tree"].v[s.prescribed[e.name]])]
         return [-2 - s.slices[e.name].start]
     own = [-2 - x.row for x in s.switches if x.element is e and x.row >= 0]
     return own + [-2 - rows - k for k, f in enumerate(s.forces) if f is e]

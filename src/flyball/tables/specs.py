@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from ..model.model import Model
 from ..model.wiring import Wired
 from ..numerics.ldl import Pattern
 from .forest import TreeJoint
+
+T = TypeVar("T", bound=tuple)
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ class Structure:
     loads: list[Force] = field(default_factory=list)  # those that need to know what their joint carries
     reads: dict[str, int] = field(default_factory=dict)  # element whose force events name -> its column (`reads`)
     state_at: dict[str, int] = field(default_factory=dict)  # name -> work, turn or place state
-    tables: dict[str, np.ndarray] = field(default_factory=dict)
+    tables: dict[str, Any] = field(default_factory=dict)  # integers of `System`, by its fields
     code: list[int] = field(default_factory=list)
     const: list[float] = field(default_factory=list)
     table_at: dict[str, int] = field(default_factory=dict)  # table or joint's curve -> its place in const
@@ -111,12 +113,12 @@ class Structure:
     @cached_property
     def nq(self) -> int:
         """Number of coordinates."""
-        return int(self.tables["body_i"][:, 4].sum())
+        return int(self.tables["tree"].nq.sum())
 
     @cached_property
     def nv(self) -> int:
         """Number of velocities."""
-        return int(self.tables["body_i"][:, 5].sum())
+        return int(self.tables["tree"].nv.sum())
 
     @property
     def states(self) -> list[str]:
@@ -159,6 +161,7 @@ def frame(s: Structure, e: Any, role: str, coordinate: str = "") -> int:
     return s.frame_at[key]
 
 
-def ints(rows: list, width: int) -> np.ndarray:
-    """A table of integers, also where it has no rows."""
-    return np.array(rows, np.int64).reshape(-1, width)
+def integers(of: type[T], rows: Any) -> T:
+    """A table of integers, one array for each of its fields, from its rows; there may be none."""
+    width = len(of._fields)  # type: ignore[attr-defined]
+    return of(*np.ascontiguousarray(np.array(rows, np.int64).reshape(-1, width).T))

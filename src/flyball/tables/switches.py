@@ -15,10 +15,9 @@ from ..model.element import Element
 from ..model.model import Model
 from ..model.switch import Switch
 from . import events
-from .specs import RowSpec, Structure, frame, ints
+from .specs import RowSpec, Structure, frame, integers
 from .system import (
     FALLING,
-    FORCE_SWITCH,
     G_ASTRAY,
     G_BACK,
     G_CONE,
@@ -32,6 +31,9 @@ from .system import (
     G_SLIDES,
     G_TURNS,
     G_UPPER,
+    Guards,
+    Switches,
+    SwitchNumbers,
 )
 from .terms import coordinate_term, measured_term
 
@@ -122,18 +124,17 @@ def rows(s: Structure) -> None:
 
 def table(s: Structure) -> None:
     """The integers of switches and guards, when forces are numbered."""
-    s.tables["force_i"][:, FORCE_SWITCH] = -1
     for k, spec in enumerate(s.switches):
         if spec.switch.slides:
             spec.force = next(i for i, f in enumerate(s.forces) if f is spec.element)
-            s.tables["force_i"][spec.force, FORCE_SWITCH] = k
+            s.tables["forces"].switch[spec.force] = k
         s.guards += [(kind, k, FALLING) for kind in _watched(k, spec)]
     if _may_share(s):
         s.guards.append((G_SHARED, 0, FALLING))
-    s.tables["switch_i"] = ints(
-        [(x.row, x.measured, x.switch.kind, x.force, max(x.law, x.partner), x.other) for x in s.switches], 6
+    s.tables["switches"] = integers(
+        Switches, [(x.row, x.measured, x.switch.kind, x.force, x.law, x.partner, x.other) for x in s.switches]
     )
-    s.tables["guard_i"] = ints(s.guards, 3)
+    s.tables["guards"] = integers(Guards, s.guards)
 
 
 def _may_share(s: Structure) -> bool:
@@ -150,14 +151,23 @@ def _watched(k: int, x: SwitchSpec) -> tuple[int, ...]:
     return GUARDS.get(x.switch.kind, ())
 
 
-def numbers(s: Structure, of: Any, x: np.ndarray, asks: Any, apart: Any) -> np.ndarray:
-    """Parameters of the switches, from the numbers of their elements; ``apart``: how far points of each are apart."""
+FIELDS = {SLIP: ("static_friction", "kinetic_friction"), RATCHET: ("tooth", "pitch", "restitution")}
+"""Which of `SwitchNumbers` an element's ``switched`` gives, by the kind of switch; others: the first of them."""
+
+
+def numbers(s: Structure, of: Any, table: SwitchNumbers, asks: Any, apart: Any) -> None:
+    """Numbers of the switches, from those of their elements; ``apart``: how far points of each are apart."""
     for k, spec in enumerate(s.switches):
-        if spec.switch.kind == BRANCH:
-            x[k], x[k, :2] = 0.0, (-np.inf, np.inf)
-        elif asks(spec.element):
-            par = spec.element.switched(of[spec.element.name], spec.switch.label, apart(spec.element))
-            x[k] = 0.0
-            x[k, :2] = -np.inf, np.inf
-            x[k, : len(par)] = par
-    return x
+        kind = spec.switch.kind
+        if kind != BRANCH and not asks(spec.element):
+            continue
+        given = (
+            ()
+            if kind == BRANCH
+            else spec.element.switched(of[spec.element.name], spec.switch.label, apart(spec.element))
+        )
+        named = dict(zip(FIELDS.get(kind, SwitchNumbers._fields), given, strict=False))
+        if kind == RATCHET:  # it begins between these teeth
+            named |= {"lower": named["tooth"], "upper": named["tooth"] + named["pitch"]}
+        for name, column in zip(table._fields, table, strict=True):
+            column[k] = named.get(name, {"lower": -np.inf, "upper": np.inf}.get(name, 0.0))

@@ -6,40 +6,21 @@ Uniform tables, one row per element, sorted by kind; every loop of the house run
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Annotated, Any, NamedTuple, TypeVar
+
+import numpy as np
 
 from ..compiler.layout import COMPLEX, CodeTables1, Float1, Int1, Int2, Number1, Number2
 from ..constraints.registry import KINDS
 from ..numerics.ldl import Pattern
 
-# columns of System.body_i
-# (law and work state: of the driver that prescribes the body's one coordinate, or -1)
-PARENT, TREE, Q0, V0, NQ, NV, BODY_LAW, BODY_WORK = range(8)
+T = TypeVar("T", bound=tuple)
 # kinds of tree joints, and how many coordinates and velocities each has (POINT in the plane: 2)
 FREE, PLANAR, POINT, REVOLUTE, PRISMATIC, SPHERICAL, WELD = range(7)
 TREE_NQ, TREE_NV = (7, 3, 3, 1, 1, 4, 0), (6, 3, 3, 1, 1, 3, 0)
-# columns of System.body_x
-MASS, INERTIA, INVERSE, EXCESS, TREE_P, TREE_R, BODY_P, BODY_R = 0, 1, 10, 19, 28, 31, 40, 43
-# (whether TREE_R and BODY_R differ from the identity: what does not need not be multiplied)
-PER_MASS, PER_COMPACT, OFFSET, TREE_TURNS, BODY_TURNS = 52, 53, 54, 55, 56
-# (what was added to a mass that is none, and the inverse of what its body would weigh if it were like the others)
-EXCESS_MASS, PER_BULK, BODY_WIDTH = 57, 58, 59
-# columns of System.term_i
-TERM_ROW, TERM_F, TERM_M, TERM_SEG, TERM_SEG_END, TERM_HINT = range(6)
-# columns of System.row_i
-ROW_LAW, ROW_WRAP, ROW_WORK = range(3)
-# columns of System.mix_i
-MIX_ROW, MIX_SLOT, MIX_TO, MIX_FROM, MIX_COUNT = range(5)
-# columns of System.force_i; forces along a measured quantity have its slot in place of frame F
-BETWEEN, ALONG, SLIDING = range(3)  # families of forces: FORCE_ALONG
-FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD, FORCE_KIND, FORCE_ALONG, FORCE_SWITCH = 0, 1, 2, 5, 6, 7, 8, 9
+BETWEEN, ALONG, SLIDING = range(3)  # families of forces: `Forces.family`
 OWN = 1000  # the kind of forces that have a code table: no built-in element's number
-# columns of System.switch_i, and of switch_x; kinds of switches: see `model/switch.py`
-SWITCH_ROW, SWITCH_MEASURED, SWITCH_KIND, SWITCH_FORCE, SWITCH_LAW, SWITCH_OTHER = range(6)
-SWITCH_PARTNER = SWITCH_LAW  # of a slip: that along the other tangent, or -1
-SWITCH_LOWER, SWITCH_UPPER, SWITCH_BOUNCE, SWITCH_STIFFNESS, SWITCH_DAMPING = range(5)
-SWITCH_TOOTH, SWITCH_PITCH = 0, 1  # of a ratchet
-SWITCH_REST, SWITCH_SLIDING = range(2)  # coefficients of friction of a slip
 # rows of Work.switch; and modes: the row counts for nothing, holds its quantity where it is, or at rest
 MODE, HOLD, LOWER, UPPER, SPARE = range(5)
 # (weight of a row of a group that shares what it holds, 0 of others: `equations/sharing.py`)
@@ -47,13 +28,10 @@ SHARED = 5
 # (of corners of laws that hold the motion: du/dt; side and du/dt of the pass before; scratch; sides by du/dt)
 DRIFT_OFF, SIDE_BEFORE, DRIFT_BEFORE, SIDE_MOVED, SIDE_TOLD, INVERSE_SLOPES = range(6, 12)
 OFF, HELD, STEADY = 0.0, 1.0, 2.0
-# columns of System.guard_i; kinds of guards; what a guard's zero is watched for
-GUARD_KIND, GUARD_OF, GUARD_WAY = range(3)
+# kinds of guards; what a guard's zero is watched for
 G_LAW, G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CORNER, G_PRESS_LOWER, G_PRESS_UPPER = range(10)
 G_CONE, G_TURNS, G_ASTRAY, G_SHARED = range(10, 14)
 FALLING, EITHER, RISING = -1, 0, 1
-# columns of System.control_i: the law of a state's rate (-1: it is held between instants)
-CONTROL_RATE = 0
 # rows of Work.row, each (nr,)
 G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
 # rows of Work.vel, each (nv,)
@@ -76,51 +54,264 @@ SCRATCH, PREPARE, PLACE, MOVE, LOADS, FACTOR, REUSE, STEP, STEP_UNLOADED, REFINE
     range(15)
 )
 
-# entries of System.kinds from its end, and what may stand in the first: how the equations are solved
-SOLVER, COORDINATES, FRAMES, GROUND_FRAMES = -4, -3, -2, -1
+# how the equations are solved: `System.solver`
 SCHUR, COUPLED, ARTICULATED = range(3)
-# entries of System.glob after the three of gravity
-REGULARISE, SEMIDEFINITE, LENGTH = 3, 4, 5
-# (a rate of its own [1/s]: see `tempo`; from there on what each measured quantity is compared with: that length, or a
-# radian)
-TEMPO, UNIT = 6, 7
 
 TERM_KINDS = len(KINDS)
+WIDTH = {
+    "inertia": 9, "inverse_inertia": 9, "excess_inertia": 9, "joint_position": 3, "joint_rotation": 9,
+    "body_position": 3, "body_rotation": 9, "position": 3, "rotation": 9,
+}  # fmt: skip
+"""Columns of the fields of tables of numbers that have several."""
+
+
+class Tree(NamedTuple):
+    """How bodies hang on one another: a row (nb,) for each body, or each step of a tree joint, parents first."""
+
+    parent: Int1  # the row that carries it; -1: ground
+    joint: Int1  # kind of the tree joint to its parent
+    q: Int1  # its first coordinate
+    v: Int1  # its first velocity
+    nq: Int1  # number of its coordinates
+    nv: Int1  # number of its velocities
+    law: Int1  # law of the driver that prescribes its one coordinate; -1: none
+    work: Int1  # state of that driver's work; -1: none
+
+    def coordinates(self, b: int) -> slice:
+        """Where the coordinates of a row are."""
+        return slice(int(self.q[b]), int(self.q[b] + self.nq[b]))
+
+    def velocities(self, b: int) -> slice:
+        """Where its velocities are."""
+        return slice(int(self.v[b]), int(self.v[b] + self.nv[b]))
+
+
+class Bodies(NamedTuple):
+    """Numbers of the rows of `Tree` [SI units, (nb, ...)]; matrices row by row."""
+
+    mass: Number1
+    inertia: Number2  # (nb, 9): about the centre of mass, in body axes
+    inverse_inertia: Number2  # (nb, 9): with `excess_inertia`
+    excess_inertia: Number2  # (nb, 9): added where a principal inertia is none, and taken out again by the solve
+    joint_position: Number2  # (nb, 3): of the tree joint's frame on the parent, from the parent's centre of mass
+    joint_rotation: Number2  # (nb, 9)
+    body_position: Number2  # (nb, 3): of the centre of mass in the frame beyond the tree joint
+    body_rotation: Number2  # (nb, 9)
+    inverse_mass: Number1  # with `excess_mass`
+    inverse_reference_inertia: Number1  # of a body of that mass as large as what its frames reach
+    offset: Number1  # value of the tree joint's coordinate as drawn
+    joint_turned: Number1  # 0 where `joint_rotation` is the identity: no need to multiply
+    body_turned: Number1  # 0 where `body_rotation` is
+    excess_mass: Number1  # added to a mass that is none, and taken out again by the solve
+    inverse_reference_mass: Number1  # of the mass that the body would have if it were like the others
+
+
+class Frames(NamedTuple):
+    """Frames that elements use, those on ground first [(nf, ...)]."""
+
+    position: Number2  # (nf, 3): from the body's centre of mass, in body axes [m]
+    rotation: Number2  # (nf, 9)
+
+
+class Terms(NamedTuple):
+    """Terms of constraint rows and measured quantities, sorted by kind [(nt,)]."""
+
+    row: Int1  # measured quantities are counted after the rows
+    F: Int1  # frame
+    M: Int1  # frame
+    segment: Int1  # first of its `Segments`
+    segment_end: Int1
+    hint: Int1  # state that it leans on: turns of an angle, place on a curve; -1: none
+
+
+class Segments(NamedTuple):
+    """Which entries of the Jacobian a term adds to [(ns,)]."""
+
+    body: Int1
+    side: Int1  # +1: that of frame M, -1: of frame F
+    entry: Int1  # first in `Work.G`
+
+
+class Rows(NamedTuple):
+    """Constraint rows [(nr,)]."""
+
+    law: Int1  # that its quantity follows; -1: 0
+    wrapped: Int1  # whether it is an angle, compared up to whole turns
+    work: Int1  # state of its work; -1: none
+
+
+class SensorDrivers(NamedTuple):
+    """Drivers whose laws name sensors: the law's slope times the sensor's gradient joins the row [(nx,)]."""
+
+    row: Int1
+    slot: Int1  # of the sensor
+    to: Int1  # first entry of G
+    start: Int1  # first entry of the sensor's gradient
+    entries: Int1  # how many
+
+
+class Forces(NamedTuple):
+    """Forces, sorted by kind [(nk, ...)]."""
+
+    F: Int1  # frame; of a force along a measured quantity that quantity, of a sliding contact its slips
+    M: Int1  # frame
+    laws: Int2  # (nk, 3)
+    work: Int1  # state of its work; -1: none
+    load: Int1  # column of its load in `Work.sensed`; -1: none
+    kind: Int1
+    family: Int1  # BETWEEN, ALONG, SLIDING
+    switch: Int1  # its switch; -1: none
+
+
+class Angles(NamedTuple):
+    """Angles whose turns are counted [(na,)]."""
+
+    F: Int1
+    M: Int1
+    state: Int1
+
+
+class LoadTerms(NamedTuple):
+    """Which terms make up the reaction behind a load; see `reads` too [(nj,)]."""
+
+    load: Int1  # column in `Work.sensed`
+    term: Int1
+
+
+class Switches(NamedTuple):
+    """Rows with modes; kinds are those of `model/switch.py` [(nw,)]."""
+
+    row: Int1  # -1: none
+    measured: Int1  # quantity
+    kind: Int1
+    force: Int1  # that acts while it slides; -1: none
+    law: Int1  # corner of a law; -1: none
+    partner: Int1  # of a slip that along the other tangent; -1: none
+    other: Int1  # of a slip the gap; -1: none
+
+
+class SwitchNumbers(NamedTuple):
+    """Numbers of `Switches`; what a kind has not is 0, bounds -inf and inf [(nw,)]."""
+
+    lower: Number1
+    upper: Number1
+    restitution: Number1
+    stiffness: Number1
+    damping: Number1
+    tooth: Number1  # of a ratchet: where a tooth is
+    pitch: Number1
+    static_friction: Number1  # of a slip: coefficient at rest
+    kinetic_friction: Number1
+
+
+class Guards(NamedTuple):
+    """What is watched for zeros [(ng,)]."""
+
+    kind: Int1
+    of: Int1  # switch or law
+    direction: Int1  # FALLING, EITHER, RISING
+
+
+class MassEntries(NamedTuple):
+    """Entries of the mass matrix; only for the coupled matrix [(nM,)]."""
+
+    row: Int1
+    column: Int1
+    place: Int1  # in `Work.A`
+
+
+class Pairs(NamedTuple):
+    """Products of blocks of G that add up to G M^-1 G^T [(np,)]."""
+
+    first: Int1  # first entry of one block
+    second: Int1
+    length: Int1
+    place: Int1  # in `Work.A`
+
+
+class Blocks(NamedTuple):
+    """Blocks of G [(ne,)]."""
+
+    body: Int1
+    entry: Int1  # first
+    row: Int1
 
 
 class System(NamedTuple):
     """A mechanism in arrays. Nothing in it changes during an analysis."""
 
-    body_i: Int2  # (nb, 8): parent, tree joint kind, first q, first v, number of q, of v, law, its work
-    body_x: Number2  # (nb, 59): mass properties, their inverses and stand-ins; frames of tree joints, their offset
-    frame_i: Int1  # (nf,): body; frames on ground (-1) come first
-    frame_x: Number2  # (nf, 12): position from the body's centre of mass and rotation, in body axes
-    term_i: Int2  # (nt, 6): row (measured quantities after the rows), frame F, M, segments, state it leans on
-    term_x: Number2  # (nt, 8): parameters of the formula, the last one the coefficient in the row
-    seg_i: Int2  # (ns, 3): body, side (+1 M, -1 F), first entry in Work.G
-    row_i: Int2  # (nr, 3): law or -1, wrapped angle or not, work state or -1
-    row_p: Int1  # (nr + nm + 1,): first entry of each row, then of each measured quantity, in Work.G
-    col_i: Int1  # (nG,): velocity of each entry of Work.G
-    mix_i: Int2  # (nx, 5): drivers that follow sensors: row, slot, entries of G to and from, count
-    force_i: Int2  # (nk, 10): F, M, three laws, state of its work, its load (or -1), kind, family, switch or -1
-    force_x: Number2  # (nk, 16): parameters of the formula
-    own: CodeTables1  # (nk,): code table of a force whose class is not flyball's; 0 of others
-    angle_i: Int2  # (na, 3): frame F, frame M, state that counts its turns
-    load_i: Int2  # (nj, 2): terms that make up the reaction behind a load: load, term; see `reads` too
-    switch_i: Int2  # (nw, 6): rows with modes: row, measured quantity, kind, force that slides, law, another
-    switch_x: Number2  # (nw, 8): parameters of each, by its kind
-    guard_i: Int2  # (ng, 3): what is watched for zeros: kind, switch or law, which way
-    control_i: Int2  # (nc, 1): states of controllers, the first of all states: law of the rate
-    # first row of each kind of term; solver; number of q; frames that are kept up to date, those of them on ground
-    kinds: Int1
+    tree: Tree
+    bodies: Bodies
+    frame_body: Int1  # (nf,): body of each frame, -1: ground
+    frames: Frames
+    terms: Terms
+    term_parameters: Number2  # (nt, 8): of its formula, the last one its factor in the row
+    segments: Segments
+    rows: Rows
+    row_start: Int1  # (nr + nm + 1,): first entry of each row, then of each measured quantity, in Work.G
+    column: Int1  # (nG,): velocity of each entry of Work.G
+    sensor_drivers: SensorDrivers
+    forces: Forces
+    force_parameters: Number2  # (nk, 16)
+    force_code: CodeTables1  # (nk,): code table of a force whose class is not flyball's; 0 of others
+    angles: Angles
+    load_terms: LoadTerms
+    switches: Switches
+    switch_numbers: SwitchNumbers
+    guards: Guards
+    control_laws: Int1  # (nc,): law of the rate of each controller's state, the first of all states; -1: sampled
+    kind_terms: Int1  # (TERM_KINDS + 1,): first term of each kind
+    solver: Int1  # (1,): SCHUR, COUPLED or ARTICULATED
+    coordinates: Int1  # (1,): number of coordinates
+    moving_frames: Int1  # (1,): number of frames that are kept up to date
+    ground_frames: Int1  # (1,): number of those of them that are on ground
     code: Int1  # bytecode of the laws
     const: Number1  # parameters, literals of the laws, splines
-    glob: Number1  # (7 + nm,): gravity, relative regularisation, semidefinite mass or not, size, pace (`UNIT`)
-    mass_i: Int2  # (nM, 3): entries of M: row, column, place in A; only for the coupled matrix
-    pair_i: Int2  # (np, 4): products of G blocks that add up to S: first, second entry, length, place in A
-    block_i: Int2  # (ne, 3): blocks of G: body, first entry, row
+    gravity: Number1  # (3,) [m/s^2]
+    regularization: Number1  # (1,): of the solve, relative
+    semidefinite: Number1  # (1,): 1 if some mass or inertia is none, else 0
+    length: Number1  # (1,): a typical length [m]
+    rate: Number1  # (1,): a typical rate [1/s] (`tempo`)
+    units: Number1  # (nm,): what each measured quantity is compared with: that length, or a radian
+    mass_entries: MassEntries
+    pairs: Pairs
+    blocks: Blocks
     ldl: Pattern  # the sparse factor
     flat: Int1  # (15,): code made for this mechanism: length of its scratch, addresses; all 0: there is none
+
+
+NUMBERS = (
+    "bodies", "frames", "term_parameters", "force_parameters", "switch_numbers", "const", "gravity", "regularization",
+    "semidefinite", "length", "rate", "units",
+)  # fmt: skip
+"""The fields of `System` that hold numbers: they change with parameters, and may be complex, or expressions."""
+
+
+def blank(of: type[T], n: int, dtype: Any) -> T:
+    """A table of n rows of zeros."""
+    return of(*(np.zeros((n, WIDTH[name]) if name in WIDTH else n, dtype) for name in of._fields))  # type: ignore[attr-defined]
+
+
+def arrays(table: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
+    """Every array of a table and of tables in it, with its name: ``"bodies.mass"``."""
+    if not isinstance(table, tuple):
+        yield name, table
+        return
+    for field, x in zip(table._fields, table, strict=True):  # type: ignore[attr-defined]
+        yield from arrays(x, f"{name}.{field}" if name else field)
+
+
+def changed(function: Callable[[str, np.ndarray], Any], table: Any, name: str = "") -> Any:
+    """The table of what a function makes of each array in it, and of its name."""
+    if not isinstance(table, tuple):
+        return function(name, table)
+    fields = zip(table._fields, table, strict=True)  # type: ignore[attr-defined]
+    return type(table)(*(changed(function, x, f"{name}.{field}" if name else field) for field, x in fields))
+
+
+def with_numbers(S: System, function: Callable[[str, np.ndarray], Any], names: Sequence[str] = NUMBERS) -> System:
+    """The same with what a function makes of every array of numbers, and of its name."""
+    return S._replace(**{name: changed(function, getattr(S, name), name) for name in names})
 
 
 class Work(NamedTuple):

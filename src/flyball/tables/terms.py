@@ -17,8 +17,8 @@ from ..model.force import Force
 from ..model.joint import Coordinate, Joint
 from ..model.touch import Touch
 from .forest import step_of
-from .specs import RowSpec, Structure, TermSpec, frame, ints
-from .system import ARTICULATED, BODY_LAW, COUPLED, SCHUR, TERM_KINDS
+from .specs import RowSpec, Structure, TermSpec, frame, integers
+from .system import ARTICULATED, COUPLED, SCHUR, TERM_KINDS, Angles, Forces, Rows
 
 
 def rows(s: Structure, holds: Sequence[Initial]) -> None:
@@ -64,7 +64,8 @@ def _driver_row(s: Structure, driver: Driver) -> None:
     link = _prescribes(s, driver)
     if link is not None and not sensors:
         s.prescribed[driver.name] = link
-        s.tables["body_i"][link, BODY_LAW:] = at, s.state(f"{driver.name}.work")
+        tree = s.tables["tree"]
+        tree.law[link], tree.work[link] = at, s.state(f"{driver.name}.work")
         return
     row = _told_row(s, driver, driver.coordinate, at)
     row.sensors = sensors
@@ -168,40 +169,41 @@ def sort(s: Structure) -> None:
     for k, t in enumerate(s.terms):
         if not t.measured:
             s.terms_of.setdefault(carrier(t).name, []).append(k)
-    angles = ints(s.angles, 3)
-    angles[:, :2] = new[angles[:, :2]]
+    angles = integers(Angles, s.angles)
     s.frame_at = {key: int(new[k]) for key, k in s.frame_at.items()}
-    s.tables["angle_i"] = angles
+    s.tables["angles"] = Angles(new[angles.F], new[angles.M], angles.state)
     for k, name in enumerate(sorted(s.prescribed, key=s.prescribed.__getitem__)):
         s.slices[name] = slice(len(s.rows) + k, len(s.rows) + k + 1)
-    s.tables["frame_i"] = np.array([f.body for f in s.frames], np.int64)
-    s.tables["row_i"] = np.array([(r.law, r.wrap, r.work) for r in s.rows], np.int64).reshape(-1, 3)
+    s.tables["frame_body"] = np.array([f.body for f in s.frames], np.int64)
+    s.tables["rows"] = integers(Rows, [(r.law, r.wrap, r.work) for r in s.rows])
     terms = np.searchsorted([t.formula.kind for t in s.terms], np.arange(TERM_KINDS + 1))
-    ground = int((s.tables["frame_i"] < 0).sum())
+    ground = int((s.tables["frame_body"] < 0).sum())
     absolute = not s.tree_joints and not s.coupled
     solver = SCHUR if absolute else COUPLED if s.rows or s.coupled else ARTICULATED
     moving = ground + sum(s.frames[new[k]].body >= 0 for k in used)
-    s.tables["kinds"] = np.r_[terms, solver, s.nq, moving, ground].astype(np.int64)
+    s.tables["kind_terms"] = terms.astype(np.int64)
+    sizes = {"solver": solver, "coordinates": s.nq, "moving_frames": moving, "ground_frames": ground}
+    s.tables |= {name: np.array([n], np.int64) for name, n in sizes.items()}
     _force_frames(s, new)
 
 
-def frame_columns(e: Force) -> tuple[int, ...]:
-    """Columns of the force table in which a force has frames; others have what is measured there."""
-    return () if isinstance(e, Touch) else (1,) if hasattr(e, "effort") else (0, 1)
+def frames_of(s: Structure, e: Force) -> tuple[np.ndarray, ...]:
+    """Fields of the force table in which a force has frames; others have what is measured there."""
+    table: Forces = s.tables["forces"]
+    return () if isinstance(e, Touch) else (table.M,) if hasattr(e, "effort") else (table.F, table.M)
 
 
 def _used(s: Structure) -> set[int]:
     """Frames that the compiled loops ask for; those of tree joints often only results do."""
     used = {k for t in s.terms for k in (t.F, t.M)} | {k for angle in s.angles for k in angle[:2]}
     for k, e in enumerate(s.forces):
-        used |= {int(s.tables["force_i"][k, column]) for column in frame_columns(e)}
+        used |= {int(column[k]) for column in frames_of(s, e)}
     return used - {-1}  # forces along a measured quantity that have no frame of their own
 
 
 def _force_frames(s: Structure, new: np.ndarray) -> None:
     """New numbers of frames in the force table."""
-    table = s.tables["force_i"]
     for k, e in enumerate(s.forces):
-        for column in frame_columns(e):
-            if table[k, column] >= 0:
-                table[k, column] = new[table[k, column]]
+        for column in frames_of(s, e):
+            if column[k] >= 0:
+                column[k] = new[column[k]]

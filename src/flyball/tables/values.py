@@ -16,7 +16,6 @@ import numpy as np
 
 from ..constraints.registry import KINDS
 from ..errors import ModelError
-from ..math.lanes import has_lanes, over_lanes
 from ..math.scalar import real_parts, sqrt
 from ..model.body import GROUND
 from ..model.coupling import Coupling
@@ -32,7 +31,7 @@ from .numbers import Numbers, kind_of, numbers
 from .points import check_centred
 from .poses import Poses
 from .specs import Structure, TermSpec
-from .system import EXCESS, EXCESS_MASS, FLAT, System
+from .system import FLAT, Frames, SwitchNumbers, System, blank
 from .tempo import tempo
 
 NO_LENGTH = 1e-13  # of coordinates: a distance that is their rounding
@@ -77,7 +76,7 @@ class Values:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """In another process code has other addresses."""
         vars(self).update(state)
-        self.system = self.system._replace(own=addresses(self.structure))
+        self.system = self.system._replace(force_code=addresses(self.structure))
 
 
 def values(
@@ -118,49 +117,52 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     model, env, numbers, bodies = s.model, given.env, given.of, given.bodies
     dtype = kind_of([*given.env.values(), *holds.values()])
     pose = Poses(s, given)
-    frame_x = _frame_x(s, pose, new.table("frame_x", (len(s.frames), 12), dtype), new)
-    length = _length(s, frame_x, bodies)
-    _check_points(s, frame_x, length, new)
-    body_x = mass_table(s, bodies, frame_x, length, new)
-    tree_frames(s, pose, numbers, body_x, new)
+    frames = _frames(s, pose, new.table("frames", blank(Frames, len(s.frames), dtype), dtype), new)
+    length = _length(s, frames.position, bodies)
+    _check_points(s, frames.position, length, new)
+    table = mass_table(s, bodies, frames.position, length, new)
+    tree_frames(s, pose, numbers, table, new)
     const, curve_at = _constants(s, numbers, env, dtype)
-    term_x = _term_x(s, pose, holds, curve_at, new.table("term_x", (len(s.terms), 8), dtype), new)
-    force_x = _force_x(s, pose, new.table("force_x", (len(s.forces), 16), dtype), new)
-    switch_x = switches.numbers(s, numbers, new.table("switch_x", (len(s.switches), 8), dtype), new.asks, pose.apart)
-    semidefinite = float((body_x[:, EXCESS : EXCESS + 9] != 0.0).any() or (body_x[:, EXCESS_MASS] != 0.0).any())
+    terms = new.table("term_parameters", np.zeros((len(s.terms), 8), dtype), dtype)
+    terms = _term_parameters(s, pose, holds, curve_at, terms, new)
+    forces = _force_parameters(s, pose, new.table("force_parameters", np.zeros((len(s.forces), 16), dtype), dtype), new)
+    of_switches = new.table("switch_numbers", blank(SwitchNumbers, len(s.switches), dtype), dtype)
+    switches.numbers(s, numbers, of_switches, new.asks, pose.apart)
+    semidefinite = float((table.excess_inertia != 0.0).any() or (table.excess_mass != 0.0).any())
     gravity = model.gravity_vector(env)
     pace = tempo(given, model, gravity, length)
-    glob = np.array([*gravity, REGULARISATION, semidefinite, length, pace, *_units(s, length)], dtype)
-    t = s.tables
-    system = System(
-        t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
-        t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], force_x, addresses(s), t["angle_i"], t["load_i"],
-        t["switch_i"], switch_x, t["guard_i"], t["control_i"],
-         t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl, np.zeros(FLAT, np.int64),
+    one = {"regularization": REGULARISATION, "semidefinite": semidefinite, "length": length, "rate": pace}
+    system = System(  # type: ignore[misc]
+        **s.tables,
+        bodies=table, frames=frames, term_parameters=terms, force_parameters=forces, switch_numbers=of_switches,
+        force_code=addresses(s), const=const, gravity=np.array([*gravity], dtype),
+        **{name: np.array([x], dtype) for name, x in one.items()}, units=np.array(_units(s, length), dtype),
+        ldl=s.ldl, flat=np.zeros(FLAT, np.int64),
     )  # fmt: skip
-    typical = length if has_lanes([length]) else float(length.real)
+    typical = float(length.real)
     x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, typical, pose)
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
     x.q[:], x.v[:] = positions(x, drawn, new=new), free_velocities(x, drawn, new=new)
     return x
 
 
-def _frame_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
+def _frames(s: Structure, pose: Poses, table: Frames, new: Afresh) -> Frames:
     for k, f in enumerate(s.frames):
         if new.asks(f.element):
-            x[k] = pose.row(f)
-    return x
+            row = pose.row(f)
+            table.position[k], table.rotation[k] = row[:3], row[3:]
+    return table
 
 
-def _check_points(s: Structure, frame_x: np.ndarray, length: Any, new: Afresh) -> None:
+def _check_points(s: Structure, places: np.ndarray, length: Any, new: Afresh) -> None:
     """Refuse ends that miss the centre of a point mass with these numbers."""
     single = {s.place[name]: name for name in s.points}
-    for f, way in zip(s.frames, frame_x[:, :3], strict=True) if single else ():
+    for f, way in zip(s.frames, places, strict=True) if single else ():
         if f.body in single and new.asks(f.element):
             check_centred(s.model, single[f.body], f.element, way, length)
 
 
-def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamespace]) -> Any:
+def _length(s: Structure, places: np.ndarray, bodies: Mapping[str, SimpleNamespace]) -> Any:
     """A typical length: the largest way from a centre of mass to a frame, or from one body to the mean of all.
 
     Where there is none: of bodies and places on the ground about their mean, or what bodies' inertia is the square of.
@@ -168,15 +170,14 @@ def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamesp
     moving = [b for k, b in bodies.items() if k != GROUND]
     if not moving:
         return 1.0
-    centres, on_body = np.array([b.c for b in moving]), s.tables["frame_i"] >= 0
-    if (length := _reach(frame_x[on_body, :3], frame_x[~on_body, :3], centres)).real > 0.0:
+    centres, on_body = np.array([b.c for b in moving]), s.tables["frame_body"] >= 0
+    if (length := _reach(places[on_body], places[~on_body], centres)).real > 0.0:
         return length
     spin = [np.trace(b.inertia) / b.mass for b in moving if b.mass.real > 0.0]
     length = np.sqrt(max(spin, key=lambda x: x.real, default=0.0))
     return length if length.real > 0.0 else 1.0
 
 
-@over_lanes
 def _reach(on_bodies: np.ndarray, on_ground: np.ndarray, centres: np.ndarray) -> Any:
     """The same by places alone, (..., k, 3) each; 0 where they are all one."""
     places = np.concatenate([on_ground, centres], axis=-2)
@@ -215,7 +216,7 @@ def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: An
     return np.array(const, dtype), curve_at
 
 
-def _term_x(
+def _term_parameters(
     s: Structure,
     pose: Poses,
     holds: Mapping[str, Any],
@@ -268,7 +269,7 @@ def _coupled(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
     return t.sign * (share - _offset(t, pose.numbers))
 
 
-def _force_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
+def _force_parameters(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
     for k, e in enumerate(s.forces):
         if not new.asks(e):
             continue

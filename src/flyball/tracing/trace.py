@@ -29,23 +29,26 @@ from ..tables.system import (
     F_APPLIED,
     G_VALUE,
     GAMMA,
-    INERTIA,
     LAM,
     LOAD,
-    MASS,
     NU,
-    NV,
+    NUMBERS,
     PLANAR,
     RETURNED,
-    TREE,
-    V0,
     VALUE,
     System,
     Work,
+    arrays,
+    with_numbers,
 )
 
-TABLES = ("body_x", "frame_x", "term_x", "force_x", "const", "glob")
-"""The tables of numbers in `System`."""
+TRACED = tuple(name for name in NUMBERS if name != "switch_numbers")
+"""The tables of numbers in `System` that equations of motion without switches are made of."""
+
+
+def traced_arrays(S: System) -> dict[str, np.ndarray]:
+    """Their arrays by name, always in the same order."""
+    return {name: x for table in TRACED for name, x in arrays(getattr(S, table), table)}
 
 
 @dataclass
@@ -78,13 +81,12 @@ class Traced:
 def plain(S: System) -> System:
     """The tables of numbers as arrays of objects, of Python's own numbers."""
 
-    def objects(x: np.ndarray) -> np.ndarray:
+    def objects(_: str, x: np.ndarray) -> np.ndarray:
         out = np.empty(x.shape, object)
         out.ravel()[:] = x.ravel().tolist()
         return out
 
-    new: dict[str, Any] = {name: objects(getattr(S, name)) for name in TABLES}
-    return S._replace(**new)
+    return with_numbers(S, objects, TRACED)
 
 
 def traced(
@@ -139,7 +141,10 @@ def tables_by_name(s: Structure, S: System) -> dict[int, str]:
     found = {at: name for name, at in s.table_at.items()}
     for k, t in enumerate(s.terms):
         if KINDS[t.formula.kind].place:
-            found |= {int(S.term_x[k, 1].real): f"{t.element.name}.x", int(S.term_x[k, 2].real): f"{t.element.name}.y"}
+            found |= {
+                int(S.term_parameters[k, 1].real): f"{t.element.name}.x",
+                int(S.term_parameters[k, 2].real): f"{t.element.name}.y",
+            }
     return found
 
 
@@ -182,8 +187,8 @@ def _rows(S: System, W: Work, nm: int, nv: int) -> tuple[np.ndarray, np.ndarray]
     nr = len(S.rows.law)
     dense = np.array([[0.0] * nv] * (nr + nm), object).reshape(nr + nm, nv)
     for k in range(nr + nm):
-        for e in range(S.row_p[k], S.row_p[k + 1]):
-            dense[k, S.col_i[e]] = dense[k, S.col_i[e]] + W.G[e]
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            dense[k, S.column[e]] = dense[k, S.column[e]] + W.G[e]
     return dense[nr:], dense[:nr]
 
 
@@ -192,8 +197,8 @@ def mass_matrix(S: System, W: Work, nv: int) -> np.ndarray:
     M = np.array([[0.0] * nv] * nv, object).reshape(nv, nv)
     if len(S.mass_entries.row):
         mass_entries(S, W)
-        for e, (i, j, _) in enumerate(S.mass_i):
-            M[i, j] = M[j, i] = W.M[e]
+        i, j = S.mass_entries.row, S.mass_entries.column
+        M[i, j] = M[j, i] = W.M
         return M
     for b in range(len(S.tree.parent)):
         v0, n = S.tree.v[b], S.tree.nv[b]

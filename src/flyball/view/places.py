@@ -41,9 +41,9 @@ class Places:
         k = x.structure.frame_at.get((name, role, ""))
         if k is None:
             return None
-        body = self._names.get(int(x.system.frame_i[k]), GROUND)
-        row = x.system.frame_x[k].real
-        return End(body, row[:3] + x.bodies[body].com.real, row[3:].reshape(3, 3), k)
+        body = self._names.get(int(x.system.frame_body[k]), GROUND)
+        p, R = x.system.frames.position[k].real, x.system.frames.rotation[k].real
+        return End(body, p + x.bodies[body].com.real, R.reshape(3, 3), k)
 
     def ends(self, e: Any) -> tuple[End, End] | None:
         """F and M of an element that joins two bodies; None if it does not."""

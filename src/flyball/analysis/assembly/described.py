@@ -14,7 +14,7 @@ import numpy as np
 from ...math.vec import cross
 from ...model.geometry import quaternion_to_matrix, rotation_about
 from ...results.departure import FAST, Departure
-from ...tables.system import EXCESS, INERTIA, NV, POINT, Q0, TREE, V0
+from ...tables.system import POINT
 from ...tables.values import Values
 from ..compiled import Compiled
 
@@ -63,8 +63,8 @@ def _all_bodies(x: Values) -> list[Given]:
         origin, turning = b.velocity is not None, b.angular_velocity is not None
         if (at := x.structure.place[b.name]) < 0:
             continue
-        row = x.system.body_i[at]
-        out.append(Given(b.name, int(row[V0]), shifts, int(row[NV]) - shifts, origin, turning, b.as_drawn))
+        v0, nv = int(x.system.tree.v[at]), int(x.system.tree.nv[at])
+        out.append(Given(b.name, v0, shifts, nv - shifts, origin, turning, b.as_drawn))
     return out
 
 
@@ -94,8 +94,8 @@ def _blow(x: Values, g: Given, u: np.ndarray) -> np.ndarray:
 
     The turn w of least m |u + w x c|^2 + w J w. Missing inertias have stand-ins.
     """
-    d, row = x.bodies[g.name], x.system.body_x[x.structure.place[g.name]]
-    J = (row[INERTIA : INERTIA + 9] + row[EXCESS : EXCESS + 9]).reshape(3, 3)
+    d, table, b = x.bodies[g.name], x.system.bodies, x.structure.place[g.name]
+    J = (table.inertia[b] + table.excess_inertia[b]).reshape(3, 3)
     about = J + d.mass * ((d.com @ d.com) * np.eye(3) - np.outer(d.com, d.com))
     moment = d.mass * _cross(u, d.com)
     return np.array([0.0, 0.0, moment[2] / about[2, 2]]) if g.planar else np.linalg.solve(about, moment)
@@ -113,10 +113,10 @@ def _origin(d: Any) -> np.ndarray:
 
 def rotation(x: Values, name: str, q: np.ndarray) -> np.ndarray:
     """Rotation of a body at q; to the bit as it is drawn where it was not turned."""
-    row = x.system.body_i[x.structure.place[name]]
-    if row[TREE] == POINT:
+    b = x.structure.place[name]
+    if x.system.tree.joint[b] == POINT:
         return x.bodies[name].R
-    at = int(row[Q0])
+    at = int(x.system.tree.q[b])
     here = q[at + 2 : at + 3] if x.structure.model.planar else q[at + 3 : at + 7]
     drawn = x.q[at + 2 : at + 3] if x.structure.model.planar else x.q[at + 3 : at + 7]
     if np.array_equal(here, drawn):

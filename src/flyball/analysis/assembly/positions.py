@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics.rank import svd
-from ...tables.system import G_VALUE, NV, V0
+from ...tables.system import G_VALUE
 from ..compiled import Compiled
 from .described import rotation
 
@@ -48,7 +48,7 @@ def movable(c: Compiled) -> np.ndarray:
     out = np.ones(s.nv)
     for name, b in s.place.items():
         if b >= 0 and s.model[name].as_drawn:
-            v0, n = s.tables["body_i"][b, 3], s.tables["body_i"][b, 5]
+            v0, n = s.tables["tree"].v[b], s.tables["tree"].nv[b]
             out[v0 : v0 + n] = 0.0
     return out
 
@@ -60,10 +60,10 @@ def inverse_weights(c: Compiled) -> np.ndarray:
 
 def _shifts(c: Compiled) -> np.ndarray:
     """Which velocities are those of points, not turning."""
-    body_i = c.structure.tables["body_i"]
+    tree = c.structure.tables["tree"]
     out = np.ones(c.structure.nv, bool)
     shifts = 2 if c.structure.model.planar else 3
-    for v0, n in zip(body_i[:, V0], body_i[:, NV], strict=True):
+    for v0, n in zip(tree.v, tree.nv, strict=True):
         out[v0 + min(n, shifts) : v0 + n] = False
     return out
 
@@ -73,9 +73,9 @@ def _longest(c: Compiled, d: np.ndarray) -> tuple[float, float]:
 
     A step is as long as its vectors are, which is the same in whatever axes the world is described.
     """
-    body_i, shifts = c.structure.tables["body_i"], _shifts(c)
-    body = np.repeat(np.arange(len(body_i)), body_i[:, NV])
-    place = np.concatenate([np.arange(v0, v0 + n) for v0, n in zip(body_i[:, V0], body_i[:, NV], strict=True)])
+    tree, shifts = c.structure.tables["tree"], _shifts(c)
+    body = np.repeat(np.arange(len(tree.nv)), tree.nv)
+    place = np.concatenate([np.arange(v0, v0 + n) for v0, n in zip(tree.v, tree.nv, strict=True)])
     both = (np.bincount(body, (d**2 * kind)[place]) for kind in (shifts, ~shifts))
     shifted, turned = (float(np.sqrt(x.max(initial=0.0))) for x in both)
     return shifted, turned
@@ -183,10 +183,10 @@ def close(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarr
 
 def _along_bodies(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
     """The same, translations turned from each body's own axes to the world's: what they do depends on no world axes."""
-    body_i, out = c.structure.tables["body_i"], d.copy()
+    tree, out = c.structure.tables["tree"], d.copy()
     for name, b in c.structure.place.items():
         if b >= 0:
-            at, n = int(body_i[b, V0]), min(int(body_i[b, NV]), 2 if c.structure.model.planar else 3)
+            at, n = int(tree.v[b]), min(int(tree.nv[b]), 2 if c.structure.model.planar else 3)
             out[at : at + n] = rotation(c.values, name, q)[:n, :n] @ d[at : at + n]
     return out
 

@@ -13,7 +13,6 @@ from ...model.model import Model
 from ...results.departure import Departure
 from ...results.numbers import tuple_of
 from ...tables.coordinates import BodyState
-from ...tables.system import NQ, Q0
 from ..compiled import Compiled, compiled
 from .described import fast, not_kept
 from .gaps import contradictory_velocities, disagreement, no_rate

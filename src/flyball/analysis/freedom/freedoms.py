@@ -9,7 +9,7 @@ import numpy as np
 from ...model.body import Body, Initial
 from ...model.joint import Joint
 from ...results.freedoms import FreeMotion
-from ...tables.system import NV, POINT, TREE, V0
+from ...tables.system import POINT
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from .jacobian import lengths
@@ -33,8 +33,8 @@ def free_motions(a: Assembly, motions: np.ndarray) -> tuple[FreeMotion, ...]:
         return ()
     c = a.compiled
     place = {name: b for name, b in c.structure.place.items() if b >= 0}
-    body_i = c.values.system.body_i
-    groups = [np.arange(body_i[b, V0], body_i[b, V0] + body_i[b, NV]) for b in place.values()]
+    tree = c.values.system.tree
+    groups = [np.arange(tree.v[b], tree.v[b] + tree.nv[b]) for b in place.values()]
     scale = lengths(c)[:, None]
     names, gradients = _coordinates(a)
     out: list[FreeMotion] = []
@@ -129,10 +129,10 @@ def _spin(c: Compiled, b: int) -> np.ndarray:
 def _motion(a: Assembly, velocity: np.ndarray, coordinate: str) -> FreeMotion:
     c = a.compiled
     s = c.structure
-    body_i = c.values.system.body_i
+    tree = c.values.system.tree
     speed = np.abs(velocity / lengths(c))
     fast = {
-        name: float(speed[body_i[b, V0] : body_i[b, V0] + body_i[b, NV]].max())
+        name: float(speed[tree.v[b] : tree.v[b] + tree.nv[b]].max())
         for name, b in s.place.items()
         if b >= 0 and isinstance(s.model[name], Body)
     }
@@ -141,7 +141,8 @@ def _motion(a: Assembly, velocity: np.ndarray, coordinate: str) -> FreeMotion:
     if coordinate:
         return FreeMotion(coordinate, coordinate, moving, velocity)
     name = max((n for n in moving if n not in s.points), key=fast.__getitem__)
-    own = velocity[body_i[s.place[name], V0] :][: body_i[s.place[name], NV]]
+    b = s.place[name]
+    own = velocity[tree.v[b] : tree.v[b] + tree.nv[b]]
     others = f"; {', '.join(n for n in moving if n != name)} with it" if len(moving) > 1 else ""
     return FreeMotion(f"{name} {_turning(a, name, own)}{others}", "", moving, velocity)
 
@@ -157,7 +158,7 @@ def _turning(a: Assembly, name: str, u: np.ndarray) -> str:
     S = c.values.system
     joints = {j.name for j in c.structure.model.joints}
     frames = {k for t in c.structure.terms if t.element.name in joints for k in (t.F, t.M)}
-    points = [p, *(c.work.FK[k, :3] for k in sorted(frames) if S.frame_i[k] == b)]
+    points = [p, *(c.work.FK[k, :3] for k in sorted(frames) if S.frame_body[k] == b)]
     near = 1e-6 * c.values.length
     through = all(np.linalg.norm(np.cross(x - at, axis)) < near for x in points)
     direction = ", ".join(f"{x + 0.0:.3g}" for x in np.where(np.abs(axis) < 1e-9, 0.0, axis))

@@ -16,7 +16,7 @@ import numpy as np
 from ...equations.tree import retract
 from ...model.geometry import orientation_matrix
 from ...results.freedoms import Geometry
-from ...tables.system import NQ, Q0
+from ...tables.system import Frames
 from ..assembly.positions import closed_near
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
@@ -79,8 +79,9 @@ def _way(c: Compiled, q: np.ndarray, start: np.ndarray) -> float:
     """How far apart positions are [m], turns counted by the mechanism's length."""
     size = np.ones(len(q))
     shifts = 2 if c.structure.model.planar else 3
-    for row in c.values.system.body_i:
-        size[row[Q0] + shifts : row[Q0] + row[NQ]] = c.values.length
+    tree = c.values.system.tree
+    for q0, nq in zip(tree.q, tree.nq, strict=True):
+        size[q0 + shifts : q0 + nq] = c.values.length
     return float(np.linalg.norm((q - start) * size))
 
 
@@ -88,17 +89,18 @@ def _shaken_rank(a: Assembly) -> int:
     """Rank where the frames of all joints are somewhere else, by a little and at random."""
     c = compiled(a.compiled.structure.model, parameters=a.compiled.values.told)
     s = c.structure
-    S = c.values.system._replace(frame_x=c.values.system.frame_x.copy())
+    S = c.values.system
+    frames = Frames(S.frames.position.copy(), S.frames.rotation.copy())
     random = np.random.default_rng(2)
-    for k in range(len(S.frame_x)):
+    for k in range(len(S.frame_body)):
         if s.frames[k].role == "world":
             continue
         shift, turn = SHAKEN * c.values.length * random.normal(size=3), SHAKEN * random.normal(size=3)
         if s.model.planar:
             shift[2] = turn[0] = turn[1] = 0.0
-        S.frame_x[k, :3] += shift
-        S.frame_x[k, 3:] = (S.frame_x[k, 3:].reshape(3, 3) @ orientation_matrix(turn, "turn")).ravel()
-    shaken = Compiled(replace(c.values, system=S), c.z)
+        frames.position[k] += shift
+        frames.rotation[k] = (frames.rotation[k].reshape(3, 3) @ orientation_matrix(turn, "turn")).ravel()
+    shaken = Compiled(replace(c.values, system=S._replace(frames=frames)), c.z)
     shaken.follow(a.compiled.hints)
     shaken.at(a.t, a.q, a.v)
     return rank_of(shaken)

@@ -10,7 +10,6 @@ from ...errors import ModelError
 from ...model.model import Model
 from ...numerics.sparse_rank import sparse_null_space
 from ...tables.points import points
-from ...tables.system import NV, V0
 from ..assembly.start import Assembly
 
 FEW = 1e-3  # part of a motion that is no turn
@@ -40,11 +39,11 @@ def check_inertia(model: Model, a: Assembly, motions: np.ndarray) -> None:
     if w[0] > 1e-9 * max(w[-1], 1e-300):
         return
     motion = motions @ V[:, 0]
-    body_i = a.compiled.values.system.body_i
-    size = [np.abs(motion[v0 : v0 + n]).max() for v0, n in zip(body_i[:, V0], body_i[:, NV], strict=True)]
+    tree = a.compiled.values.system.tree
+    size = [np.abs(motion[v0 : v0 + n]).max() for v0, n in zip(tree.v, tree.nv, strict=True)]
     b = int(np.argmax(size))
     name = next(k for k, v in a.compiled.structure.place.items() if v == b)
-    v0, n = int(body_i[b, V0]), int(body_i[b, NV])
+    v0, n = int(tree.v[b]), int(tree.nv[b])
     shifts = 2 if model.planar else 3
     turns = motion[v0 + shifts : v0 + n]
     if np.abs(turns).max(initial=0.0) < FEW * size[b]:

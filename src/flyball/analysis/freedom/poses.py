@@ -7,7 +7,7 @@ import numpy as np
 from ...math.vec import mtv
 from ...model.geometry import matrix_to_quaternion
 from ...results.result import Result
-from ...tables.system import NV, PLANAR, POINT, Q0, TREE, V0
+from ...tables.system import PLANAR, POINT
 from ..compiled import Compiled
 
 
@@ -23,7 +23,7 @@ def absolute_states(result: Result, own: Compiled, base: Compiled) -> np.ndarray
     q, v, z = np.zeros((n, s.nq)), np.zeros((n, s.nv)), np.full((n, len(s.states)), np.nan)
     for name, b in s.place.items():
         if b >= 0:
-            _moved(result, name, base.values.system.body_i[b], q, v)
+            _moved(result, base, name, q, v)
     hints = {k: result.hints[:, at] for k, at in own.structure.state_at.items()} | own.turned(result.q.T)
     for name, at in s.state_at.items():
         if name.endswith(".work"):
@@ -33,15 +33,16 @@ def absolute_states(result: Result, own: Compiled, base: Compiled) -> np.ndarray
     return np.column_stack([result.t, q, v, z])
 
 
-def _moved(result: Result, name: str, row: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
-    """Coordinates and velocities of one body, as they stand in a row of the body table."""
-    b = result.values.structure.place[name]
+def _moved(result: Result, base: Compiled, name: str, q: np.ndarray, v: np.ndarray) -> None:
+    """Coordinates and velocities of one body, where those of ``base`` stand."""
+    tree = base.values.system.tree
+    b, at = (x.structure.place[name] for x in (result.values, base.values))
     p, R, w, u, _, _ = result.records.body(b)
-    q0, v0 = int(row[Q0]), int(row[V0])
-    if row[TREE] == POINT:
-        n = int(row[NV])
+    q0, v0 = int(tree.q[at]), int(tree.v[at])
+    if tree.joint[at] == POINT:
+        n = int(tree.nv[at])
         q[:, q0 : q0 + n], v[:, v0 : v0 + n] = np.stack(p[:n], axis=1), np.stack(u[:n], axis=1)
-    elif row[TREE] == PLANAR:
+    elif tree.joint[at] == PLANAR:
         q[:, q0 : q0 + 3] = np.stack([p[0], p[1], result.records.angle(b)], axis=1)
         v[:, v0 : v0 + 3] = np.stack([u[0], u[1], w[2]], axis=1)
     else:

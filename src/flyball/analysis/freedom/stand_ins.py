@@ -51,8 +51,8 @@ def rows_of(c: Compiled, there: Found, names: Sequence[str], positions: Sequence
     """Rows of elements of a compiled mechanism in the position where it was looked at, and in those next to it."""
     a = there.assembly
     S, still = c.values.system, np.zeros(c.structure.nv)
-    ends, scale = S.row_p[: len(S.rows.law) + 1], lengths(c)
-    columns = S.col_i[: ends[-1]]
+    ends, scale = S.row_start[: len(S.rows.law) + 1], lengths(c)
+    columns = S.column[: ends[-1]]
     numbers = np.repeat(np.arange(len(ends) - 1), np.diff(ends))
     values = np.zeros((len(positions) + 1, len(columns)))
     for p, q in enumerate((a.q, *positions)):

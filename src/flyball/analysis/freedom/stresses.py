@@ -42,7 +42,7 @@ def self_stresses(
     for name in names:
         for k in s.terms_of[name]:
             t = s.terms[k]
-            par = parameters(S.term_x, k)
+            par = parameters(S.term_parameters, k)
             hint = z[t.hint] if t.hint >= 0 else 0.0
             _, f, tM, tF, _ = KINDS[t.formula.kind].row(par, frame(t.F), frame(t.M), hint, S.const)
             if s.frames[t.M].role != "M":  # measured from M to F

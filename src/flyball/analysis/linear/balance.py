@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from ...equations.tree import lengths, retract
-from ...tables.system import Q0, V0
+from ...tables.system import with_numbers
 from .derivatives import Equations, State
 from .free import prescribed
 from .least import least
@@ -113,7 +113,6 @@ def shaken(x: State) -> Iterator[State]:
         q = x.q.copy()
         retract(S, q, size * digits(size=len(size)))
         v, vdot, lam, effort = (a * (1.0 + digits(size=len(a))) for a in (x.v, x.vdot, x.lam, x.effort))
-        numbers = {k: a for k, a in S._asdict().items() if isinstance(a, np.ndarray) and a.dtype == np.float64}
-        own = {k: np.where(a == np.rint(a), a, a * (1.0 + digits(size=a.shape))) for k, a in numbers.items()}
-        c = replace(x.c, values=replace(x.c.values, system=S._replace(**own)))  # type: ignore[arg-type]
+        rounded = with_numbers(S, lambda _, a: np.where(a == np.rint(a), a, a * (1.0 + digits(size=a.shape))))  # noqa: B023
+        c = replace(x.c, values=replace(x.c.values, system=rounded))
         yield replace(x, c=c, q=q, v=v, vdot=vdot, lam=lam, effort=effort)

@@ -10,7 +10,6 @@ from ...equations.tree import retract
 from ...equations.velocities import velocities
 from ...results.records import Records
 from ...tables.coordinates import BodyState, positions
-from ...tables.system import Q0
 from ...tables.values import Values
 from ..motion.start import Start
 from ..steps import tangent_rate

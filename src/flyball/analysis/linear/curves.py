@@ -15,7 +15,7 @@ from ...equations.tree import retract
 from ...results.health import Health
 from ...results.mobility import Mobility
 from ...results.result import Result
-from ...tables.system import G_VALUE, NU, V0
+from ...tables.system import G_VALUE, NU
 from ...tables.values import Values
 from ..assembly.start import Assembly
 from ..compiled import compiled
@@ -138,8 +138,8 @@ def _result(x: State, values: Values, dq: np.ndarray, dv: np.ndarray, da: np.nda
     n = len(dq)
     q = np.repeat(x.q[:, None], n, axis=1).astype(dq.dtype)
     retract(values.system, q, dq.T)
-    body_i = values.structure.tables["body_i"]
-    efforts = [x.effort[body_i[b, V0]] for b in values.structure.prescribed.values()]
+    first = values.structure.tables["tree"].v
+    efforts = [x.effort[first[b]] for b in values.structure.prescribed.values()]
     z = np.repeat(x.z[None], n, axis=0)
     lam = np.r_[x.lam, efforts] + dlam
     health = Health(True, "one state", 0.0, 0.0, 0, 0, 0, 0, 0.0)

@@ -23,15 +23,8 @@ from ...laws.opcodes import BY_TIME
 from ...tables.specs import Structure
 from ...tables.system import (
     ALONG,
-    BODY_LAW,
     EFFORT,
-    FORCE_ALONG,
-    FORCE_F,
-    FORCE_LAW,
-    FORCE_M,
     LAM,
-    NV,
-    OFFSET,
     SLIDING,
     X_SOLVED,
     System,
@@ -270,20 +263,21 @@ def pattern(s: Structure, S: System) -> Any:
 
     nb, nr, nm = len(S.tree.parent), len(s.rows), len(s.measured)
     body = np.repeat(np.arange(nb), S.tree.nv)
-    of_row = [np.unique(body[S.col_i[S.row_p[k] : S.row_p[k + 1]]]) for k in range(nr + nm)]
+    of_row = [np.unique(body[S.column[S.row_start[k] : S.row_start[k + 1]]]) for k in range(nr + nm)]
     named = sorted({m % nm for m in s.slots.values()}) if s.slots else []
     also = np.unique(np.concatenate([of_row[nr + m] for m in named])) if named else np.zeros(0, int)
     reach: list[tuple[np.ndarray, np.ndarray]] = [(np.arange(nb)[b : b + 1],) * 2 for b in range(nb)]
     reach += [(at, at) for at in of_row[:nr]]
-    for force in S.force_i:
-        if force[FORCE_ALONG] == ALONG:
-            at = of_row[nr + force[FORCE_F]]
-        elif force[FORCE_ALONG] == SLIDING:  # along one tangent or two
-            at = np.unique(np.concatenate([of_row[nr + m] for m in force[[FORCE_F, FORCE_M]] if m >= 0]))
+    table = S.forces
+    for F, M, family, laws in zip(table.F, table.M, table.family, table.laws, strict=True):
+        if family == ALONG:
+            at = of_row[nr + F]
+        elif family == SLIDING:  # along one tangent or two
+            at = np.unique(np.concatenate([of_row[nr + m] for m in (F, M) if m >= 0]))
         else:
-            at = S.frame_i[[force[FORCE_F], force[FORCE_M]]]
+            at = S.frame_body[[F, M]]
             at = at[at >= 0]
-        has_law = (force[FORCE_LAW : FORCE_LAW + 3] >= 0).any()
+        has_law = (laws >= 0).any()
         reach.append((at, np.union1d(at, also) if has_law else at))
     i = np.concatenate([np.repeat(a, len(b)) for a, b in reach])
     j = np.concatenate([np.tile(b, len(a)) for a, b in reach])

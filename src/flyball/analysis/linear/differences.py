@@ -14,6 +14,7 @@ import numpy as np
 from ...errors import AnalysisError, ModelError
 from ...model.model import Model
 from ...tables.names import velocity_names
+from ...tables.system import arrays
 from ...tables.values import values
 from ..compiled import compiled
 from .loads import STEP as COMPLEX
@@ -95,10 +96,12 @@ def whole(model: Model, parameters: Mapping[str, float], name: str) -> float:
     c = compiled(model, parameters=parameters)
     v = values(c.structure, {**c.parameters, name: complex(value, COMPLEX)})
     length = c.values.length
-    scales = [(v.system.frame_x[:, :3], length)]
+    scales = [(v.system.frames.position, length)]
     places = np.array([n.unit == "m" for n in velocity_names(c.structure)])
     scales += [(v.v[places], length), (v.v[~places], 1.0), (v.q, length)]
-    for table in (v.system.body_x, v.system.term_x, v.system.force_x, v.system.glob):
-        scales += [(x, np.abs(x.real).max()) for x in np.atleast_2d(table).T if len(x) and np.abs(x.real).max() > 0.0]
+    for table in ("bodies", "term_parameters", "force_parameters", "gravity", "length", "rate", "units"):
+        for _, x in arrays(getattr(v.system, table)):
+            columns = np.atleast_2d(x.T)
+            scales += [(x, np.abs(x.real).max()) for x in columns if len(x) and np.abs(x.real).max() > 0.0]
     effect = max((float(np.abs(np.imag(x)).max(initial=0.0)) / COMPLEX / s for x, s in scales), default=0.0)
     return 1.0 / effect if effect > 0.0 else 1.0

@@ -18,7 +18,6 @@ from ...equations.tree import quaternion_at, rates
 from ...numerics.rank import parts
 from ...results.numbers import tuple_of
 from ...results.records import Records
-from ...tables.system import NV, V0
 from .derivatives import State
 from .loads import STEP, derivative
 from .reduced import Frame

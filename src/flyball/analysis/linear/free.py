@@ -18,7 +18,7 @@ from ...numerics.rank import TOLERANCE, null_space, parts
 from ...numerics.saddle import null_basis, surely_independent
 from ...numerics.sparse_rank import rank as rank_of
 from ...tables.names import Named, velocity_names
-from ...tables.system import BODY_LAW, G_VALUE, V0
+from ...tables.system import G_VALUE
 from ..compiled import Compiled
 from .derivatives import Equations
 
@@ -124,11 +124,11 @@ def void(e: Equations) -> np.ndarray:
 
 def prescribed(c: Compiled) -> np.ndarray:
     """Unit rows (n, nv) for the coordinates that drivers prescribe, in the order of the structure's."""
-    body_i = c.structure.tables["body_i"]
+    tree = c.structure.tables["tree"]
     out = np.zeros((len(c.structure.prescribed), c.structure.nv))
     for k, b in enumerate(c.structure.prescribed.values()):
-        assert body_i[b, BODY_LAW] >= 0
-        out[k, body_i[b, V0]] = 1.0
+        assert tree.law[b] >= 0
+        out[k, tree.v[b]] = 1.0
     return out
 
 

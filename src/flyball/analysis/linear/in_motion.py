@@ -8,7 +8,6 @@ from dataclasses import replace
 from ...model.expressions import number
 from ...model.model import Model
 from ...model.wiring import wired
-from ...tables.system import MASS
 from ..compiled import compiled
 from .sliders import Scale, Slid, beginnings, slid
 

@@ -218,7 +218,7 @@ def _laws(e: Equations, to: Sequence[str]) -> Iterator[tuple[str, str, list[str]
             names = dict(zip([*inputs] or ["value", "rate"], both, strict=True))
             names |= {n: c for n, c in _names(s.model, law, inputs, to).items() if n not in inputs}
             text = f"{force.title}: its law '{law}'" if laws else force.title
-            par = wide(c.values.system.force_x, k)
+            par = wide(c.values.system.force_parameters, k)
             yield force.name, text, [*names.values()], partial(_effort, force, par, law, [*names], known, tables)
             continue
         for law in laws:

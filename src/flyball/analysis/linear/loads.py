@@ -15,7 +15,7 @@ from ...equations.scratch import work
 from ...errors import ModelError
 from ...numerics.rank import parts
 from ...tables.specs import Structure
-from ...tables.system import TERM_ROW, System, Work
+from ...tables.system import System, Work, with_numbers
 from ..compiled import Compiled
 
 if TYPE_CHECKING:
@@ -37,14 +37,13 @@ def derivative(x: np.ndarray) -> np.ndarray:
 
 def pressing(s: Structure) -> np.ndarray:
     """The rows whose multipliers some friction depends on."""
-    terms = s.tables["load_i"][:, 1] if s.loads else np.zeros(0, int)
-    return np.unique(s.tables["term_i"][terms[terms >= 0] % len(s.terms), TERM_ROW])
+    terms = s.tables["load_terms"].term if s.loads else np.zeros(0, int)
+    return np.unique(s.tables["terms"].row[terms[terms >= 0] % len(s.terms)])
 
 
 def as_complex(system: System) -> System:
     """The same tables in complex numbers."""
-    parts = {k: x for k, x in system._asdict().items() if isinstance(x, np.ndarray) and x.dtype == np.float64}
-    return system._replace(**{k: x.astype(complex) for k, x in parts.items()})  # type: ignore[arg-type]
+    return with_numbers(system, lambda _, x: x.astype(complex))
 
 
 def complex_tables(c: Compiled) -> tuple[System, Work]:

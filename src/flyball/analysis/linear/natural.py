@@ -14,7 +14,6 @@ import numpy as np
 
 from ...model.model import Model
 from ...tables.names import velocity_names
-from ...tables.system import TEMPO
 from ..motion.crossed import refuse_crossed
 from .balance import acting, rounding
 from .derivatives import Equations, State

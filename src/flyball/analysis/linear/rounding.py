@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...tables.system import NV
 from .balance import acting
 from .derivatives import Equations
 from .free import Free
@@ -117,8 +116,8 @@ def _spread(rows: np.ndarray, M: np.ndarray, e: Equations, scale: np.ndarray) ->
     """The largest of what acts on the bodies that the mass matrix couples with each, as seen from each velocity."""
     from scipy.sparse.csgraph import connected_components
 
-    body_i = e.state.c.structure.tables["body_i"]
-    body = np.repeat(np.arange(len(body_i)), body_i[:, NV])
+    nv = e.state.c.structure.tables["tree"].nv
+    body = np.repeat(np.arange(len(nv)), nv)
     _, part = connected_components((M != 0.0) | (body[:, None] == body), directed=False)
     most = np.zeros(part.max(initial=-1) + 1)
     np.maximum.at(most, part, rows * scale)

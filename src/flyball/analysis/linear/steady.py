@@ -16,7 +16,7 @@ from ...equations.tree import normalise, rates
 from ...errors import AnalysisError
 from ...laws.opcodes import INPUT
 from ...tables.names import velocity_names
-from ...tables.system import FORCE_LAW, TEMPO, System
+from ...tables.system import System
 from .balance import acting, at_rest, rounding
 from .derivatives import Equations, State
 from .frames import frames, generator, kinematic

@@ -19,7 +19,6 @@ from ...model.words import listing, suggest
 from ...tables.forest import step_of
 from ...tables.names import velocity_names
 from ...tables.specs import Structure
-from ...tables.system import BODY_LAW, V0
 from ..assembly.positions import row_scales
 from ..assembly.start import Assembly
 from ..motion.layer import in_coordinates
@@ -62,7 +61,7 @@ def turning(a: Assembly, described: Assembly, names: Sequence[str], parameters: 
     start = State(c, b.t, b.q, v, c.z.copy(), 0.0 * v, np.zeros(len(c.structure.rows)), 0.0 * v)
     found, _ = _search(start, at, [])  # with the speeds as they are, if anything balances at these
     if found is None:
-        found, start = _search(start, at, [d for d in at if s.tables["body_i"][_body(s, d), BODY_LAW] < 0])
+        found, start = _search(start, at, [d for d in at if s.tables["tree"].law[_body(s, d)] < 0])
     if found is None:
         raise _failure(start, names)
     x = found
@@ -117,7 +116,7 @@ def _place(b: Assembly, name: str) -> int:
             f"turning={name!r}: {element.title} closes a loop of the mechanism; name a coordinate along the way from "
             f"ground, one of {', '.join(n.name for n in velocity_names(s))}"
         )
-    return int(s.tables["body_i"][row, V0])
+    return int(s.tables["tree"].v[row])
 
 
 def _step(x: State, at: list[int], free: list[int]) -> tuple[State, float]:
@@ -170,7 +169,7 @@ def _equations(
 
 def _body(s: Structure, d: int) -> int:
     """The row of the body table that a velocity belongs to."""
-    return int(np.searchsorted(s.tables["body_i"][:, V0], d, side="right")) - 1
+    return int(np.searchsorted(s.tables["tree"].v, d, side="right")) - 1
 
 
 def _failure(x: State, names: list[str]) -> NotConverged:

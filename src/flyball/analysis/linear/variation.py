@@ -26,19 +26,7 @@ from ...numerics.integrators.tableaux import Tableau, tableau
 from ...results.health import Health
 from ...results.result import Result
 from ...tables.specs import Structure
-from ...tables.system import (
-    BODY_TURNS,
-    EXCESS_MASS,
-    INVERSE,
-    PER_BULK,
-    PER_COMPACT,
-    PER_MASS,
-    TREE_P,
-    TREE_TURNS,
-    V0,
-    System,
-    Work,
-)
+from ...tables.system import System, Work, arrays, with_numbers
 from ...tables.values import Values
 from ..motion.driven import integrals, nodes
 from ..motion.reasons import reason
@@ -46,7 +34,11 @@ from ..motion.start import Start
 from ..simulate import run_clock
 from .loads import as_complex, pressing
 
-TABLES = ("body_x", "frame_x", "term_x", "force_x", "const", "glob")
+TABLES = ("bodies", "frames", "term_parameters", "force_parameters", "const", "gravity", "length", "rate", "units")
+FOR_THE_SOLVE = (
+    "inverse_inertia", "excess_inertia", "inverse_mass", "inverse_reference_inertia", "excess_mass",
+    "inverse_reference_mass",
+)  # fmt: skip
 FOUND = 10_000_000  # numbers of output that are held at a time
 
 
@@ -287,21 +279,21 @@ class Variation:
 
 def _seen(s: Structure, system: System) -> list[np.ndarray]:
     """The tables that the residuals look at, and records of frames, of which those on ground hold numbers."""
-    body_x = system.body_x.copy()
-    body_x[:, INVERSE:TREE_P] = body_x[:, PER_MASS : PER_COMPACT + 1] = body_x[:, EXCESS_MASS : PER_BULK + 1] = (
-        0.0  # for the solve alone
-    )
-    return [body_x, *(getattr(system, name) for name in TABLES[1:]), work(s, system, complex).FK]
+    bodies = system.bodies._replace(**{name: 0.0 * getattr(system.bodies, name) for name in FOR_THE_SOLVE})
+    tables = [x for name in TABLES for _, x in arrays(getattr(system._replace(bodies=bodies), name))]
+    return [*tables, work(s, system, complex).FK]
 
 
 def _together(s: Structure, system: System, values: Sequence[Values]) -> tuple[System, Work, np.ndarray]:
     """Tables and scratch in complex numbers, with all that parameters can change in one array."""
     for x in values:  # a rotation that is none as it stands, and that a parameter changes, must be looked at
-        at = slice(TREE_TURNS, BODY_TURNS + 1)
-        system.body_x[:, at] = np.maximum(system.body_x[:, at].real, x.system.body_x[:, at].real)
+        for name in ("joint_turned", "body_turned"):
+            turned = getattr(system.bodies, name)
+            turned[:] = np.maximum(turned.real, getattr(x.system.bodies, name).real)
     parts = _seen(s, system)
     tables = np.concatenate([x.ravel() for x in parts])
     ends = np.cumsum([0, *(x.size for x in parts)])
     views = [tables[i:j].reshape(x.shape) for i, j, x in zip(ends[:-1], ends[1:], parts, strict=True)]
-    system = system._replace(**dict(zip(TABLES, views[:-1], strict=True)))  # type: ignore[arg-type]
+    own = iter(views)
+    system = with_numbers(system, lambda _, x: next(own), TABLES)
     return system, work(s, system, complex)._replace(FK=views[-1]), tables

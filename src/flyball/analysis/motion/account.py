@@ -8,6 +8,7 @@ from collections import OrderedDict
 
 from ...tables.cost import cost
 from ...tables.specs import Structure
+from ...tables.system import arrays
 
 MOST = 256  # kinds of mechanisms that are known
 
@@ -46,7 +47,7 @@ def kind(s: Structure) -> tuple[str, float]:
 
 def _hashed(s: Structure) -> str:
     digest = hashlib.blake2b(digest_size=16)
-    for name, table in sorted(s.tables.items()):
-        digest.update(f"{name}{table.shape}".encode())
-        digest.update(table.tobytes())
+    for table, of in sorted(s.tables.items()):
+        for name, x in arrays(of, table):
+            digest.update(f"{name}{x.shape}".encode() + x.tobytes())
     return digest.hexdigest()

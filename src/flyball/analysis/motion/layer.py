@@ -15,7 +15,7 @@ from ...tables.cost import cost, least
 from ...tables.reads import read
 from ...tables.spanning import spanning
 from ...tables.specs import Structure
-from ...tables.system import COUPLED, MASS, NV, POINT, SEMIDEFINITE, SOLVER, TREE, V0
+from ...tables.system import COUPLED, POINT
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from ..mobility import mobility
@@ -153,7 +153,7 @@ def _unsound(c: Compiled, a: Assembly) -> str | None:
     for k, links in enumerate([*(t.links for t in s.tree_joints.values()), *roots]):
         for b in links:
             of[S.tree.v[b] : S.tree.v[b] + S.tree.nv[b]] = k
-    row, column, _ = S.mass_i.T
+    row, column, _ = S.mass_entries
     own = of[row] == of[column]
     M: dict[int, dict[tuple[int, int], float]] = {}
     for i, j, x in zip(

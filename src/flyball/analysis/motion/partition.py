@@ -6,7 +6,7 @@ import numpy as np
 
 from ...model.model import Model
 from ...tables.names import velocity_names
-from ...tables.system import BODY_LAW, PARTITION, V0
+from ...tables.system import PARTITION
 from ..mobility import mobility
 from .start import Start
 
@@ -23,8 +23,8 @@ def choose(model: Model, start: Start) -> None:
     c = a.compiled
     c.at(a.t, a.q, a.v)
     size = start.assembly.compiled.sizes
-    body_i = c.structure.tables["body_i"]
-    given = body_i[body_i[:, BODY_LAW] >= 0, V0]
+    tree = c.structure.tables["tree"]
+    given = tree.v[tree.law >= 0]
     size[given] = 0.0
     G = c.jacobian() * size
     length = np.sqrt((G * G).sum(axis=1))

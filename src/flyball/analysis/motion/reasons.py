@@ -24,11 +24,6 @@ from ...model.touch import Touch
 from ...model.words import brief
 from ...numerics.integrators import clock as ex
 from ...tables.system import (
-    BODY_LAW,
-    FORCE_F,
-    FORCE_LAW,
-    FORCE_LOAD,
-    FORCE_M,
     GAMMA,
     GUILTY,
     LOAD,
@@ -37,10 +32,7 @@ from ...tables.system import (
     NU_DOT,
     OFF,
     REVOLUTE,
-    ROW_LAW,
-    ROW_WRAP,
     STATUS,
-    TREE,
 )
 from ..assembly.start import Assembly
 from ..compiled import Compiled
@@ -161,8 +153,7 @@ def _driving(c: Compiled) -> list[tuple[Any, int, bool]]:
         if isinstance(row.element, Driver)
     ]
     return laws + [
-        (s.model[name], int(S.tree.law[b]), bool(S.tree.joint[b] == REVOLUTE))
-        for name, b in s.prescribed.items()
+        (s.model[name], int(S.tree.law[b]), bool(S.tree.joint[b] == REVOLUTE)) for name, b in s.prescribed.items()
     ]
 
 
@@ -283,7 +274,7 @@ def broken_force(c: Compiled, t: float) -> str:
                 if not math.isfinite(W.sensed[LOAD, S.forces.load[k]]):
                     return f"what {e.title} presses with is no number"
                 continue
-            F, M, par = load(W.FK, S.forces.F[k]), load(W.FK, S.forces.M[k]), wide(S.force_x, k)
+            F, M, par = load(W.FK, S.forces.F[k]), load(W.FK, S.forces.M[k]), wide(S.force_parameters, k)
             x, y = inputs_of(c, k)
             if not math.isfinite(x) or not math.isfinite(y):
                 return f"what {e.title} measures is no number. {e.fails}"
@@ -427,17 +418,14 @@ def _pacemaker(clock: ex.Clock) -> int:
 
 def _component(a: Assembly, i: int) -> str:
     """Name of the body or tree joint that a component of the state belongs to."""
-    s = a.compiled.structure
+    s, tree = a.compiled.structure, a.compiled.structure.tables["tree"]
     if s.nq + s.nv <= i < s.nq + s.nv + len(s.controls):
         return f"controller state {s.controls[i - s.nq - s.nv].name!r}"
     for joint in s.tree_joints.values():
         for b in joint.links:
-            q0, v0, nq, nv = s.tables["body_i"][b, 2:6]
-            if q0 <= i < q0 + nq or s.nq + v0 <= i < s.nq + v0 + nv:
+            if i in range(s.nq)[tree.coordinates(b)] or i - s.nq in range(s.nv)[tree.velocities(b)]:
                 return f"joint {joint.joint.name!r}"
     for name, b in s.place.items():
-        if b >= 0:
-            q0, v0, nq, nv = s.tables["body_i"][b, 2:6]
-            if q0 <= i < q0 + nq or s.nq + v0 <= i < s.nq + v0 + nv:
-                return f"body {name!r}"
+        if b >= 0 and (i in range(s.nq)[tree.coordinates(b)] or i - s.nq in range(s.nv)[tree.velocities(b)]):
+            return f"body {name!r}"
     return "a measured quantity"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...equations.engine import MOTION
-from ...tables.system import F_APPLIED, G_VALUE, GAMMA, NU, NV, PER_COMPACT, PER_MASS, V0, VALUE
+from ...tables.system import F_APPLIED, G_VALUE, GAMMA, NU, VALUE
 from ..compiled import Compiled, compiled
 
 if TYPE_CHECKING:
@@ -81,8 +81,8 @@ def missed(
     evaluated with forces; ``sizes`` are c's, ``o`` the options of the motion.
     """
     S, n = c.values.system, len(c.structure.rows)
-    row_p = S.row_p[: n + 1]
-    row, column, G = np.repeat(np.arange(n), np.diff(row_p)), S.col_i[: row_p[-1]], c.work.G[: row_p[-1]]
+    row_p = S.row_start[: n + 1]
+    row, column, G = np.repeat(np.arange(n), np.diff(row_p)), S.column[: row_p[-1]], c.work.G[: row_p[-1]]
 
     def times(entries: np.ndarray, x: np.ndarray) -> np.ndarray:
         return np.bincount(row, entries * x[column], n)
@@ -105,8 +105,7 @@ def _unconstrained(c: Compiled) -> np.ndarray:
     """
     S = c.values.system
     per = np.zeros(c.structure.nv)
-    for row, x in zip(S.body_i, S.body_x, strict=True):
-        v0, n = int(row[V0]), int(row[NV])
+    for b, (v0, n) in enumerate(zip(S.tree.v, S.tree.nv, strict=True)):
         k = min(n, 2 if c.structure.model.planar else 3)
-        per[v0 : v0 + k], per[v0 + k : v0 + n] = x[PER_MASS], x[PER_COMPACT]
+        per[v0 : v0 + k], per[v0 + k : v0 + n] = S.bodies.inverse_mass[b], S.bodies.inverse_reference_inertia[b]
     return per * c.work.vel[F_APPLIED]

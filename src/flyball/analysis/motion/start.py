@@ -20,7 +20,7 @@ from ...tables.numbers import files
 from ...tables.specs import Structure
 from ...tables.structure import outdated
 from ...tables.switches import declared
-from ...tables.system import HOLD, MODE, Q0, SEMIDEFINITE, VALUE
+from ...tables.system import HOLD, MODE, VALUE
 from ..assemble import assemble
 from ..assembly.start import Assembly
 from ..compiled import compiled

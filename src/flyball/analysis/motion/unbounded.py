@@ -8,7 +8,6 @@ import numpy as np
 
 from ...equations.engine import MOTION, evaluate
 from ...equations.rows import measured
-from ...equations.within import LAWS
 from ...laws.evaluation import evaluate as evaluate_law
 from ...model.force import Force
 from ...model.grammar import written
@@ -17,7 +16,7 @@ from ...model.words import brief, shortened
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import TABLEAUX, Tableau, tableau
 from ...tables.branches import laws
-from ...tables.system import FORCE_LAW, RATE, VALUE
+from ...tables.system import RATE, VALUE
 from ..assembly.start import Assembly
 from .undefined import inputs_of
 

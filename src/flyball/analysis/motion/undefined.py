@@ -17,7 +17,7 @@ from ...model.grammar import Node, written
 from ...model.table import Table
 from ...model.words import brief
 from ...tables.branches import laws
-from ...tables.system import FORCE_F, FORCE_M, RATE, VALUE
+from ...tables.system import RATE, VALUE
 from ..compiled import Compiled
 
 LONGEST = 100  # characters of a part of a law in a message
@@ -29,7 +29,7 @@ def inputs_of(c: Compiled, k: int) -> tuple[float, float]:
     F, M = S.forces.F[k], S.forces.M[k]
     if isinstance(e, CoordinateForce):
         return float(W.sensed[VALUE, F]), float(W.sensed[RATE, F])
-    x, y = e.inputs(wide(S.force_x, k), load(W.FK, F), load(W.FK, M))
+    x, y = e.inputs(wide(S.force_parameters, k), load(W.FK, F), load(W.FK, M))
     return float(x), float(y)
 
 

@@ -15,7 +15,6 @@ from ...model.body import GROUND
 from ...model.model import Model
 from ...tables.contact import Touching, touching
 from ...tables.coordinates import BodyState
-from ...tables.system import NV, V0
 from ..assembly.start import Assembly
 from ..motion.impulse.scene import placed, smallest
 
@@ -138,16 +137,17 @@ def refuse_surfaces(scene: Touching) -> None:
 def rows(place: Place) -> np.ndarray:
     """Velocities of the second side relative to the first along the frames of all contacts, (3 n, nv)."""
     s = place.at.compiled.structure
-    body_i = s.tables["body_i"]
+    tree = s.tables["tree"]
     out = np.zeros((3 * len(place.contacts), s.nv))
     for k, c in enumerate(place.contacts):
         for name, sign in zip(c.bodies, (-1.0, 1.0), strict=True):
             if name == GROUND or s.place[name] < 0:
                 continue
-            b = body_i[s.place[name]]
+            b = s.place[name]
+            v0, nv = tree.v[b], tree.nv[b]
             x = place.bodies[name]
             for r, d in enumerate(c.frame):
                 turn = np.cross(c.point - x.p, d)
                 full = np.r_[d[:2], turn[2]] if s.model.planar else np.r_[d, x.R.T @ turn]
-                out[3 * k + r, b[V0] : b[V0] + b[NV]] += sign * full[: b[NV]]
+                out[3 * k + r, v0 : v0 + nv] += sign * full[:nv]
     return out

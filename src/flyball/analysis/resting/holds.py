@@ -25,7 +25,7 @@ from ...model.model import Model
 from ...model.switch import Switch
 from ...results.result import Result
 from ...tables.specs import FrameSpec
-from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, SWITCH_LOWER, SWITCH_UPPER, VALUE
+from ...tables.system import VALUE
 from ...tables.values import Values
 from ..assembly.start import Assembly
 from ..compiled import compiled
@@ -88,7 +88,7 @@ def holds(model: Model, at: Assembly) -> Holds:
     for k, x in enumerate(c.structure.switches):
         value = float(c.work.sensed[VALUE, x.measured])
         size = 1.0 if _turns(model, x.element, x.switch) else c.values.length
-        lower, upper = (float(S.switch_x[k, n]) for n in (SWITCH_LOWER, SWITCH_UPPER))
+        lower, upper = float(S.switch_numbers.lower[k]), float(S.switch_numbers.upper[k])
         sign = _sign(x.switch.kind, value, lower, upper, CLOSED * size)
         if sign is not None:
             out.parts.append(constraint(x.element, x.switch, c.values, value))
@@ -136,13 +136,13 @@ def capacity(model: Model, at: Assembly, e: Any, reaction: Callable[[str], tuple
     c.at(at.t, q, v, MOTION)
     s, S, W = c.structure, c.values.system, c.work
     k = next(i for i, f in enumerate(s.forces) if f is e)
-    row, par = S.force_i[k], wide(S.force_x, k)
-    x, load, law = float(W.sensed[VALUE, row[FORCE_F]]), 0.0, 0.0
-    if row[FORCE_LOAD] >= 0:
-        load = float(e.load(par, record(W.FK, int(row[FORCE_M])), *reaction(e.joint)))
-    if row[FORCE_LAW] >= 0:
+    par, first = wide(S.force_parameters, k), int(S.forces.laws[k, 0])
+    x, load, law = float(W.sensed[VALUE, S.forces.F[k]]), 0.0, 0.0
+    if S.forces.load[k] >= 0:
+        load = float(e.load(par, record(W.FK, int(S.forces.M[k])), *reaction(e.joint)))
+    if first >= 0:
         stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3))
-        law = float(evaluate(S.code, S.const, int(row[FORCE_LAW]), stack, (at.t, x, 0.0), W.sensed))
+        law = float(evaluate(S.code, S.const, first, stack, (at.t, x, 0.0), W.sensed))
     return abs(float(e.effort(par, x, 0.0, (law, 0.0, STATIC), load)))
 
 

@@ -19,7 +19,6 @@ from ...model.touching import nothing_touches
 from ...numerics.integrators.tableaux import TABLEAUX
 from ...results.departure import changed_velocities, not_allowed
 from ...results.study import DONE, WAITING
-from ...tables.system import SEMIDEFINITE
 from ...tables.values import Values
 from ..motion.choice import AUTO, SimulateOptions, chosen
 from ..motion.driven import leaves_no_freedom

@@ -17,7 +17,7 @@ from ...model.body import Driver, Initial
 from ...model.element import LawOf
 from ...model.joint import Joint
 from ...model.model import Model, listing, suggest
-from ...tables.system import G_VALUE, GAMMA, NV, V0
+from ...tables.system import G_VALUE, GAMMA
 from ..assemble import assemble
 from ..assembly.start import Assembly
 from ..compiled import compiled
@@ -63,9 +63,9 @@ class Freed:
         if e is not None:
             out += bias
         turning = []
-        for b, body in enumerate(S.body_i):
-            if body[NV] == 6:
-                turning.append(W.BK[b, 3:12].reshape(3, 3) @ v[body[V0] + 3 : body[V0] + 6])
+        for b, (v0, nv) in enumerate(zip(S.tree.v, S.tree.nv, strict=True)):
+            if nv == 6:
+                turning.append(W.BK[b, 3:12].reshape(3, 3) @ v[v0 + 3 : v0 + 6])
         return np.r_[out, np.concatenate(turning)] if turning else out
 
     def outline(self, x: Place) -> list[tuple[str, str, np.ndarray]]:

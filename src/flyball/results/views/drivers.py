@@ -32,7 +32,7 @@ class CouplingView(View):
         for k in s.terms_of[self.element.name]:
             t = s.terms[k]
             if f"{t.owner.name}.{t.what}" == coordinate:
-                return self._result.multipliers[:, t.row] * S.term_x[k, COEFFICIENT] / t.sign
+                return self._result.multipliers[:, t.row] * S.term_parameters[k, COEFFICIENT] / t.sign
         has = ", ".join(self.element.coupled())
         raise ModelError(f"{self.element.title} does not couple {coordinate!r}; it couples {has}")
 

@@ -15,7 +15,7 @@ from ...laws.over_time import over_time, takes_arrays
 from ...math.scalar import divide, sign, unless_zero
 from ...math.vec import dot, norm, sub
 from ...model.force import CoordinateForce, JointForce
-from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD, SPARE
+from ...tables.system import HELD, SPARE
 from ..booked import basis
 from ..records import coordinate_frames, turned
 from .base import Curves, View
@@ -42,15 +42,15 @@ class ForceView(View):
         """Records of F and M over time, and its numbers, of a force between frames."""
         r, S = self._result.records, self._x.system
         k = self._index()
-        F, M = (r.frame(int(S.force_i[k, side])) for side in (FORCE_F, FORCE_M))
-        return F, M, wide(S.force_x, k)
+        F, M = (r.frame(int(side[k])) for side in (S.forces.F, S.forces.M))
+        return F, M, wide(S.force_parameters, k)
 
     def acts(self) -> tuple[tuple[int, int], tuple, tuple, tuple]:
         """Of a force between frames: bodies of F and M, point, force and torque there on M's body over time."""
         S = self._x.system
         _, force, torque = self._between()
         k = self._index()
-        i, j = (int(S.frame_i[int(S.force_i[k, side])]) for side in (FORCE_F, FORCE_M))
+        i, j = (int(S.frame_body[side[k]]) for side in (S.forces.F, S.forces.M))
         return (i, j), self._frames[1][0], force, torque
 
     def pushes(self) -> tuple[int, np.ndarray]:
@@ -66,8 +66,8 @@ class ForceView(View):
         load = 0.0 * x
         if S.forces.load[k] >= 0:
             force, torque = self._result.reactions.of(e.joint)
-            load = e.load(wide(S.force_x, k), self._result.records.frame(int(S.forces.M[k])), force, torque)
-        return x, rate, e.effort(wide(S.force_x, k), x, rate, laws, load) + 0.0 * x
+            load = e.load(wide(S.force_parameters, k), self._result.records.frame(int(S.forces.M[k])), force, torque)
+        return x, rate, e.effort(wide(S.force_parameters, k), x, rate, laws, load) + 0.0 * x
 
     def _way(self, k: int, rate: np.ndarray) -> np.ndarray:
         """Which way it slides: as its switch said then; where there is none by the sign of the rate."""
@@ -177,7 +177,7 @@ class ForceView(View):
                 return self._result.records.zeros()
             S, k = self._x.system, self._index()
             x = self._result.measured.quantity(int(S.forces.F[k]))[0]
-            return self._in_force() * e.energy(wide(S.force_x, k), x)
+            return self._in_force() * e.energy(wide(S.force_parameters, k), x)
         F, M, par = self._frames
         return e.energy(par, F, M)
 

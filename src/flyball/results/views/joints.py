@@ -14,7 +14,6 @@ from ...math.vec import dot, mtv, sub
 from ...model.body import GROUND
 from ...model.words import listing, suggest
 from ...tables.forest import step_of
-from ...tables.system import Q0
 from ..records import TURN, coordinate_frames, turned
 from ..terms import Wrench
 from .base import View, stacked
@@ -57,14 +56,14 @@ class JointView(View):
             return self._result.states[:, s.state_at[name]]
         r = self._result.records
         (here, drawn_here), (there, drawn_there) = (
-            (self._heading(k) + r.angle(int(S.frame_i[k])), self._heading(k) + r.drawn_angle(int(S.frame_i[k])))
+            (self._heading(k) + r.angle(int(S.frame_body[k])), self._heading(k) + r.drawn_angle(int(S.frame_body[k])))
             for k in (i, j)
         )
         return there - here - TURN * rounded((drawn_there - drawn_here) / TURN)
 
     def _heading(self, frame: int) -> Any:
         """In the plane: the way that a frame's x axis points in its body."""
-        R = self._x.system.frame_x[frame, 3:]
+        R = self._x.system.frames.rotation[frame]
         return atan2(*R[[3, 0]].tolist())
 
     def _found(self, name: str) -> np.ndarray:

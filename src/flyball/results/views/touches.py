@@ -24,7 +24,7 @@ class TouchView(View):
         S, t = self._x.system, self._x.structure.terms
         one = next(k for k in t if k.element is self.element)
         zero = self._result.records.zeros()
-        bodies = int(S.frame_i[one.F]), int(S.frame_i[one.M])
+        bodies = int(S.frame_body[one.F]), int(S.frame_body[one.M])
         return bodies, tuple(x.point.T), tuple(x.sliding.T), (zero, zero, zero)
 
     @property

@@ -13,7 +13,6 @@ from ...graph.printers.spelling import spelt
 from ...graph.printers.text import text
 from ...graph.simplify.simplify import simplified
 from ...model.joint import Joint
-from ...tables.system import INERTIA, MASS
 from .forces import along
 from .parts import Block, Cell, Display, Formula, Formulas, Listing, Matrix, Prose, Section, Tex
 from .words import between, meaning, moments, unit

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...equations.loads import efforts, forces, gather, inertial
-from ...tables.system import System, Work
+from ...tables.system import System, Work, changed
 from ..formulated import Formulated
 
 
@@ -16,14 +16,13 @@ def along(x: Formulated) -> list[tuple[str, np.ndarray]]:
     T = x.traced
     S, W = T.system, T.work
     W = W._replace(FB=np.array([[0.0] * W.FB.shape[1]] * len(W.FB), object).reshape(W.FB.shape))
-    weightless = S.glob.copy()
-    weightless[:3] = 0.0
-    turning = _gathered(S._replace(glob=weightless), W, None)
+    turning = _gathered(S._replace(gravity=np.array([0.0] * 3, object)), W, None)
     out = [("Centrifugal, Coriolis and gyroscopic forces", turning)]
     if any(c != 0.0 for c in S.gravity):
         out.append(("Weight", _gathered(S, W, None) - turning))
     for k, e in enumerate(T.structure.forces):
-        one = S._replace(force_i=S.force_i[k : k + 1], force_x=S.force_x[k : k + 1], own=S.own[k : k + 1])
+        own = changed(lambda _, x: x[k : k + 1], S.forces)  # noqa: B023
+        one = S._replace(forces=own, force_parameters=S.force_parameters[k : k + 1], force_code=S.force_code[k : k + 1])
         out.append((f"{e.name} ({type(e).__name__})", _gathered(one, W, T.t)))
     return [(title, x.cleaned(f)) for title, f in out]
 

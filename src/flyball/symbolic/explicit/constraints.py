@@ -9,7 +9,6 @@ import numpy as np
 from ...equations.rows import BY_TIME
 from ...graph.arrays import zeros
 from ...laws.evaluation import evaluate_jet
-from ...tables.system import BODY_LAW, OFFSET, Q0, V0
 from ...tracing.trace import Traced
 
 

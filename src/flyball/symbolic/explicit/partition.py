@@ -18,7 +18,6 @@ from ...errors import ModelError, SingularityError
 from ...model.model import listing, suggest
 from ...numerics.rank import null_space
 from ...tables.specs import Structure
-from ...tables.system import NQ, NV, Q0, V0
 
 DEPENDENT = 1e-8  # part of the largest by which an independent coordinate must move
 
@@ -109,8 +108,8 @@ def named(names: Sequence[str], wanted: Sequence[str], model: str) -> list[int]:
 def positions(s: Structure) -> list[tuple[list[int], list[int]]]:
     """Coordinates that belong together and their velocities: one and one, or a quaternion and its turns."""
     out = []
-    for row in s.tables["body_i"]:
-        q, v, nq, nv = (int(row[k]) for k in (Q0, V0, NQ, NV))
+    tree = s.tables["tree"]
+    for q, v, nq, nv in zip(*(x.tolist() for x in (tree.q, tree.v, tree.nq, tree.nv)), strict=True):
         single = nv if nq == nv else nv - 3
         out += [([q + k], [v + k]) for k in range(single)]
         if nq > nv:

@@ -10,7 +10,6 @@ from ...analysis.linear.free import compared, gaps
 from ...graph.values import evaluate, evaluated
 from ...numerics.rank import TOLERANCE, null_space, parts, rank
 from ...tables.names import velocity_names
-from ...tables.system import LENGTH
 from ...tracing.trace import Traced
 from .constraints import Constraints
 from .partition import Free, positions, singular

@@ -12,7 +12,6 @@ import numpy as np
 from ...graph.derivative import jacobian
 from ...graph.node import Node
 from ...graph.values import evaluate, reached, symbols
-from ...tables.system import Q0
 from ...tracing.trace import Traced
 from .blocks import blocks
 from .definition import Definition, Formulas

@@ -25,7 +25,6 @@ from ...graph.derivative import jacobian, replaced
 from ...graph.printers.routine import refuse_long
 from ...graph.values import symbols
 from ...numerics.ldl import Pattern, analyse, ldl_factor, ldl_solve
-from ...tables.system import LENGTH, REGULARISE, SEMIDEFINITE, V0
 from ...tracing.trace import Traced
 
 REFINEMENTS = 2  # what the regularisation leaves of a well determined solution goes below rounding with the first
@@ -82,9 +81,9 @@ def _forces(G: np.ndarray, lam: np.ndarray) -> np.ndarray:
 def schur(x: Traced) -> Once:
     """Through S = G M^-1 G^T, M being of the bodies themselves: `solve.factor_schur`."""
     S, nr = x.system, len(x.lam)
-    rows = np.repeat(np.arange(nr), np.diff(S.row_p[: nr + 1]))
+    rows = np.repeat(np.arange(nr), np.diff(S.row_start[: nr + 1]))
     W = x.work._replace(G=zeros(len(x.work.G)), H=zeros(len(x.work.H)), row=x.work.row.copy())
-    W.G[: len(rows)] = x.G[rows, S.col_i[: len(rows)]]
+    W.G[: len(rows)] = x.G[rows, S.column[: len(rows)]]
     _refuse_long(S.ldl)
     n = len(S.ldl.perm)
     D = np.array([zeros(n), zeros(n), zeros(n)], object)
@@ -98,7 +97,7 @@ def schur(x: Traced) -> Once:
             inverse_mass(S, b, f, S.tree.v[b], dx, S.tree.v[b])
         mu = solved(S.ldl, L, D, gamma - x.G @ dx) if nr else gamma
         for e, k in enumerate(rows):
-            dx[S.col_i[e]] = dx[S.col_i[e]] + W.H[e] * mu[k]
+            dx[S.column[e]] = dx[S.column[e]] + W.H[e] * mu[k]
         return dx, mu
 
     return once
@@ -136,8 +135,8 @@ def weighed(x: Traced, k: int) -> list[int]:
     S = x.system
     if k >= len(S.rows.law):  # of a driver that prescribes a velocity
         return touched(x.G[k])
-    entries = range(S.row_p[k], S.row_p[k + 1])
-    return [int(S.col_i[e]) for e in entries if S.pairs.place[e] < len(S.ldl.Ai)]
+    entries = range(S.row_start[k], S.row_start[k + 1])
+    return [int(S.column[e]) for e in entries if S.pairs.place[e] < len(S.ldl.Ai)]
 
 
 def touched(row: np.ndarray) -> list[int]:

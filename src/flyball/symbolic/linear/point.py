@@ -21,7 +21,6 @@ from ...model.body import Initial
 from ...model.expressions import number as number_of
 from ...model.words import listing, suggest
 from ...tables.forest import steps
-from ...tables.system import OFFSET, Q0, V0
 from .solve import number
 from .traced import Mechanics
 from .velocities import completed, velocities

@@ -23,7 +23,6 @@ from ...results.health import Health
 from ...results.result import Result
 from ...tables.names import Named, velocity_names
 from ...tables.structure import Choices, structure
-from ...tables.system import BODY_LAW, OFFSET, Q0, V0
 from ...tables.values import Values, values
 from ...tracing.model import parameters
 from ...tracing.trace import Traced, plain, traced

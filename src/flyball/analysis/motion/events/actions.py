@@ -21,7 +21,7 @@ from ....results.events import Happening
 from ....results.struck import summed
 from ....tables.reads import read
 from ....tables.specs import Structure
-from ....tables.system import GUARD_WAY, HELD, MODE
+from ....tables.system import HELD, MODE
 from ....tables.values import Values
 from .blows import generalised
 from .carried import take_up
@@ -114,7 +114,7 @@ def act(here: Here, fired: Sequence[int]) -> Acts:
     ----------
     here : Here
     fired : sequence of int
-        Rows of `System.guard_i`, those of events among them.
+        Rows of `System.guards`, those of events among them.
 
     Raises
     ------

@@ -6,7 +6,7 @@ import numpy as np
 
 from ....equations.watched import Loop
 from ....numerics.integrators.watching import AWAY
-from ....tables.system import G_CORNER, GUARD_KIND, GUARD_OF, SWITCH_MEASURED
+from ....tables.system import G_CORNER
 from .here import Here
 from .looked import DISTANCES
 
@@ -20,7 +20,7 @@ def astray(here: Here, loop: Loop) -> frozenset[int]:
     """
     S, out = here.c.system, set()
     for g in loop.fired if loop.desk.count[AWAY] else ():
-        kind, s = S.guard_i[g, [GUARD_KIND, GUARD_OF]].tolist()
+        kind, s = int(S.guards.kind[g]), int(S.guards.of[g])
         if kind == G_CORNER:
             out.add(s)
         elif kind in DISTANCES:

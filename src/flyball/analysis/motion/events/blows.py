@@ -14,7 +14,6 @@ from ....model.event import Event
 from ....model.event_check import coordinate_of
 from ....model.geometry import vector
 from ....results.struck import Blow
-from ....tables.system import NV, PARENT, V0
 from .here import Here
 
 Three = np.ndarray
@@ -51,8 +50,8 @@ def _gradient(here: Here, text: str) -> np.ndarray:
     s, S = here.structure, here.c.system
     out = np.zeros(s.nv)
     row = len(S.rows.law) + s.measured[text]
-    at = slice(S.row_p[row], S.row_p[row + 1])
-    np.add.at(out, S.col_i[at], here.c.work.G[at])
+    at = slice(S.row_start[row], S.row_start[row + 1])
+    np.add.at(out, S.column[at], here.c.work.G[at])
     return out
 
 

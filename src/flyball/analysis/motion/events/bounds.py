@@ -10,7 +10,7 @@ from ....constraints.modes import RATCHET, STOP
 from ....model.touch import Touch
 from ....tables.specs import Structure
 from ....tables.switches import SwitchSpec
-from ....tables.system import HELD, HOLD, LOWER, MODE, OFF, SWITCH_KIND, SWITCH_PITCH, SWITCH_TOOTH, UPPER, VALUE
+from ....tables.system import HELD, HOLD, LOWER, MODE, OFF, UPPER, VALUE
 from .here import Here
 
 NOTHING = 1e-12  # m or rad: printed as 0
@@ -60,7 +60,7 @@ def beyond(here: Here, near: np.ndarray) -> dict[int, float]:
     for s, spec in enumerate(here.structure.switches):
         x, kind = W.sensed[VALUE, spec.measured], S.switches.kind[s]
         if kind == RATCHET and W.switch[MODE, s] == HELD:
-            tooth, pitch = S.switch_x[s, [SWITCH_TOOTH, SWITCH_PITCH]]
+            tooth, pitch = S.switch_numbers.tooth[s], S.switch_numbers.pitch[s]
             off = (W.switch[HOLD, s] - tooth) / pitch
             past = abs(off - round(off)) * pitch
         elif kind == STOP:

@@ -10,7 +10,7 @@ from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....errors import ModelError
 from ....model.touch import Touch
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
-from ....tables.system import G_LAW, G_SHARED, GUARD_KIND, GUARD_OF, LOWER, SHARED, UPPER
+from ....tables.system import G_LAW, G_SHARED, LOWER, SHARED, UPPER
 from ..jams import Overlap, Unresolved, bodies, jam
 from .bounds import told
 from .instant import Instant, Part
@@ -36,7 +36,7 @@ def guard_names(n: Instant, fired: Iterable[int]) -> list[str]:
     """Whose guards these are: events, elements that hold, those whose laws have corners; each once."""
     out = []
     for g in fired:
-        kind, s = n.S.guard_i[g, [GUARD_KIND, GUARD_OF]].tolist()
+        kind, s = int(n.S.guards.kind[g]), int(n.S.guards.of[g])
         if kind == G_LAW:
             out.append(n.here.structure.events[int(g)].title)
             continue

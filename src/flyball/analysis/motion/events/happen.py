@@ -80,7 +80,7 @@ def happen(here: Here, fired: Sequence[int]) -> None:
     ----------
     here : Here
     fired : sequence of int
-        Rows of `System.guard_i`.
+        Rows of `System.guards`.
 
     Raises
     ------

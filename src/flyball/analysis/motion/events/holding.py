@@ -17,11 +17,6 @@ from ....tables.system import (
     MODE,
     OFF,
     SPARE,
-    SWITCH_KIND,
-    SWITCH_LOWER,
-    SWITCH_MEASURED,
-    SWITCH_STIFFNESS,
-    SWITCH_UPPER,
     UPPER,
     VALUE,
 )
@@ -44,7 +39,7 @@ def hold(here: Here, e: Event, a: Lock) -> str:
     for k in switches(here, held.coordinates, held.joint, held.element):
         if held.element:
             W.switch[SPARE, k] = 0.0
-            W.switch[LOWER, k], W.switch[UPPER, k] = S.switch_values.lower[k], S.switch_values.upper[k]
+            W.switch[LOWER, k], W.switch[UPPER, k] = S.switch_numbers.lower[k], S.switch_numbers.upper[k]
             here.given += stored(here, k)
             continue
         x = W.sensed[VALUE, S.switches.measured[k]]
@@ -84,7 +79,7 @@ def stored(here: Here, k: int) -> float:
         return 0.0
     x = W.sensed[VALUE, S.switches.measured[k]]
     depth = max(W.switch[LOWER, k] - x, x - W.switch[UPPER, k], 0.0)
-    return float(0.5 * S.switch_values.stiffness[k] * depth**2)
+    return float(0.5 * S.switch_numbers.stiffness[k] * depth**2)
 
 
 def switches(here: Here, coordinates: tuple[str, ...], joint: str, element: str) -> list[int]:

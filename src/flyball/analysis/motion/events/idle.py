@@ -17,7 +17,7 @@ from ....equations.tasks import MOTION
 from ....equations.watched import Loop
 from ....numerics.cone.dense.problem import EVEN, FOUND, OUT, PUSHES
 from ....numerics.integrators.clock import SPAN, H, T
-from ....tables.system import BODY_LAW, G_BACK, G_LOWER, G_UPPER, ROW_WORK, UNIT, V0
+from ....tables.system import G_BACK, G_LOWER, G_UPPER
 from .here import Here
 from .instant import Instant, instant_of, slowest
 
@@ -115,7 +115,7 @@ def tie(here: Here, loop: Loop) -> None:
     loop.desk.tied[:] = loop.desk.still[:] = 0.0
     if here.still:
         at = list(here.still)
-        loop.desk.still[at] = here.c.system.glob[UNIT : UNIT + len(loop.desk.still)][at] * slowest(here)
+        loop.desk.still[at] = here.c.system.units[at] * slowest(here)
     if here.tied:
         n = instant_of(here)
         for g, (kind, s, _) in enumerate(n.guarded):

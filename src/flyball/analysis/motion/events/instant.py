@@ -19,19 +19,12 @@ from ....numerics.integrators.clock import COUNTS, REALS, SPAN, STATES, Clock, T
 from ....numerics.integrators.tableaux import tableau
 from ....tables.system import (
     EFFORT,
-    FORCE_LOAD,
     G_SHARED,
     HELD,
     HOLD,
-    INERTIA,
-    MASS,
     MODE,
     OFF,
     SPARE,
-    SWITCH_FORCE,
-    SWITCH_KIND,
-    SWITCH_MEASURED,
-    TEMPO,
     VALUE,
 )
 from .bounds import sizes, units
@@ -121,7 +114,7 @@ class Instant:
         self.tiny = MOTIONLESS * self.unit * fall
         self.near, self.least = NEAR * self.unit, REST * self.unit * self.pace
         self.rooms: dict[int, Room] = {}
-        self.guarded: list[list[int]] = S.guard_i.tolist()
+        self.guarded = list(zip(*(x.tolist() for x in S.guards), strict=True))
         self.shares = bool(self.guarded) and self.guarded[-1][0] == G_SHARED
         self.all = self.room(len(self.m))
         self.all.B.which[:] = np.arange(len(self.m))
@@ -202,8 +195,8 @@ class Instant:
         S, nr = self.S, len(self.S.rows.law)
         out = np.zeros((len(which), self.here.structure.nv))
         for i, s in enumerate(which.tolist()):
-            at = slice(S.row_p[nr + self.m[s]], S.row_p[nr + self.m[s] + 1])
-            out[i, S.col_i[at]] += self.W.G[at]
+            at = slice(S.row_start[nr + self.m[s]], S.row_start[nr + self.m[s] + 1])
+            out[i, S.column[at]] += self.W.G[at]
         return out
 
     def restored(self) -> None:

@@ -15,11 +15,10 @@ import numpy as np
 
 from ....equations.instant import BLOWS, Bench
 from ....numerics.cone.dense.problem import FOUND, HOLDS, PUSHES, Dense
-from ....tables.system import BODY_LAW, BODY_WORK, NU, ROW_WORK, SWITCH_BOUNCE, SWITCH_ROW, V0
+from ....tables.system import NU
 from .instant import STOPS, Instant, Part
 
 REST = 1e-12  # of the terms of a rate after the jump: none
-NEWTON = 3  # column of switch_x: 1 where restitution is by Newton's law
 
 
 @dataclass
@@ -144,16 +143,11 @@ def expanded(
     """Impulses and velocities with what restitution gives back."""
     x, u = hit
     bounces = [n.kind[p.switch] in STOPS and p.switch not in n.here.astray for p in parts]
-    bounce = np.where(bounces, n.S.switch_values.restitution[[p.switch for p in parts]], 0.0)
+    bounce = np.where(bounces, n.S.switch_numbers.restitution[[p.switch for p in parts]], 0.0)
     least = np.where((P.rule == PUSHES) & (x > 0.0), bounce * x, 0.0)
     if not least.any():
         return x, u
-    newton = all(n.S.switch_x[p.switch, NEWTON] == 1.0 for p, more in zip(parts, least, strict=True) if more > 0.0)
-    if newton:
-        more, speed = by_velocities(n, B, P, before, bounce)
-        more, speed = more - x, speed - u
-    else:
-        more, speed = by_impulses(n, B, P, least, u)
+    more, speed = by_impulses(n, B, P, least, u)
     # energy on the way s from the inelastic impact: E + a s + b s^2
     E, a, b = 0.5 * float(x @ (before + u)), float(more @ (before + u) + x @ speed) / 2.0, float(more @ speed) / 2.0
     s = 1.0
@@ -171,16 +165,6 @@ def by_impulses(n: Instant, B: Bench, P: Dense, least: np.ndarray, u: np.ndarray
     B.loaded[:] = least @ B.L
     n.balance(B, P, BLOWS)
     return P.x + least, P.u - u
-
-
-def by_velocities(
-    n: Instant, B: Bench, P: Dense, before: np.ndarray, bounce: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Newton: what closes goes back with e times its speed at least."""
-    back = np.where((P.rule == PUSHES) & (before < 0.0), bounce * before, 0.0)
-    P.b[:] = before + back
-    n.balance(B, P, BLOWS)
-    return P.x.copy(), P.u - back
 
 
 def driven(n: Instant, out: Jump, drive: np.ndarray) -> None:

@@ -10,15 +10,7 @@ from ....constraints.modes import BRANCH
 from ....laws.breaks import Breaks, Timed, found_beforehand, margin, timed
 from ....numerics.integrators import clock as ex
 from ....tables.system import (
-    BODY_LAW,
-    CONTROL_RATE,
-    FORCE_LAW,
     G_LAW,
-    GUARD_KIND,
-    GUARD_OF,
-    ROW_LAW,
-    SWITCH_KIND,
-    SWITCH_LAW,
 )
 from ...compiled import Compiled
 
@@ -42,9 +34,7 @@ def _timed(c: Compiled) -> Timed:
     guards = S.guards.of[S.guards.kind == G_LAW]
     forces = S.forces.laws.ravel()
     corners = S.switches.law[S.switches.kind == BRANCH]
-    starts = np.concatenate(
-        [forces, S.rows.law, S.tree.law, guards, corners, S.controls.rate_law]
-    )
+    starts = np.concatenate([forces, S.rows.law, S.tree.law, guards, corners, S.control_laws])
     return timed(S.code.tolist(), starts.tolist())
 
 

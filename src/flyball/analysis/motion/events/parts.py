@@ -7,7 +7,6 @@ import numpy as np
 from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STATIC
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FREE, GRIPS, HOLDS, PUSHES
 from ....tables.system import (
-    FORCE_LOAD,
     G_BACK,
     G_LOWER,
     G_SLIDES,

@@ -12,7 +12,7 @@ import numpy as np
 
 from ....equations.tasks import MOTION
 from ....numerics.cone.dense.problem import HOLDS
-from ....tables.system import BIAS, COORDINATES
+from ....tables.system import BIAS
 from .instant import Instant, Part
 from .jump import Jump, add
 

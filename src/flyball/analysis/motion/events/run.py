@@ -30,8 +30,6 @@ from ....tables.system import (
     G_HOLDS,
     G_PULL,
     G_SHARED,
-    GUARD_KIND,
-    GUARD_OF,
 )
 from ...progress import Tell
 from ..engines import FAILED, Engine
@@ -345,7 +343,7 @@ class Run:
         here = self.here
         if isinstance(self.loop, Loop):
             as_grains(here, self.loop)
-        n, (kinds, of) = instant_of(here), here.c.system.guard_i[:, [GUARD_KIND, GUARD_OF]].T
+        n, kinds, of = instant_of(here), here.c.system.guards.kind, here.c.system.guards.of
         values, sides = n.guards(), np.isin(kinds, (*DISTANCES, G_BACK))
         at = sides & (np.abs(values) <= REACHED * n.unit[np.where(sides, of, 0)]) if sides.any() else sides
         against = np.flatnonzero(((values < 0.0) & np.isin(kinds, HOLDING)) | at)

@@ -11,7 +11,7 @@ from ....equations.engine import MOTION
 from ....results.booked import booked
 from ....results.result import Result
 from ....results.stretches import Stretch, stretched
-from ....tables.system import HELD, MODE, OFF, SPARE, SWITCH_ROW, VALUE
+from ....tables.system import HELD, MODE, OFF, SPARE, VALUE
 from .here import Here
 from .reported import share
 
@@ -58,8 +58,8 @@ def _quiet(here: Here, rows: np.ndarray) -> None:
     first, ny = 1 + s.nq, 1 + len(here.y)
     for k in np.flatnonzero(W.switch[MODE] == HELD).tolist():
         row = S.switches.row[k]
-        if row >= 0 and S.row_p[row + 1] - S.row_p[row] == 1:
-            column = S.col_i[S.row_p[row]]
+        if row >= 0 and S.row_start[row + 1] - S.row_start[row] == 1:
+            column = S.column[S.row_start[row]]
             rows[:, [first + column, ny + column]] = 0.0
 
 

@@ -13,7 +13,7 @@ from ....errors import FlyballError, SimulationError
 from ....model.touch import Touch
 from ....tables.contact.places import places
 from ....tables.numbers import words
-from ....tables.system import G_VALUE, LOWER, NU, SPARE, SWITCH_KIND, SWITCH_LOWER, SWITCH_UPPER, UPPER, VALUE
+from ....tables.system import G_VALUE, LOWER, NU, SPARE, UPPER, VALUE
 from ....tables.values import Values, values
 from .bounds import beyond, rule, sizes, units
 from .here import Here
@@ -72,10 +72,11 @@ def _take(here: Here, x: Values, told: Mapping[str, float]) -> None:
 def _move_bounds(here: Here, old: Values) -> None:
     """Bounds of stops, and teeth, as the numbers now say."""
     S, W = here.c.system, here.c.work
-    now, then, pair = S.switch_x, old.system.switch_x, [SWITCH_LOWER, SWITCH_UPPER]
-    for s in np.flatnonzero((W.switch[SPARE] == 0.0) & (now[:, pair] != then[:, pair]).any(axis=1)).tolist():
+    now, then = S.switch_numbers, old.system.switch_numbers
+    moved = (now.lower != then.lower) | (now.upper != then.upper)
+    for s in np.flatnonzero((W.switch[SPARE] == 0.0) & moved).tolist():
         if S.switches.kind[s] in (STOP, ELASTIC, RATCHET):
-            W.switch[[LOWER, UPPER], s] = now[s, pair]
+            W.switch[LOWER, s], W.switch[UPPER, s] = now.lower[s], now.upper[s]
 
 
 def _refuse_other_places(here: Here, new: Values, who: str) -> None:

@@ -16,7 +16,7 @@ from ....equations.instant import FORCES, NUDGE
 from ....equations.sharing import GRAIN
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, HOLDS, OUT, PUSHES, TURNS, WITH, Dense
 from ....numerics.cone.shares import CELLS, OPEN, best_kernel, room
-from ....tables.system import G_SHARED, MODE, OFF, SHARED, SWITCH_ROW, SWITCH_SLIDING
+from ....tables.system import G_SHARED, MODE, OFF, SHARED
 from .instant import Instant, Part
 from .yielding import accelerations
 
@@ -226,7 +226,7 @@ def sliding(n: Instant, parts: list[Part], P: Dense) -> dict[int, Part]:
             for k in own:
                 lean = float(P.u[k]) / speed
                 if n.kind[p.switch] == SLIP:
-                    mu = float(n.S.switch_values.kinetic_friction[parts[own[0]].switch])
+                    mu = float(n.S.switch_numbers.kinetic_friction[parts[own[0]].switch])
                     out[k] = parts[k]._replace(rule=DRIVEN, lean=lean, gain=mu)
                     P.gain[k, p.of] = (1.0 - FIRST) * mu
                 else:

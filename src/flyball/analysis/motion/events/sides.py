@@ -15,16 +15,11 @@ from ....constraints.modes import ELASTIC, FROZEN, RATCHET, TURN
 from ....equations.tasks import MOTION
 from ....tables.system import (
     BIAS,
-    COORDINATES,
     G_PRESS_LOWER,
     G_PRESS_UPPER,
     LOWER,
     MODE,
     OFF,
-    SWITCH_DAMPING,
-    SWITCH_PITCH,
-    SWITCH_STIFFNESS,
-    SWITCH_TOOTH,
     UPPER,
 )
 from .instant import Instant
@@ -43,7 +38,7 @@ def teeth(n: Instant, still: np.ndarray) -> None:
         elif n.rate[s] > 0.0 and not still[s]:
             _goes_on(n, s)
         elif first or n.way[s] >= 0.0:
-            tooth, pitch = n.S.switch_values.tooth[s], n.S.switch_values.pitch[s]
+            tooth, pitch = n.S.switch_numbers.tooth[s], n.S.switch_numbers.pitch[s]
             n.W.switch[LOWER, s] = tooth + pitch * np.floor((n.x[s] - tooth) / pitch + TOOTH)
             n.ways()[s] = n.way[s] = -1.0
 
@@ -88,7 +83,7 @@ def pressed(n: Instant, fired: np.ndarray, ways: np.ndarray) -> None:
 
 def _side(n: Instant, s: int, old: float, hit: set[int]) -> float:
     """1 if pressed at the lower side, -1 at the upper, 0 if open; `BY_ITSELF` less `FROZEN` where nothing tells."""
-    k, c = n.S.switch_values.stiffness[s], n.S.switch_values.damping[s]
+    k, c = n.S.switch_numbers.stiffness[s], n.S.switch_numbers.damping[s]
     now = 0.0
     for side, bound, guard in ((1.0, LOWER, G_PRESS_LOWER), (-1.0, UPPER, G_PRESS_UPPER)):
         depth, rate = side * (n.W.switch[bound, s] - n.x[s]), -side * n.rate[s]

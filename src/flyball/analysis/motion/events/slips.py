@@ -20,10 +20,6 @@ from ....tables.system import (
     HOLD,
     MODE,
     OFF,
-    SWITCH_OTHER,
-    SWITCH_PARTNER,
-    SWITCH_REST,
-    SWITCH_SLIDING,
 )
 from .instant import Instant, Part
 
@@ -99,7 +95,8 @@ def parts_of(n: Instant, gap: int, at: int, still: np.ndarray, *, led: bool) -> 
     if not own:
         return []
     held = bool(still[own].all())
-    mu = float(n.S.switch_x[own[0], SWITCH_REST if held else SWITCH_SLIDING])
+    numbers = n.S.switch_numbers
+    mu = float((numbers.static_friction if held else numbers.kinetic_friction)[own[0]])
     if held or not led:
         rules = (GRIPS,) if len(own) == 1 else (TURNS, WITH)
         return [Part(s, rule, state=EVEN, gain=mu, of=at) for s, rule in zip(own, rules, strict=True)]
@@ -115,7 +112,7 @@ def slide_on(n: Instant, parts: Sequence[Part], P: Dense, resting: np.ndarray) -
     other = False
     for i, p in enumerate(parts):
         if n.kind[p.switch] == SLIP and P.rule[i] != WITH and P.state[i] != EVEN and not resting[i]:
-            mu = float(n.S.switch_values.kinetic_friction[p.switch])
+            mu = float(n.S.switch_numbers.kinetic_friction[p.switch])
             other |= P.gain[i, p.of] != mu
             P.gain[i, p.of] = mu
     return other
@@ -135,7 +132,7 @@ def loose(n: Instant, parts: Sequence[Part], found: tuple[np.ndarray, ...], fire
             continue
         size = float(np.linalg.norm(x[own]))
         if size >= reach[i] - least[i]:
-            mu = float(n.S.switch_values.kinetic_friction[p.switch])
+            mu = float(n.S.switch_numbers.kinetic_friction[p.switch])
             for k in own:
                 out[k] = parts[k]._replace(rule=DRIVEN, lean=-float(x[k]) / size if size else 0.0, gain=mu)
     return out

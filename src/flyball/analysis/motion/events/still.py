@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ....numerics.cone.dense.problem import EVEN
-from ....tables.system import BODY_LAW, ROW_WORK, V0
 from .instant import IMMOVABLE, Instant
 
 if TYPE_CHECKING:
@@ -33,8 +32,8 @@ def still(n: Instant, found: Decided) -> tuple[int, ...]:
     drives = np.hstack([B.E[held][:, axes], B.L[held][:, rows]])
     nr, mass = len(n.S.rows.law), n.inertia.max()
     for m in named:
-        w, at = np.zeros(n.here.structure.nv), slice(n.S.row_p[nr + m], n.S.row_p[nr + m + 1])
-        np.add.at(w, n.S.col_i[at], n.W.G[at])
+        w, at = np.zeros(n.here.structure.nv), slice(n.S.row_start[nr + m], n.S.row_start[nr + m + 1])
+        np.add.at(w, n.S.column[at], n.W.G[at])
         a, lam, effort = n.response(w)
         own, cross = float(w @ a), B.Y[held] @ w
         if own * mass < IMMOVABLE:

@@ -14,7 +14,6 @@ import numpy as np
 from ....equations.instant import SILENT, STILL
 from ....equations.rows import measured
 from ....laws.evaluation import evaluate_jet
-from ....tables.system import SWITCH_LAW
 from .instant import REST, Instant
 from .rest import LOW
 
@@ -64,11 +63,11 @@ def seen(n: Instant, s: int) -> Corner:
     for m in range(nm):
         slope = slopes[nm + m] if rates else slopes[m]
         unit = n.here.c.values.length if measures.get(m) == "m" else 1.0
-        at = slice(S.row_p[nr + m], S.row_p[nr + m + 1])
+        at = slice(S.row_start[nr + m], S.row_start[nr + m + 1])
         G = np.abs(W.G[at])
-        row[S.col_i[at]] += slope * W.G[at]
+        row[S.column[at]] += slope * W.G[at]
         size += abs(slope) * unit
-        rounding = STILL * (G @ np.abs(v[S.col_i[at]])) + SILENT * G.sum() * np.abs(v).max(initial=0.0)
+        rounding = STILL * (G @ np.abs(v[S.column[at]])) + SILENT * G.sum() * np.abs(v).max(initial=0.0)
         still += abs(slope) * (REST * unit * n.pace + rounding)
     return Corner(row, rates, size * n.pace if rates else size, still, still if rates else LOW * size)
 

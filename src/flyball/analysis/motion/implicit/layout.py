@@ -12,17 +12,8 @@ from ....numerics.integrators.implicit.whole import SOFT as SOFTENED
 from ....numerics.lu import Rows, analyse, constrained_order
 from ....tables.specs import Structure
 from ....tables.system import (
-    FORCE_ALONG,
-    FORCE_SWITCH,
-    INERTIA,
-    MASS,
-    NV,
     SCHUR,
     SLIDING,
-    SOLVER,
-    SWITCH_OTHER,
-    SWITCH_ROW,
-    V0,
     System,
 )
 from ...compiled import Compiled
@@ -59,8 +50,10 @@ class Layout:
         self.places, self.groups = int(at[-1]), self.terms.groups
         self.pressing = np.union1d(pressing(s), pressed(S)).astype(np.int64)
         self.valued = np.array([r.holonomic for r in s.rows], np.int64).reshape(self.nr)
-        self.turns = np.array([w for w in (quaternion_at(S, b)[1] for b in range(len(S.tree.parent))) if w >= 0], np.int64)
-        self.row_p, self.col_i = S.row_p[: self.nr + 1], S.col_i[: S.row_p[self.nr]]
+        self.turns = np.array(
+            [w for w in (quaternion_at(S, b)[1] for b in range(len(S.tree.parent))) if w >= 0], np.int64
+        )
+        self.row_p, self.col_i = S.row_start[: self.nr + 1], S.column[: S.row_start[self.nr]]
         self._entries()
         P = self.P
         self.dear = bool((np.diff(P.Up)[P.Lj]).sum() > MANY * self.n)
@@ -154,8 +147,8 @@ class Layout:
 
         Increments come first: only a few of their own stand beside the diagonal, and what is left is half as large.
         """
-        body_i = self.s.tables["body_i"]
-        body, bodies = np.repeat(np.arange(len(body_i)), body_i[:, NV]), len(body_i)
+        nv = self.s.tables["tree"].nv
+        body, bodies = np.repeat(np.arange(len(nv)), nv), len(nv)
         rows, states = bodies + np.arange(self.nr), bodies + self.nr + np.arange(self.nx)
         groups = np.tile(np.concatenate([body, body, rows, rows, states]), stages)
         order = constrained_order(groups, np.arange(bodies + self.nr + self.nx) >= bodies, i, j)

@@ -15,7 +15,7 @@ from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
 from ....numerics.integrators.implicit.desk import Desk
 from ....tables.branches import steep_laws
-from ....tables.system import FREE, NV, Q0, SCHUR, SCRATCH, SOLVER, SPHERICAL, TREE, V0, System
+from ....tables.system import FREE, SCHUR, SCRATCH, SPHERICAL, System
 from ...compiled import Compiled
 from ...linear.derivatives import refuse_functions
 from ...linear.loads import STEP, as_complex
@@ -168,8 +168,9 @@ class Implicit:
     def _plain(self) -> np.ndarray:
         """Component of the state that each velocity is the rate of, or -1: a turn."""
         out = np.full(self.layout.nv, -1, np.int64)
-        for row in self.system.body_i:
-            plain = row[NV] if row[TREE] != FREE else 3
-            if row[TREE] != SPHERICAL:
-                out[row[V0] : row[V0] + plain] = np.arange(row[Q0], row[Q0] + plain)
+        tree = self.system.tree
+        for kind, q, v, nv in zip(tree.joint, tree.q, tree.v, tree.nv, strict=True):
+            plain = nv if kind != FREE else 3
+            if kind != SPHERICAL:
+                out[v : v + plain] = np.arange(q, q + plain)
         return out

@@ -11,16 +11,7 @@ from ....tables.specs import Structure
 from ....tables.system import (
     ALONG,
     BETWEEN,
-    FORCE_ALONG,
-    FORCE_F,
-    FORCE_LAW,
-    FORCE_LOAD,
-    FORCE_M,
-    NV,
-    PARENT,
     SLIDING,
-    TERM_ROW,
-    V0,
     System,
 )
 from ...linear.derivatives import grouped
@@ -57,13 +48,13 @@ class Parts:
 
     def __init__(self, s: Structure, S: System, nx: int) -> None:
         self.S, self.nv, self.nr, self.nx = S, s.nv, len(S.rows.law), nx
-        nm = len(S.row_p) - 1 - self.nr
+        nm = len(S.row_start) - 1 - self.nr
         self.body = np.repeat(np.arange(len(S.tree.parent)), S.tree.nv)
         self.chain: list[np.ndarray] = []
-        for row in S.body_i:
-            own = np.arange(row[V0], row[V0] + row[NV])
-            self.chain.append(np.r_[own, self.chain[row[PARENT]]] if row[PARENT] >= 0 else own)
-        self.entries = [S.col_i[S.row_p[k] : S.row_p[k + 1]] for k in range(self.nr + nm)]
+        for parent, v, nv in zip(S.tree.parent, S.tree.v, S.tree.nv, strict=True):
+            own = np.arange(v, v + nv)
+            self.chain.append(np.r_[own, self.chain[parent]] if parent >= 0 else own)
+        self.entries = [S.column[S.row_start[k] : S.row_start[k + 1]] for k in range(self.nr + nm)]
         self.row = [self._hung(np.unique(self.body[e])) for e in self.entries]
         states = s.nv + np.arange(nx)
         self.told = np.r_[self._read(s, s.slots, nm), states]
@@ -83,28 +74,29 @@ class Parts:
         """Velocities of bodies and of all that they hang on."""
         return _union([self.chain[b] for b in bodies])
 
-    def _law(self, force: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """With what its laws are told."""
-        return np.union1d(own, self.told) if (force[FORCE_LAW : FORCE_LAW + 3] >= 0).any() else own
+    def _law(self, k: int, own: np.ndarray) -> np.ndarray:
+        """With what the laws of force k are told."""
+        return np.union1d(own, self.told) if (self.S.forces.laws[k] >= 0).any() else own
 
     def _between(self) -> list[Part]:
-        out = []
-        for force in self.S.force_i:
-            if force[FORCE_ALONG] == BETWEEN:
-                ends = [b for b in self.S.frame_i[force[[FORCE_M, FORCE_F]]] if b >= 0]
-                depends = self._law(force, self._hung(ends))
+        out, forces = [], self.S.forces
+        for k, family in enumerate(forces.family):
+            if family == BETWEEN:
+                ends = [b for b in self.S.frame_body[[forces.M[k], forces.F[k]]] if b >= 0]
+                depends = self._law(k, self._hung(ends))
                 out += [(self.chain[b], depends) for b in ends]
         return out
 
     def _along(self) -> list[Part]:
-        out = []
-        for force in self.S.force_i:
-            if force[FORCE_ALONG] not in (ALONG, SLIDING):
+        out, forces = [], self.S.forces
+        for k, family in enumerate(forces.family):
+            if family not in (ALONG, SLIDING):
                 continue
-            columns = [FORCE_F, FORCE_M] if force[FORCE_ALONG] == SLIDING else [FORCE_F]
-            lines = [self.nr + m for m in force[columns] if m >= 0]
-            loading = [self.S.terms.row[x] for n, x in self.S.load_i if n == force[FORCE_LOAD] and x >= 0]
-            depends = self._law(force, _union([self.row[n] for n in [*lines, *loading]]))
+            measured = [forces.F[k], forces.M[k]] if family == SLIDING else [forces.F[k]]
+            lines = [self.nr + m for m in measured if m >= 0]
+            pressing = zip(*self.S.load_terms, strict=True)
+            loading = [self.S.terms.row[x] for n, x in pressing if n == forces.load[k] and x >= 0]
+            depends = self._law(k, _union([self.row[n] for n in [*lines, *loading]]))
             out += [(self.entries[n], depends) for n in lines]
         return out
 

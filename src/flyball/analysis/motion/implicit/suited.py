@@ -7,7 +7,6 @@ from typing import Any
 
 from ....errors import ModelError
 from ....results.doubts import open_loads
-from ....tables.system import SEMIDEFINITE
 from ...linear.derivatives import refuse_functions
 from ...mobility import mobility
 from ..start import Start, begin_at

@@ -13,7 +13,6 @@ from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
 from ....numerics.integrators.implicit.desk import VariationalDesk
 from ....numerics.integrators.tableaux import tableau
-from ....tables.system import EXCESS, EXCESS_MASS, LENGTH, SEMIDEFINITE
 from ...compiled import Compiled
 from ..start import Start
 from .loop import SEEN
@@ -45,7 +44,7 @@ class Variational:
         turns = [w for w in (quaternion_at(S, b)[1] for b in range(len(S.tree.parent))) if w >= 0]
         real, count = np.zeros(ds.REALS), np.zeros(ds.COUNTS, np.int64)
         real[ds.NEWTON], real[ds.ROUGH] = TIGHT * S.length[0], CLOSED * S.length[0]
-        n, z = int(S.row_p[nr]), np.zeros
+        n, z = int(S.row_start[nr]), np.zeros
         self.desk = VariationalDesk(
             count, real, z((4, nv)), z((4, nv)), z((4, nv)), z((4, nr)), z(nr), z((4, nz)), z((4, nz)), z((2, nv)),
             np.array(turns, np.int64), z((4, nv)), z((3, nv)), z(nr), z((2, n)), z((KEPT, nr)), z((KEPT, nv)),
@@ -88,9 +87,7 @@ def refuse_unknown(begun: Start) -> None:
         )
     if S.semidefinite[0] > 0.0:
         thin = [
-            n
-            for n, b in s.place.items()
-            if b >= 0 and (S.bodies.excess_mass[b] or S.bodies.excess_inertia[b].any())
+            n for n, b in s.place.items() if b >= 0 and (S.bodies.excess_mass[b] or S.bodies.excess_inertia[b].any())
         ]
         raise ModelError(
             f"method={VARIATIONAL!r} needs masses and inertias about all axes, which {', '.join(map(repr, thin))} does "

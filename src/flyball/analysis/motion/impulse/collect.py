@@ -29,7 +29,6 @@ from ....stepping.tables import (
     TIME,
 )
 from ....tables.contact import Touching
-from ....tables.system import NV, Q0, V0
 from ...assembly.start import Assembly
 from .held import Held
 
@@ -127,7 +126,7 @@ class Collected:
 def coordinates(base: Assembly, scene: Touching, kept: Collected) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Absolute coordinates (n, nq), velocities and accelerations (n, nv) of single bodies over time."""
     s = base.compiled.structure
-    body_i = s.tables["body_i"]
+    tree = s.tables["tree"]
     n = len(kept.t)
     q, v = np.tile(base.q, (n, 1)), np.zeros((n, s.nv))
     a = np.zeros((n, s.nv))
@@ -139,7 +138,7 @@ def coordinates(base: Assembly, scene: Touching, kept: Collected) -> tuple[np.nd
         k = scene.carriers.slices[name].start
         if k >= pose.shape[1]:  # of the mechanism
             continue
-        q0, v0, width = body_i[b, Q0], body_i[b, V0], body_i[b, NV]
+        q0, v0, width = tree.q[b], tree.v[b], tree.nv[b]
         line = slice(v0, v0 + 2 if s.model.planar else v0 + 3)
         v[:, line], a[:, line] = twist[:, k, : line.stop - v0], change[:, k, : line.stop - v0]
         if s.model.planar:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ....tables.coordinates import BodyState
-from ....tables.system import NV, V0
 from ...assembly.described import described
 from ...assembly.start import Assembly
 from ...compiled import Compiled
@@ -23,11 +22,11 @@ def as_drawn(c: Compiled, t: float) -> Assembly | None:
 def moving(base: Assembly) -> dict[str, BodyState]:
     """How every body moves at that start."""
     values, out = base.compiled.values, {}
-    body_i = values.structure.tables["body_i"]
+    tree = values.structure.tables["tree"]
     for name, b in values.structure.place.items():
         if b >= 0:
             d = values.bodies[name]
-            u = base.v[body_i[b, V0] : body_i[b, V0] + body_i[b, NV]]
+            u = base.v[tree.velocities(b)]
             if values.structure.model.planar:
                 v, w = np.r_[u[:2], 0.0], np.r_[0.0, 0.0, u[2:] if len(u) > 2 else 0.0]
             else:

@@ -13,7 +13,6 @@ from ....model.model import Model
 from ....results.booked import added, ended
 from ....results.result import Result
 from ....tables.contact import Touching
-from ....tables.system import NQ, NV, Q0, V0
 from ...assemble import assemble
 from ...assembly.start import Assembly
 from ...compiled import compiled
@@ -49,9 +48,9 @@ def part_of(base: Assembly, model: Model, parameters: Mapping[str, float] | None
     q, v, z = np.zeros(s.nq), np.zeros(s.nv), c.z.copy()
     for name, b in s.place.items():
         if b >= 0:
-            here, there = s.tables["body_i"][b], whole.tables["body_i"][whole.place[name]]
-            q[here[Q0] : here[Q0] + here[NQ]] = base.q[there[Q0] : there[Q0] + there[NQ]]
-            v[here[V0] : here[V0] + here[NV]] = base.v[there[V0] : there[V0] + there[NV]]
+            here, there, k = s.tables["tree"], whole.tables["tree"], whole.place[name]
+            q[here.coordinates(b)] = base.q[there.coordinates(k)]
+            v[here.velocities(b)] = base.v[there.velocities(k)]
     for name, k in s.state_at.items():
         if name in whole.state_at:
             z[k] = base.compiled.z[whole.state_at[name]]

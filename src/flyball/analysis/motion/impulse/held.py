@@ -9,7 +9,7 @@ import numpy as np
 
 from ....model.model import Model
 from ....stepping.joined import STEP, V_AFTER, V_BEFORE, Joined
-from ....tables.system import G_VALUE, NQ, NU, NV, Q0, V0
+from ....tables.system import G_VALUE, NU
 from ....tables.values import Values
 from ...assembly.start import Assembly
 from ..start import Start, begin
@@ -60,11 +60,10 @@ class Held:
         y, lam = np.array(self.y), np.array(self.lam)
         for name, b in own.place.items():
             if b >= 0:
-                here, there = own.tables["body_i"][b], s.tables["body_i"][s.place[name]]
-                q[:, there[Q0] : there[Q0] + there[NQ]] = y[:, here[Q0] : here[Q0] + here[NQ]]
-                from_v = own.nq + here[V0]
-                v[:, there[V0] : there[V0] + there[NV]] = y[:, from_v : from_v + here[NV]]
-                vdot[:, there[V0] : there[V0] + there[NV]] = np.array(self.vdot)[:, here[V0] : here[V0] + here[NV]]
+                here, there, k = own.tables["tree"], s.tables["tree"], s.place[name]
+                q[:, there.coordinates(k)] = y[:, here.coordinates(b)]
+                v[:, there.velocities(k)] = y[:, own.nq :][:, here.velocities(b)]
+                vdot[:, there.velocities(k)] = np.array(self.vdot)[:, here.velocities(b)]
         states = np.zeros((len(y), len(s.states)))
         for name, k in s.state_at.items():
             if name in own.state_at:

@@ -29,7 +29,7 @@ from ....stepping.joined import (
 )
 from ....stepping.smooth import MIXED, MIXING
 from ....tables.specs import Structure
-from ....tables.system import FORCE_ALONG, FORCE_F, FORCE_M, LATER, NV, PARENT, STABILIZE, V0, System
+from ....tables.system import BETWEEN, LATER, STABILIZE, System
 from ..start import Start
 
 Stop = tuple[float, float, float]
@@ -66,7 +66,7 @@ def tables(
     slopes[:, DIRECTIONS] = [directions(f) for f in s.forces]
     springs = int(slopes[:, DIRECTIONS].sum())
     c.work.option[STABILIZE], c.work.option[LATER] = STEPS, 0.0
-    S = S._replace(force_x=S.force_x.copy())
+    S = S._replace(force_parameters=S.force_parameters.copy())
     line, line_x = lines(s, S, stops or {})
     A = Joined(
         S, c.work, tableau("rk45"), clock, Sheet(np.zeros((4, width))), Sheet(slopes), np.zeros(1, np.int64),
@@ -94,12 +94,12 @@ def lines(s: Structure, S: System, stops: Mapping[str, Stop]) -> tuple[np.ndarra
             x[[LEAST, MOST_AT, REBOUND]] = stops[e.name]
         elif e.single == "rope":
             kind = ROPE
-            x[[ROPE_K, ROPE_C, SHORTEST]] = S.force_x[k, :3]
-            S.force_x[k, :2] = 0.0
+            x[[ROPE_K, ROPE_C, SHORTEST]] = S.force_parameters[k, :3]
+            S.force_parameters[k, :2] = 0.0
         elif e.single == "friction":
             kind = FRICTION
-            x[LEAST] = S.force_x[k, 0]
-            S.force_x[k, 0] = 0.0
+            x[LEAST] = S.force_parameters[k, 0]
+            S.force_parameters[k, 0] = 0.0
         else:
             continue
         line.append((kind, S.forces.F[k], k))
@@ -134,10 +134,10 @@ def groups(S: System, nv: int) -> tuple[np.ndarray, np.ndarray]:
     movers = [_moving(S, b) for b in range(len(S.tree.parent))]
     for own in movers:
         join(own)
-    for r in range(len(S.row_p) - 1):
-        join(S.col_i[S.row_p[r] : S.row_p[r + 1]])
-    for f in S.force_i[S.forces.family == 0]:
-        ends = [S.frame_i[f[k]] for k in (FORCE_F, FORCE_M)]
+    for r in range(len(S.row_start) - 1):
+        join(S.column[S.row_start[r] : S.row_start[r + 1]])
+    for k in np.flatnonzero(S.forces.family == BETWEEN):
+        ends = [S.frame_body[S.forces.F[k]], S.frame_body[S.forces.M[k]]]
         join(d for b in ends if b >= 0 for d in movers[b])
     of = np.array([root(d) for d in range(nv)], np.int64)
     first = np.flatnonzero(np.r_[True, of[1:] != of[:-1]]) if nv else np.zeros(0, np.int64)

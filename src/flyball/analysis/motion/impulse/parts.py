@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....model.model import Model
-from ....tables.system import FORCE_ALONG, FORCE_F, FORCE_M, TERM_F, TERM_M
+from ....tables.system import BETWEEN
 from ....tables.values import Values
 
 
@@ -30,9 +30,9 @@ class Parts:
 def parts(model: Model, values: Values) -> Parts:
     """Tell free bodies from those of the mechanism, by what the tables of absolute coordinates say acts on them."""
     S = values.system
-    between = S.force_i[S.forces.family == 0]
-    frames = np.concatenate([S.term_i[:, [TERM_F, TERM_M]].ravel(), between[:, [FORCE_F, FORCE_M]].ravel()])
-    used = set(S.frame_i[frames[frames >= 0]].tolist())
+    between = S.forces.family == BETWEEN
+    frames = np.concatenate([S.terms.F, S.terms.M, S.forces.F[between], S.forces.M[between]])
+    used = set(S.frame_body[frames[frames >= 0]].tolist())
     place = values.structure.place
     free = tuple(b.name for b in model.bodies if place[b.name] not in used)
     return Parts((*free, *(b.name for b in model.bulk)), tuple(b.name for b in model.bodies if place[b.name] in used))
