@@ -16,11 +16,9 @@ from flyball.equations.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivativ
 from flyball.equations.solve import REFINEMENTS, factor, solve
 from flyball.equations.tree import retract
 from flyball.tables.system import (
-    COORDINATES,
     F_APPLIED,
     GAMMA,
     LAM,
-    LENGTH,
     PASS,
     STABILIZE,
     TOL_G,
@@ -42,7 +40,7 @@ def follow(S: System, W: Work, times: Float1, y: Float1, dy: Float1, task: int) 
     velocities, and accelerations from the constraints alone. REACTIONS: the same with forces, accelerations and
     reactions, as a simulation reports them.
     """
-    nq, nv = S.kinds[COORDINATES], W.vel.shape[1]
+    nq, nv = S.coordinates[0], W.vel.shape[1]
     q, v, z = y[:nq], y[nq : nq + nv], y[nq + nv :]
     a, step = W.vel[X_SOLVED], W.vel[V3]
     for k in range(times.shape[0]):
@@ -59,7 +57,7 @@ def follow(S: System, W: Work, times: Float1, y: Float1, dy: Float1, task: int) 
                 status = arrive(times[k], y, dy, S, W)[0]
             else:
                 prepare(S, W, times[k], q, v)
-                status, _, factored = settle(S, W, times[k], q, v, z, TIGHT_G * S.glob[LENGTH], TIGHT_V)
+                status, _, factored = settle(S, W, times[k], q, v, z, TIGHT_G * S.length[0], TIGHT_V)
                 remember(S, W, z)
                 if not factored:
                     factor(S, W)

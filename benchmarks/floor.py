@@ -148,7 +148,7 @@ def times(S: Any, W: Any, y: np.ndarray, nq: int, nv: int) -> dict[str, float]:
     args = (S, W, y, y[:nq].copy(), y[nq : nq + nv].copy(), y[nq + nv :].copy(), np.zeros(len(y)))
     for part in PARTS:
         loop = compiled_loop(part)
-        batch = max(200, BATCH // len(S.body_i))
+        batch = max(200, BATCH // len(S.tree.parent))
         found = []
         for _ in range(REPEATS):
             begin = time.process_time()

@@ -67,9 +67,9 @@ def run(case: str, steps: int, times: np.ndarray, **options: Any) -> tuple[dict[
 def momentum(r: fb.Result, body: fb.Body) -> np.ndarray:
     """Angular momentum about the origin (n, 3)."""
     b = r["body"]
-    J = r.values.system.body_x[0, 1:10].reshape(3, 3)
+    J = r.values.system.bodies.inertia[0].reshape(3, 3)
     spin = np.einsum("nij,jk,nlk,nl->ni", b.rotation, J, b.rotation, b.angular_velocity)
-    return spin + r.values.system.body_x[0, 0] * np.cross(b.position, b.velocity)
+    return spin + r.values.system.bodies.mass[0] * np.cross(b.position, b.velocity)
 
 
 def draw(path: str, steps: int, times: np.ndarray, curves: dict[str, tuple[np.ndarray, np.ndarray]]) -> None:

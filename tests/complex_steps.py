@@ -17,19 +17,7 @@ from flyball.model.element import Unit, fields_with
 from flyball.model.expressions import number
 from flyball.tables.specs import Structure
 from flyball.tables.system import (
-    BODY_P,
-    BODY_R,
-    EXCESS,
-    INERTIA,
-    INVERSE,
-    LENGTH,
-    OFFSET,
-    PER_COMPACT,
-    PER_MASS,
     REVOLUTE,
-    TREE,
-    TREE_P,
-    TREE_R,
 )
 from flyball.tables.values import Values, values
 
@@ -97,20 +85,21 @@ def tables(x: Values) -> Tables:
     physics but chosen as the largest of several, so that they have kinks: there the derivative is one of several.
     """
     S = x.system
-    X = S.body_x
-    out = {"mass": X[:, :INERTIA], "inertia": X[:, INERTIA:INVERSE]}
-    out |= {"per mass": X[:, PER_MASS : PER_MASS + 1], "offset": X[:, OFFSET : OFFSET + 1]}
-    for b, row in enumerate(X):
-        T, B = row[TREE_R : TREE_R + 9].reshape(3, 3), row[BODY_R : BODY_R + 9].reshape(3, 3)
-        angles = (0.0, 0.7) if S.body_i[b, TREE] == REVOLUTE else (0.0,)
-        poses = [T @ about_z(a) @ np.column_stack([B, row[BODY_P : BODY_P + 3]]) for a in angles]
-        out[f"tree joint {b}"] = np.concatenate([row[TREE_P : TREE_P + 3], *(p.ravel() for p in poses)])
-        if S.body_i[b, TREE] != REVOLUTE:
-            out[f"tree frames {b}"] = row[TREE_P:PER_MASS]
-    scaled = "scale of inverse" if X[:, EXCESS:TREE_P].any() else "inverse"
-    out |= {scaled: X[:, INVERSE:EXCESS], "scale of excess": X[:, EXCESS:TREE_P]}
-    out |= {"scale": np.r_[X[:, PER_COMPACT], S.glob[LENGTH]], "glob": S.glob[:LENGTH]}
-    out |= {name: getattr(S, name) for name in ("frame_x", "term_x", "force_x", "const")}
+    X = S.bodies
+    out = {"mass": X.mass, "inertia": X.inertia, "per mass": X.inverse_mass, "offset": X.offset}
+    for b in range(len(X.mass)):
+        T, B = X.joint_rotation[b].reshape(3, 3), X.body_rotation[b].reshape(3, 3)
+        angles = (0.0, 0.7) if S.tree.joint[b] == REVOLUTE else (0.0,)
+        poses = [T @ about_z(a) @ np.column_stack([B, X.body_position[b]]) for a in angles]
+        out[f"tree joint {b}"] = np.concatenate([X.joint_position[b], *(p.ravel() for p in poses)])
+        if S.tree.joint[b] != REVOLUTE:
+            own = (X.joint_position, X.joint_rotation, X.body_position, X.body_rotation)
+            out[f"tree frames {b}"] = np.concatenate([x[b] for x in own])
+    scaled = "scale of inverse" if X.excess_inertia.any() else "inverse"
+    out |= {scaled: X.inverse_inertia, "scale of excess": X.excess_inertia}
+    out |= {"scale": np.r_[X.inverse_reference_inertia, S.length], "gravity": S.gravity}
+    out |= {"places": S.frames.position, "axes": S.frames.rotation}
+    out |= {name: getattr(S, name) for name in ("term_parameters", "force_parameters", "const")}
     return out | {"q": x.q, "v": x.v}
 
 

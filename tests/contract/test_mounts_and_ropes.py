@@ -24,7 +24,7 @@ def kept(result, gravity):
     middle = sum(MASS[k] * x[0] for k, x in states.items()) / total
     spin = np.zeros_like(middle)
     for k, (p, v, w, R) in states.items():
-        I = S.body_x[place[k], 1:10].reshape(3, 3)
+        I = S.bodies.inertia[place[k]].reshape(3, 3)
         spin += np.cross(p - middle, MASS[k] * v) + np.einsum("nij,jk,nlk,nl->ni", R, I, R, w)
     return max(np.abs(momentum - momentum[0]).max(), np.abs(spin - spin[0]).max())
 

@@ -34,7 +34,7 @@ def modes(here: Here) -> list[float]:
 
 def ways(here: Here) -> list[float]:
     """Ways of all switches."""
-    n = len(here.c.system.switch_i)
+    n = len(here.c.system.switches.row)
     return here.c.work.sensed[VALUE, here.c.work.sensed.shape[1] - n :].tolist()
 
 

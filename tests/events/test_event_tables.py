@@ -75,13 +75,13 @@ def test_rows_that_let_go_are_measured_as_they_are(planar, tree):
     c.at(0.5, q, v, MOTION)
     rows = s.slices["W"]
     J = c.jacobian()
-    nr = len(S.row_i)
+    nr = len(S.rows.law)
     for k, row in enumerate(range(rows.start, rows.stop)):
         m = s.measured[own_row(s.model["W"], k)]
         assert c.work.sensed[VALUE, m] == pytest.approx(c.work.row[G_VALUE, row], abs=1e-12)
         gradient = np.zeros(s.nv)
-        at = slice(S.row_p[nr + m], S.row_p[nr + m + 1])
-        np.add.at(gradient, S.col_i[at], c.work.G[at])
+        at = slice(S.row_start[nr + m], S.row_start[nr + m + 1])
+        np.add.at(gradient, S.column[at], c.work.G[at])
         assert gradient == pytest.approx(J[row], abs=1e-12)
     assert np.abs(J[rows]).max() > 0.1
 

@@ -5,7 +5,6 @@ import pytest
 
 import flyball as fb
 from flyball.results.struck import Struck, summed
-from flyball.tables.system import INERTIA, MASS
 from tests.layers import both_layers
 
 ROUND = {"looks": True, "contact": True}
@@ -138,7 +137,7 @@ def momentum(moment, body, tables):
     S, b = tables.system, tables.structure.place[body]
     _, R, w, v, _, _ = (np.array([float(np.ravel(x)[0]) for x in part]) for part in moment.alone.records.body(b))
     R = R.reshape(3, 3)
-    return np.r_[S.body_x[b, MASS] * v, R @ S.body_x[b, INERTIA : INERTIA + 9].reshape(3, 3) @ R.T @ w]
+    return np.r_[S.bodies.mass[b] * v, R @ S.bodies.inertia[b].reshape(3, 3) @ R.T @ w]
 
 
 @both_layers

@@ -14,7 +14,7 @@ from flyball.analysis.motion.events.instant import Part
 from flyball.constraints.modes import SLIP
 from flyball.equations.sliding import FIRST, FRESH, direction
 from flyball.numerics.cone.dense.problem import EVEN, PUSHES, TURNS, WITH
-from flyball.tables.system import SWITCH_SLIDING
+from flyball.tables.system import SwitchNumbers
 
 G = 9.81
 TIGHT = {"method": "dop853", "rtol": 1e-11, "atol": 1e-12}
@@ -318,9 +318,10 @@ def test_a_slip_begins_that_is_slow_and_gets_faster(speed, faster, begins):
 def test_a_slip_is_let_go_with_the_friction_that_it_held():
     """At the edge of its cone: 3 N of 0.3 times 10 N."""
     x, mu = np.array([10.0, 1.8, -2.4]), 0.3
-    table = np.zeros((3, SWITCH_SLIDING + 1))
-    table[1:, SWITCH_SLIDING] = mu
-    n = SimpleNamespace(fired=lambda guards, *kinds: {1}, kind=[0, SLIP, SLIP], S=SimpleNamespace(switch_x=table))
+    numbers = SwitchNumbers(*np.zeros((9, 3)))
+    numbers.kinetic_friction[1:] = mu
+    S = SimpleNamespace(switch_numbers=numbers)
+    n = SimpleNamespace(fired=lambda guards, *kinds: {1}, kind=[0, SLIP, SLIP], S=S)
     parts = [Part(0, PUSHES), Part(1, TURNS, gain=mu, of=0), Part(2, WITH, gain=mu, of=0)]
     found = x, np.full(3, EVEN), np.array([np.inf, 3.0, 3.0]), np.full(3, 1e-9)
     out = slips.loose(n, parts, found, np.zeros(0, int))

@@ -18,21 +18,17 @@ from flyball.equations.tree import column
 from flyball.math.vec import quaternion_matrix
 from flyball.results.records import Records
 from flyball.tables.system import (
-    BODY_LAW,
-    BODY_WIDTH,
     F_APPLIED,
     FREE,
-    INERTIA,
-    MASS,
-    NV,
-    PARENT,
     PLANAR,
     PRISMATIC,
     REVOLUTE,
     SPHERICAL,
     TREE_NV,
-    V0,
     WELD,
+    Bodies,
+    Tree,
+    blank,
 )
 from tests.mechanisms import planar_rod
 
@@ -48,10 +44,9 @@ def scratch(nb, nv, dtype=float):
 def tables(parents, kinds):
     """A forest's tables without numbers in them."""
     nv = np.array([TREE_NV[k] for k in kinds])
-    body_i = np.zeros((len(parents), 8), np.int64)
-    body_i[:, :2] = np.transpose([parents, kinds])
-    body_i[:, V0], body_i[:, NV], body_i[:, BODY_LAW:] = np.cumsum(nv) - nv, nv, -1
-    return SimpleNamespace(body_i=body_i, body_x=np.zeros((len(parents), BODY_WIDTH)))
+    parent, joint, none = np.array(parents, np.int64), np.array(kinds, np.int64), np.full(len(nv), -1)
+    hung = Tree(parent, joint, np.zeros_like(nv), np.cumsum(nv) - nv, np.zeros_like(nv), nv, none, none.copy())
+    return SimpleNamespace(tree=hung, bodies=blank(Bodies, len(parents), float))
 
 
 def rotation(random):
@@ -69,7 +64,7 @@ def forest(seed, *, massless=True, planar=False, chain=False, centre=(0, 0, 0)):
         kinds.append(random.choice(inner) if parents[b] >= 0 or seed % 3 else PLANAR if planar else FREE)
     S = tables(parents, kinds)
     light = [massless and parents[b] >= 0 and random.random() < 0.3 and b in parents for b in range(len(parents))]
-    W = scratch(len(parents), int(S.body_i[:, NV].sum()))
+    W = scratch(len(parents), int(S.tree.nv.sum()))
     flat = np.array([1, 1, 0]) if planar else np.ones(3)
     for b, kind in enumerate(kinds):
         p = centre + flat * random.normal(size=3)
@@ -78,11 +73,11 @@ def forest(seed, *, massless=True, planar=False, chain=False, centre=(0, 0, 0)):
         W.O[b] = p if kind in (FREE, PLANAR) else p + flat * random.normal(size=3)
         if not light[b]:
             A = random.normal(size=(3, 3))
-            S.body_x[b, MASS] = random.uniform(0.5, 2.0)
-            S.body_x[b, INERTIA : INERTIA + 9] = (np.diag([0, 0, 0.7]) if planar else A @ A.T + np.eye(3)).ravel()
+            S.bodies.mass[b] = random.uniform(0.5, 2.0)
+            S.bodies.inertia[b] = (np.diag([0, 0, 0.7]) if planar else A @ A.T + np.eye(3)).ravel()
         n = np.array([0, 0, 1.0]) if planar and kind == REVOLUTE else flat * random.normal(size=3)
         n /= np.linalg.norm(n)
-        v0 = S.body_i[b, V0]
+        v0 = S.tree.v[b]
         if kind == REVOLUTE:
             W.X[v0, :3] = n
         elif kind == PRISMATIC:
@@ -94,32 +89,32 @@ def forest(seed, *, massless=True, planar=False, chain=False, centre=(0, 0, 0)):
 
 def dense(S, W):
     """M as the sum over bodies of J^T m J."""
-    nb, nv = len(S.body_i), W.X.shape[0]
+    nb, nv = len(S.tree.parent), W.X.shape[0]
     M = np.zeros((nv, nv), W.X.dtype)
     for b in range(nb):
         J = np.zeros((6, nv), W.X.dtype)
         a = b
         while a >= 0:
-            for k in range(S.body_i[a, NV]):
+            for k in range(S.tree.nv[a]):
                 w, v = column(S, W, a, k)
-                J[:, S.body_i[a, V0] + k] = np.r_[w, np.add(v, np.cross(w, W.BK[b, :3] - W.O[a]))]
-            a = S.body_i[a, PARENT]
+                J[:, S.tree.v[a] + k] = np.r_[w, np.add(v, np.cross(w, W.BK[b, :3] - W.O[a]))]
+            a = S.tree.parent[a]
         R = W.BK[b, 3:12].reshape(3, 3)
-        inertia = R @ S.body_x[b, INERTIA : INERTIA + 9].reshape(3, 3) @ R.T
-        M += S.body_x[b, MASS] * J[3:].T @ J[3:] + J[:3].T @ inertia @ J[:3]
+        inertia = R @ S.bodies.inertia[b].reshape(3, 3) @ R.T
+        M += S.bodies.mass[b] * J[3:].T @ J[3:] + J[:3].T @ inertia @ J[:3]
     return M
 
 
 def places(S):
     """Row and column of each entry of M, in the order of ``mass_entries``."""
     entries = []
-    for b in range(len(S.body_i)):
-        for d in range(S.body_i[b, V0], S.body_i[b, V0] + S.body_i[b, NV]):
+    for b in range(len(S.tree.parent)):
+        for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
             a = b
             while a >= 0:
-                own = range(S.body_i[a, V0], S.body_i[a, V0] + S.body_i[a, NV])
+                own = range(S.tree.v[a], S.tree.v[a] + S.tree.nv[a])
                 entries += [(d, i) for i in own if i <= d]
-                a = S.body_i[a, PARENT]
+                a = S.tree.parent[a]
     return np.array(entries)
 
 
@@ -185,10 +180,10 @@ def test_prescribed_velocities_take_their_effort(seed, kind):
     """Their accelerations are given; M x = f elsewhere, and the drivers add what is missing to it where they act."""
     S, W = forest(seed, **KINDS[kind])
     random = np.random.default_rng(seed)
-    drivable = np.flatnonzero(S.body_i[:, NV] == 1)
+    drivable = np.flatnonzero(S.tree.nv == 1)
     driven = drivable[random.random(len(drivable)) < 0.5]
-    S.body_i[driven, BODY_LAW] = 0
-    told = S.body_i[driven, V0]
+    S.tree.law[driven] = 0
+    told = S.tree.v[driven]
     M = dense(S, W)
     free = np.setdiff1d(np.arange(len(M)), told)
     if singular(M[np.ix_(free, free)]):
@@ -235,7 +230,7 @@ def slender(axis):
 
 def test_nothing_at_the_end_has_no_inertia():
     S, W = hinges([0, 0, 1], [0, 1, 0])
-    S.body_x[0, MASS], S.body_x[0, INERTIA : INERTIA + 9] = 1.0, np.eye(3).ravel()
+    S.bodies.mass[0], S.bodies.inertia[0] = 1.0, np.eye(3).ravel()
     assert articulate(S, W) == 1 + 1, "the second velocity"
 
 
@@ -243,21 +238,21 @@ def test_nothing_at_the_end_has_no_inertia():
 def test_a_rod_does_not_resist_turning_about_itself(axis):
     """Whatever rounding makes of its inertia there; nor does it when two other hinges are taken out before."""
     S, W = hinges(axis)
-    S.body_x[0, MASS], S.body_x[0, INERTIA : INERTIA + 9] = 1.0, slender(axis)
+    S.bodies.mass[0], S.bodies.inertia[0] = 1.0, slender(axis)
     assert articulate(S, W) == 1
     S, W = hinges(axis, [0.1, 0.9, 0.8], [0.9, -0.3, 0.2])
-    S.body_x[2, MASS], S.body_x[2, INERTIA : INERTIA + 9] = 1.0, slender(axis)
+    S.bodies.mass[2], S.bodies.inertia[2] = 1.0, slender(axis)
     assert articulate(S, W) == 1
-    S.body_i[0, BODY_LAW] = 0
+    S.tree.law[0] = 0
     assert articulate(S, W) == 0, "a driver needs no inertia"
 
 
 def test_two_hinges_on_one_axis_share_no_inertia():
     S, W = hinges([1, 2, 3], [1, 2, 3])
-    S.body_x[1, MASS], S.body_x[1, INERTIA : INERTIA + 9] = 1.0, np.diag([0.3, 0.5, 0.7]).ravel()
+    S.bodies.mass[1], S.bodies.inertia[1] = 1.0, np.diag([0.3, 0.5, 0.7]).ravel()
     W.BK[1, :3] = 0.3, 0.1, -0.2
     assert articulate(S, W) == 1
-    S.body_x[0, MASS], S.body_x[0, INERTIA : INERTIA + 9] = 1e-9, 1e-9 * np.eye(3).ravel()
+    S.bodies.mass[0], S.bodies.inertia[0] = 1e-9, 1e-9 * np.eye(3).ravel()
     assert articulate(S, W) == 0, "a small inertia is one"
 
 
@@ -266,9 +261,9 @@ def test_complex_steps_go_through():
     S, W = forest(9)
     f, h = np.random.default_rng(0).normal(size=W.X.shape[0]), 1e-30
     M = dense(S, W)
-    b = int(np.argmax(S.body_x[:, MASS]))
-    S.body_x = S.body_x.astype(complex)
-    S.body_x[b, MASS] += h * 1j
+    b = int(np.argmax(S.bodies.mass))
+    S.bodies = Bodies(*(x.astype(complex) for x in S.bodies))
+    S.bodies.mass[b] += h * 1j
     dM = dense(S, SimpleNamespace(**{k: a.astype(complex) for k, a in vars(W).items()})).imag / h
     C = SimpleNamespace(**{k: a.astype(complex) for k, a in vars(W).items()})
     assert articulate(S, C) == 0
@@ -328,20 +323,20 @@ def test_newton_and_euler_agree(planar, floating):
     assert x == pytest.approx(dy[s.nq : s.nq + s.nv], abs=1e-10 * np.abs(x).max())
     r = Records(c.values, c.values.q[None], v[None], x[None])
     left, terms = np.zeros(s.nv), 0.0
-    for b in range(len(S.body_i)):
+    for b in range(len(S.tree.parent)):
         p, R, w, _, alpha, a = (np.ravel(part) for part in r.body(b))
         R = R.reshape(3, 3)
-        inertia = R @ S.body_x[b, INERTIA : INERTIA + 9].reshape(3, 3) @ R.T
-        force = S.body_x[b, MASS] * (a - S.glob[:3])
+        inertia = R @ S.bodies.inertia[b].reshape(3, 3) @ R.T
+        force = S.bodies.mass[b] * (a - S.gravity)
         torque = inertia @ alpha + np.cross(w, inertia @ w)
         k = b
         while k >= 0:
-            for i in range(S.body_i[k, NV]):
+            for i in range(S.tree.nv[k]):
                 turn, shift = column(S, W, k, i)
                 power = np.dot(shift, force) + np.dot(turn, torque + np.cross(p - W.O[k], force))
-                left[S.body_i[k, V0] + i] += power
+                left[S.tree.v[k] + i] += power
                 terms = max(terms, abs(power))
-            k = S.body_i[k, PARENT]
+            k = S.tree.parent[k]
     assert terms > 1.0
     assert left == pytest.approx(0.0, abs=1e-12 * terms)
 
@@ -366,9 +361,9 @@ def test_driven_joints_of_a_mechanism():
     m, hung = tree(False, False)
     c = compiled(m, tree=hung)
     s, W = c.structure, c.work
-    S = c.values.system._replace(body_i=c.values.system.body_i.copy())
+    S = c.values.system._replace(tree=Tree(*(x.copy() for x in c.values.system.tree)))
     assert c.at(0.0, c.values.q, c.values.v, MOTION)[0] == 0
-    S.body_i[0, BODY_LAW] = 0
+    S.tree.law[0] = 0
     M = dense(S, W)
     f = W.vel[F_APPLIED].copy()
     assert articulate(S, W) == 0

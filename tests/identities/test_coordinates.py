@@ -15,7 +15,7 @@ from flyball.equations.records import load
 from flyball.results.records import Records
 from flyball.tables import coordinates
 from flyball.tables.cost import cost, least
-from flyball.tables.system import EFFORT, F_APPLIED, GAMMA, LAM, V0, X_SOLVED
+from flyball.tables.system import EFFORT, F_APPLIED, GAMMA, LAM, X_SOLVED
 from tests.mechanisms import bricard, example, four_bar, planar_rod, spatial_four_bar
 from tests.verification.test_reactions import actuated
 
@@ -140,9 +140,11 @@ def mass_matrix(c, t, q):
     for unit in np.eye(s.nv):
         c.at(t, q, unit)
         parts = []
-        for b in range(len(S.body_i)):
+        for b in range(len(S.tree.parent)):
             _, R, w, u, _, _ = load(W.BK, b)
-            parts.append((S.body_x[b, 0], np.array(u), S.body_x[b, 1:10].reshape(3, 3), np.reshape(R, (3, 3)).T @ w))
+            parts.append(
+                (S.bodies.mass[b], np.array(u), S.bodies.inertia[b].reshape(3, 3), np.reshape(R, (3, 3)).T @ w)
+            )
         moved.append(parts)
     return np.array(
         [
@@ -163,11 +165,11 @@ def test_mass_matrix_is_that_of_the_bodies(case):
     exact = mass_matrix(c, 0.0, c.values.q)
     assert np.linalg.eigvalsh(exact).min() > 0
     c.at(0.0, c.values.q, np.zeros(s.nv), MOTION)
-    if not len(S.mass_i):
+    if not len(S.mass_entries.row):
         pytest.skip("without rows M is never made")
     mass_entries(S, c.work)
     M = np.zeros((s.nv, s.nv))
-    M[S.mass_i[:, 0], S.mass_i[:, 1]] = c.work.M
+    M[S.mass_entries.row, S.mass_entries.column] = c.work.M
     assert pytest.approx(np.tril(exact), abs=1e-12 * np.abs(exact).max()) == M
 
 
@@ -186,7 +188,7 @@ def test_joint_layer_solves_the_equations_of_motion(case):
     M = mass_matrix(c, T, Q)
     c.at(T, Q, V, MOTION)
     G, x, f = c.jacobian(), W.vel[X_SOLVED], W.vel[F_APPLIED]
-    driven = S.body_i[list(s.prescribed.values()), V0]
+    driven = S.tree.v[list(s.prescribed.values())]
     free = np.delete(np.arange(s.nv), driven)
     K = np.block([[M[np.ix_(free, free)], G[:, free].T], [G[:, free], np.zeros((len(G), len(G)))]])
     known = np.r_[f[free] - M[np.ix_(free, driven)] @ x[driven], W.row[GAMMA] - G[:, driven] @ x[driven]]

@@ -93,7 +93,7 @@ def test_slopes_of_forces_are_their_stiffness_and_damping():
     y = np.r_[a.q, a.v, c.z]
     y[7:10] += 0.02, -0.01, 0.03  # of c
     evaluate(c.system, c.work, 0.0, y, MOTION)
-    found = perform(c, y, SLOPES, len(c.system.force_i), SLOPE_WIDTH)[0]
+    found = perform(c, y, SLOPES, len(c.system.forces.F), SLOPE_WIDTH)[0]
     along, between = sorted(found, key=lambda row: np.count_nonzero(row[STIFFNESS:DAMPING]))
     assert along[[STIFFNESS, DAMPING]] == pytest.approx([40.0, 3.0], rel=1e-6)
     assert along[ALONG] == pytest.approx(-40.0 * 0.1 - 3.0 * 0.2, rel=1e-9)
@@ -112,6 +112,6 @@ def test_a_stop_that_a_mass_leaves_is_none_to_rounding_on_both_sides():
     for v in (1.0, -1.0):
         for x in (0.5 - rounding, -0.5 + rounding):
             evaluate(c.system, c.work, 0.0, np.array([x, v]), POSITION)
-            guards = perform(c, np.array([x, v]), WATCH, width=len(c.system.guard_i))[0][0]
+            guards = perform(c, np.array([x, v]), WATCH, width=len(c.system.guards.kind))[0][0]
             near = float(guards[np.abs(guards) < 0.1].item())
             assert near == (rounding if x * v > 0.0 else 0.0)

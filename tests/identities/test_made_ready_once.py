@@ -20,6 +20,7 @@ from flyball.model.kept import Kept
 from flyball.tables.numbers import numbers
 from flyball.tables.spanning import spanning
 from flyball.tables.structure import Choices, structure
+from flyball.tables.system import NUMBERS, arrays
 from flyball.tables.values import Values, values
 from tests import mechanisms
 from tests.complex_steps import with_parameters
@@ -27,11 +28,10 @@ from tests.contract import zoo
 from tests.examples.test_examples import FILES
 
 CLOCKED = ("seconds", "compiling")  # what the clock says of a motion differs from run to run
-TABLES = ("body_x", "frame_x", "term_x", "force_x", "const", "glob")
 
 
 def bits(x: Values) -> dict[str, bytes]:
-    found = {name: getattr(x.system, name) for name in TABLES} | {"q": x.q, "v": x.v}
+    found = {k: a for name in NUMBERS for k, a in arrays(getattr(x.system, name), name)} | {"q": x.q, "v": x.v}
     return {name: a.tobytes() for name, a in found.items()}
 
 

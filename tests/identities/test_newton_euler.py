@@ -13,7 +13,7 @@ from flyball.equations.tree import column
 from flyball.math.vec import dot
 from flyball.tables.spanning import spanning
 from flyball.tables.structure import Choices, structure
-from flyball.tables.system import FRAMES, GROUND_FRAMES, MASS, NV
+from flyball.tables.system import FRAMES, GROUND_FRAMES
 from tests.contract.zoo import CASES
 from tests.examples.test_examples import FILES, mechanism
 from tests.identities.test_joint_layer import PARTS, coupled, with_joint
@@ -35,18 +35,18 @@ def residual(r):
     through = r.reactions.through
     driven = {b: r.multipliers[:, s.slices[name].start] for name, b in s.prescribed.items()}
     largest = 0.0
-    for b in range(len(S.body_i)):
+    for b in range(len(S.tree.parent)):
         force, torque = through[b, :3], through[b, 3:]
         arm = np.array(r.records.body(b)[0]) - W.O[b]
         moment = torque + np.cross(arm, force, axis=0)  # about the joint's point
-        for k in range(S.body_i[b, NV]):
+        for k in range(S.tree.nv[b]):
             turn, shift = (np.stack([x + 0.0 * force[0] for x in part]) for part in column(S, W, b, k))
             along = (turn * moment).sum(axis=0) + (shift * force).sum(axis=0) - driven.get(b, 0.0)
             unit = length if turn.any() else 1.0
             largest = max(largest, np.abs(along).max() / unit)
     needs = [
-        S.body_x[b, 0] * np.abs(np.subtract(np.array(r.records.body(b)[5]).T, S.glob[:3])).max()
-        for b in range(len(S.body_i))
+        S.bodies.mass[b] * np.abs(np.subtract(np.array(r.records.body(b)[5]).T, S.gravity)).max()
+        for b in range(len(S.tree.parent))
     ]
     acting: list[float] = []
     for j in r.model.joints:
@@ -118,12 +118,12 @@ def test_tree_joints_carry_nothing_along_their_coordinates(case):
     r = m.simulate(0.05, outputs=5, coordinates="joint")
     S, s = r.values.system, r.values.structure
     driver = {b: name for name, b in s.prescribed.items()}
-    weight = np.abs(S.glob[:3]).max() * S.body_x[:, MASS].max()
+    weight = np.abs(S.gravity).max() * S.bodies.mass.max()
     largest = max([1e-3, weight, *(np.abs(np.array(r.reactions.of(j.name)[0])).max() for j in m.joints)])
-    for b in range(len(S.body_i)):
+    for b in range(len(S.tree.parent)):
         force, torque, p = r.reactions.through[b, :3], r.reactions.through[b, 3:], r.records.body(b)[0]
         at_joint = torque + np.cross(np.subtract(p, r.records.W.O[b]), force, axis=0)
-        for k in range(S.body_i[b, NV]):
+        for k in range(S.tree.nv[b]):
             turn, shift = column(S, r.records.W, b, k)
             effort = r[driver[b]].effort if b in driver else 0.0
             assert dot(turn, at_joint) + dot(shift, force) == pytest.approx(effort + 0.0 * r.t, abs=1e-10 * largest)

@@ -67,7 +67,7 @@ def absolute(r, structure):
     for name, b in structure.place.items():
         if b >= 0:
             _, R, _, _, alpha, a = (np.array(part)[..., 0] for part in r.records.body(r.values.structure.place[name]))
-            at = structure.tables["body_i"][b, 3]
+            at = structure.tables["tree"].v[b]
             own = (a[0], a[1], alpha[2]) if r.planar else (*a, *(R.reshape(3, 3).T @ alpha))
             x[at : at + len(own)] = own
     return x

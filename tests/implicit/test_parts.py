@@ -12,7 +12,7 @@ from flyball.analysis.motion.start import begin
 from flyball.analysis.motion.touches import with_places
 from flyball.equations.residual import stepped
 from flyball.equations.tasks import PARTS, PUSHES, Bench
-from flyball.tables.system import FORCE_ALONG, FORCE_SWITCH, HELD, MODE, OFF, SLIDING, SWITCH_OTHER
+from flyball.tables.system import HELD, MODE, OFF, SLIDING
 from tests.contract.test_everything import everything
 from tests.contract.zoo import joined
 from tests.mechanisms import example
@@ -47,9 +47,8 @@ def test_jacobians_from_parts_are_those_of_the_whole(name, coordinates):
     x.vdot, x.lam = rng.normal(size=s.nv), rng.normal(size=len(s.rows))
     full = Equations(x)
     SC, WC = full.complex_tables
-    for force in S.force_i[S.force_i[:, FORCE_ALONG] == SLIDING]:
-        slip = force[FORCE_SWITCH]
-        WC.switch[MODE, slip], WC.switch[MODE, S.switch_i[slip, SWITCH_OTHER]] = OFF, HELD
+    for slip in S.forces.switch[S.forces.family == SLIDING]:
+        WC.switch[MODE, slip], WC.switch[MODE, S.switches.other[slip]] = OFF, HELD
     made, nv = layout(s, S), s.nv
 
     def by(kinds, terms, task):

@@ -12,7 +12,7 @@ from flyball.equations.engine import ARRIVE, MOTION, REPORT, RESIDUAL, engine, m
 from flyball.equations.tasks import Sheet
 from flyball.numerics.integrators.clock import Clock, T
 from flyball.numerics.integrators.tableaux import Tableau, tableau
-from flyball.tables.system import LAM, System, Work
+from flyball.tables.system import LAM, Bodies, System, Work
 from tests.layers import LAYERS
 
 
@@ -56,7 +56,7 @@ def desk(model, coordinates):
         np.zeros((6, 0)),
     )  # fmt: skip
     clock.y[0] = start.y
-    width = 1 + n + s.nv + 3 * len(S.row_i) + 3 * len(s.measured) + len(s.prescribed)
+    width = 1 + n + s.nv + 3 * len(S.rows.law) + 3 * len(s.measured) + len(s.prescribed)
     return s, S, c.work, tableau("rk45"), clock, Sheet(np.zeros((3, width)))
 
 
@@ -78,13 +78,13 @@ def test_tasks_agree_with_each_other(coordinates):
     assert 0.0 <= moved < 1e-9
     assert motion_kernel(S, W, R, clock, sheet.rows, MOTION) == 0
     vdot = clock.K[0, s.nq : s.nq + s.nv].copy()
-    nr = len(S.row_i)
+    nr = len(S.rows.law)
     lam = W.row[LAM].copy()
     out = np.zeros((3, sheet.rows.shape[1]))
     out[1, : s.nv], out[2, :nr] = vdot, lam
     assert motion_kernel(S, W, R, clock, out, RESIDUAL) == 0
     free = np.ones(s.nv, bool)
-    free[[int(S.body_i[b, 3]) for b in s.prescribed.values()]] = False
+    free[[int(S.tree.v[b]) for b in s.prescribed.values()]] = False
     largest = np.abs(lam).max(initial=1.0)
     assert np.abs(out[0, : s.nv][free]).max(initial=0.0) < 1e-9 * largest
     assert np.abs(out[0, s.nv : s.nv + 2 * nr]).max(initial=0.0) < 1e-9
@@ -97,7 +97,7 @@ def test_tasks_agree_with_each_other(coordinates):
 def test_other_tables_than_those_it_was_made_for_are_refused():
     """Complex tables would be read as if they were real."""
     _, S, W, R, clock, sheet = desk(fb.load("examples/slider_crank.toml"), "absolute")
-    complex_tables = S._replace(body_x=S.body_x.astype(complex))
+    complex_tables = S._replace(bodies=Bodies(*(x.astype(complex) for x in S.bodies)))
     with pytest.raises(Exception, match=r"System\.frame_x: an array of complex128"):
         motion_kernel(complex_tables, W, R, clock, sheet.rows, MOTION)
 

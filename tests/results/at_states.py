@@ -12,14 +12,14 @@ from flyball.analysis.compiled import Compiled
 from flyball.analysis.mobility import mobility
 from flyball.equations.engine import MOTION
 from flyball.results.result import Result
-from flyball.tables.system import BODY_LAW, EFFORT, LAM, V0, X_SOLVED
+from flyball.tables.system import EFFORT, LAM, X_SOLVED
 from tests.results.made_up import healthy
 
 
 def result_at(c: Compiled, times: Sequence[float], states: Sequence[tuple[np.ndarray, ...]]) -> Result:
     """The mechanism at those times in those states (q, v, z), with its accelerations and multipliers there."""
     s, S, W = c.structure, c.values.system, c.work
-    driven = S.body_i[S.body_i[:, BODY_LAW] >= 0, V0]
+    driven = S.tree.v[S.tree.law >= 0]
     rows = []
     for t, (q, v, z) in zip(times, states, strict=True):
         c.z = z.copy()

@@ -37,7 +37,7 @@ def sliding(force):
 def test_at_once(text):
     r = sliding(text).simulate(1.0, outputs=T)
     S = r.values.system
-    assert takes_arrays(S.code, int(S.force_i[0, 2]))
+    assert takes_arrays(S.code, int(S.forces.laws[0, 0]))
     np.testing.assert_allclose(r["a"].force, LAWS[text](T, r["s"].displacement, r["s"].displacement_rate), rtol=1e-13)
 
 
@@ -59,5 +59,5 @@ def test_number_by_number():
     m.add(fb.Actuator("c", "s.displacement", force="2*push(t)"))
     r = m.simulate(1.0, outputs=T)
     S = r.values.system
-    assert [takes_arrays(S.code, int(at)) for at in S.force_i[:, 2]] == [True, False]
+    assert [takes_arrays(S.code, int(at)) for at in S.forces.laws[:, 0]] == [True, False]
     np.testing.assert_allclose(r["c"].force, 2 * np.interp(T, [0, 0.5, 1], [0, 1, 4]), atol=1e-12)

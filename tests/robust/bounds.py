@@ -7,14 +7,14 @@ import numpy as np
 from flyball.constraints.modes import ONE_WAY, RATCHET, STOP
 from flyball.model.touch import Touch
 from flyball.results.result import Result
-from flyball.tables.system import SWITCH_LOWER, SWITCH_PITCH, SWITCH_UPPER
 
 PAST, PULLED = 1e-7, 1e-6
 
 
 def against(r: Result) -> str:
     """What was passed or pulled, in words; empty if nothing was."""
-    for x, row in zip(r.values.structure.switches, r.values.system.switch_x, strict=True):
+    numbers = r.values.system.switch_numbers
+    for k, x in enumerate(r.values.structure.switches):
         e = x.element
         if (
             isinstance(e, Touch)
@@ -30,9 +30,9 @@ def against(r: Result) -> str:
         if x.switch.kind == STOP and not rope:
             push = push * told.closed
         past = {
-            STOP: np.maximum(row[SWITCH_LOWER] - value, value - row[SWITCH_UPPER]),
+            STOP: np.maximum(numbers.lower[k] - value, value - numbers.upper[k]),
             ONE_WAY: np.maximum.accumulate(value) - value,
-            RATCHET: np.maximum.accumulate(value) - value - row[SWITCH_PITCH],
+            RATCHET: np.maximum.accumulate(value) - value - numbers.pitch[k],
         }[x.switch.kind]
         size = max(1.0, r.values.length)
         if past.max() > PAST * size:

@@ -61,7 +61,7 @@ def values_of(model, coordinates="joint", parameters=None):
 def states(x, y, seed=0):
     """States near the start, some velocities in all that moves: rows (t, y, ...) of output."""
     s, rng = x.structure, np.random.default_rng(seed)
-    nv, nr = s.nv, len(x.system.row_i)
+    nv, nr = s.nv, len(x.system.rows.law)
     rows = np.zeros((STATES, 1 + len(y) + nv + nr + nv))
     rows[:, 0] = rng.uniform(0.0, 0.3, STATES)
     rows[:, 1 : 1 + len(y)] = y + np.r_[0.02 * np.ones(s.nq), np.ones(nv), np.zeros(len(s.states))] * rng.normal(
@@ -105,7 +105,9 @@ def equal(x, tables, ours):
         near = REDUNDANT * (1.0 + size) if name == "lam" else EQUAL * size
         assert np.abs(theirs[name] - b).max(initial=0.0) <= near, name
     S, v = x.system, ours[1][0, here][x.structure.nq :]
-    terms = ours[2].G[: S.row_p[len(S.row_i)]] * v[S.col_i[: S.row_p[len(S.row_i)]]]  # of G v, by whose size it drifts
+    terms = (
+        ours[2].G[: S.row_start[len(S.rows.law)]] * v[S.column[: S.row_start[len(S.rows.law)]]]
+    )  # of G v, by whose size it drifts
     assert ours[2].flat[TERMS] == pytest.approx(np.abs(terms).max(initial=0.0), rel=1e-12)
 
 

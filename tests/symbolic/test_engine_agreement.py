@@ -28,7 +28,7 @@ def quaternions_of(c):
     """Places of quaternions in q."""
     from flyball.equations.tree import quaternion_at
 
-    at = (quaternion_at(c.values.system, b)[0] for b in range(len(c.values.system.body_i)))
+    at = (quaternion_at(c.values.system, b)[0] for b in range(len(c.values.system.tree.parent)))
     return [k for k in at if k >= 0]
 
 
@@ -48,9 +48,9 @@ def engine_at(c, rng):
     state |= {f"v[{k}]": x for k, x in enumerate(W.y[0, s.nq : s.nq + s.nv])}
     state |= {f"load[{k}]": x for k, x in enumerate(W.sensed[LOAD, 2 * nm :])}
     M = np.zeros((s.nv, s.nv))
-    for e, (i, j, _) in enumerate(c.values.system.mass_i):
-        M[i, j] = M[j, i] = W.M[e]
-    found = {"M": M if len(c.values.system.mass_i) else c.mass().toarray(), "f": W.vel[F_APPLIED], "G": c.jacobian()}
+    i, j, _ = c.values.system.mass_entries
+    M[i, j] = M[j, i] = W.M
+    found = {"M": M if len(i) else c.mass().toarray(), "f": W.vel[F_APPLIED], "G": c.jacobian()}
     found |= {name: W.row[k] for name, k in (("g", G_VALUE), ("nu", NU), ("gamma", GAMMA))}
     found["measured"] = W.sensed[:3, :nm].T
     return state, {name: np.array(x) for name, x in found.items()}

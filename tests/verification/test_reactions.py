@@ -82,7 +82,7 @@ def loads(r):
             yield body, p, force, torque
     for f in m.forces:
         force, torque = r[f.name].wrench
-        frame = r.values.system.force_i[next(i for i, e in enumerate(r.values.structure.forces) if e is f), 1]
+        frame = r.values.system.forces.M[next(i for i, e in enumerate(r.values.structure.forces) if e is f)]
         p = np.stack(r.records.frame(int(frame))[0], axis=1)
         joint = m[f.joint] if hasattr(f, "joint") else None
         ends = (joint.body_j, joint.body_i) if joint else (f.body_j, f.body_i) if hasattr(f, "body_j") else (f.body,)
@@ -151,7 +151,7 @@ def test_newton_and_euler(name):
     r = motion(name)
     s, n = r.values.structure, len(r.t)
     S = r.values.system
-    force = {b: np.tile(S.body_x[k, 0] * S.glob[:3], (n, 1)) for b, k in s.place.items() if k >= 0}
+    force = {b: np.tile(S.bodies.mass[k] * S.gravity, (n, 1)) for b, k in s.place.items() if k >= 0}
     moment = {b: np.zeros((n, 3)) for b in force}
     largest = 1.0
     for body, p, f, t in loads(r):
@@ -166,7 +166,7 @@ def test_newton_and_euler(name):
         w, alpha, a = (np.stack(x, axis=1) for x in (record[2], record[4], record[5]))
         J = R @ r.values.bodies[body].inertia @ R.transpose(0, 2, 1)
         h = np.einsum("nij,nj->ni", J, w)
-        assert total == pytest.approx(S.body_x[s.place[body], 0] * a, abs=1e-9 * largest)
+        assert total == pytest.approx(S.bodies.mass[s.place[body]] * a, abs=1e-9 * largest)
         rate = np.einsum("nij,nj->ni", J, alpha) + np.cross(w, h)
         axes = [2] if r.planar else [0, 1, 2]
         assert moment[body][:, axes] == pytest.approx(rate[:, axes], abs=1e-9 * largest)
