@@ -92,7 +92,7 @@ def test_a_violated_velocity_goes_on_as_the_equations_of_drift_say(kind, g, rate
     found = np.zeros((2, len(r.t), len(Gd)))
     for k, at in enumerate(r.t):
         c.at(at, r.q[k].copy(), r.v[k].copy())
-        found[:, k] = c.work.row[G_VALUE], c.jacobian() @ r.v[k] - c.work.row[NU]
+        found[:, k] = c.work.rows.value, c.jacobian() @ r.v[k] - c.work.rows.nu
     others = np.arange(len(Gd)) != 3
     small = 1e-3 * e  # of second order in e, and of the steps
     assert found[0][:, 3] == pytest.approx(e * g(r.t - t), abs=small)
@@ -183,9 +183,9 @@ def test_a_poor_choice_is_mended(monkeypatch, coordinates):
         c = start.assembly.compiled
         wanted = "D.displacement" if coordinates == "joint" else "slider.x"
         at = [n.name for n in velocity_names(c.structure)].index(wanted)
-        size = np.abs(c.work.vel[PARTITION])
-        c.work.vel[PARTITION] = size
-        c.work.vel[PARTITION, at] = -size[at]
+        size = np.abs(c.work.velocities.partition)
+        c.work.velocities.partition = size
+        c.work.velocities.partition[at] = -size[at]
         starts.append(start)
 
     monkeypatch.setattr(partition, "choose", poor)
@@ -195,7 +195,7 @@ def test_a_poor_choice_is_mended(monkeypatch, coordinates):
     )
     assert r["A.angle"] == pytest.approx(true["A.angle"], abs=1e-7)
     assert np.ptp(true["A.angle"]) > 4 * np.pi
-    assert starts[0].assembly.compiled.work.info[EXCHANGES] >= 1
+    assert starts[0].assembly.compiled.work.counts.exchanges[0] >= 1
     assert len(partition.independent(starts[0])) == 1
 
 
@@ -207,7 +207,7 @@ def test_independent_coordinates_stay_as_they_are(make):
     partition.choose(m, start)
     c, nq = start.assembly.compiled, start.assembly.compiled.structure.nq
     W = c.work
-    own = W.vel[PARTITION] < 0.0
+    own = W.velocities.partition < 0.0
     assert own.sum() == 1
     random = np.random.default_rng(1)
     q = start.assembly.q + 1e-4 * random.standard_normal(nq)
@@ -216,13 +216,13 @@ def test_independent_coordinates_stay_as_they_are(make):
     status, _ = c.at(0.0, q, v, MOTION)
     assert status == 0
     settled = W.y[0].copy()
-    W.option[STABILIZE] = projection.NONE
+    W.options.stabilize[0] = projection.NONE
     c.at(0.0, settled[:nq].copy(), settled[nq : nq + len(v)].copy())
-    assert np.abs(W.row[G_VALUE]).max() < ROUNDING
+    assert np.abs(W.rows.value).max() < ROUNDING
     rows, moved = c.jacobian(), settled[nq : nq + len(v)]
-    assert np.abs(rows @ moved - W.row[NU]).max() < 1e-11
+    assert np.abs(rows @ moved - W.rows.nu).max() < 1e-11
     assert (moved[own] == v[own]).all()
-    by_hand = np.linalg.lstsq(rows[:, ~own], W.row[NU] - rows[:, own] @ v[own], rcond=1e-9)[0]
+    by_hand = np.linalg.lstsq(rows[:, ~own], W.rows.nu - rows[:, own] @ v[own], rcond=1e-9)[0]
     assert moved[~own] == pytest.approx(by_hand, abs=1e-9)
     if m.planar:
         assert (settled[:nq][own] == q[own]).all()  # coordinates and velocities are the same in the plane
@@ -241,7 +241,7 @@ def test_both_matrices_give_the_same_accelerations(make):
         assert c.structure.tables["kinds"][SOLVER] == solver
         c.z = a.compiled.z.copy()
         assert c.at(0.0, a.q, a.v, MOTION)[0] == 0
-        found.append((c.work.vel[X_SOLVED].copy(), c.jacobian().T @ c.work.row[LAM]))
+        found.append((c.work.velocities.solved.copy(), c.jacobian().T @ c.work.rows.multiplier))
     for x, y in zip(*found, strict=True):
         assert x == pytest.approx(y, abs=1e-9 * max(np.abs(y).max(), 1.0))
 

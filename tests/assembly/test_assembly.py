@@ -54,8 +54,8 @@ def closed(model, a):
         if {"zx", "zy"} <= kinds:
             F, M = (load(c.work.FK, s.frame_at[j.name, role, ""])[1] for role in "FM")
             parallel[j.name] = F[2] * M[2] + F[5] * M[5] + F[8] * M[8]
-    rates = c.jacobian() @ a.v - c.work.row[NU]
-    return np.abs(c.work.row[G_VALUE]).max(), np.abs(rates).max(), parallel
+    rates = c.jacobian() @ a.v - c.work.rows.nu
+    return np.abs(c.work.rows.value).max(), np.abs(rates).max(), parallel
 
 
 def assert_closed(model, a):

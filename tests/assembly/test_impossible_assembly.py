@@ -125,7 +125,7 @@ def test_far_from_the_origin_closed_is_what_rounding_allows(away):
         m.add(e)
     a = m.assemble()
     a.compiled.at(0.0, a.q, a.v)
-    assert np.abs(a.compiled.work.row[G_VALUE]).max() < 1e-10 + 16 * np.finfo(float).eps * away
+    assert np.abs(a.compiled.work.rows.value).max() < 1e-10 + 16 * np.finfo(float).eps * away
 
 
 @pytest.mark.parametrize("size", [1e-6, 1e3])
@@ -137,4 +137,4 @@ def test_closed_is_relative_to_the_size(size):
         m.add(replace(e, position=tuple(size * x for x in e.position)) if isinstance(e, (fb.Body, fb.Frame)) else e)
     a = m.assemble()
     a.compiled.at(0.0, a.q, a.v)
-    assert np.abs(a.compiled.work.row[G_VALUE]).max() < 1e-10 * size
+    assert np.abs(a.compiled.work.rows.value).max() < 1e-10 * size

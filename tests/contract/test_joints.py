@@ -124,7 +124,7 @@ def test_accelerations_fulfil_the_rows(where, name):
     for k in (0, 200, 400):
         c.z = r.states[k].copy()
         _, dy = c.at(r.t[k], r.q[k], r.v[k], MOTION)
-        gamma = c.work.row[GAMMA]
+        gamma = c.work.rows.gamma
         largest = np.abs(gamma).max(initial=0.0)  # a tree joint may have left no row
         assert c.jacobian() @ dy[nq : nq + nv] == pytest.approx(gamma, abs=1e-10 * (1.0 + largest))
         assert r.vdot[k] == pytest.approx(dy[nq : nq + nv], rel=1e-8, abs=1e-8 * np.abs(dy).max())

@@ -29,7 +29,7 @@ def standing(m, coordinates) -> Here:
 
 def modes(here: Here) -> list[float]:
     """Of all switches."""
-    return here.c.work.switch[MODE].tolist()
+    return here.c.work.modes.mode.tolist()
 
 
 def ways(here: Here) -> list[float]:

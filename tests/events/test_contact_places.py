@@ -37,13 +37,13 @@ def moving(m, modes, ways, coordinates="absolute"):
     a = begin(with_places(m, None), 0.0, None, None, coordinates, switches=True).assembly
     c = a.compiled
     W, n = c.work, len(c.structure.switches)
-    W.switch[MODE, : len(modes)] = modes
+    W.modes.mode[: len(modes)] = modes
     W.sensed[VALUE, W.sensed.shape[1] - n : W.sensed.shape[1] - n + len(ways)] = ways
-    W.info[LEARNT] = FORGOTTEN
+    W.counts.learnt[0] = FORGOTTEN
     status, dy = c.at(a.t, a.q, a.v, MOTION)
     assert status == 0
     nq, nv = c.structure.nq, c.structure.nv
-    return dy[nq : nq + nv].copy(), W.row[LAM].copy(), c
+    return dy[nq : nq + nv].copy(), W.rows.multiplier.copy(), c
 
 
 def test_places_of_balls_boxes_and_capsules():

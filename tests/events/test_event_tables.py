@@ -68,7 +68,7 @@ def test_rows_that_let_go_are_measured_as_they_are(planar, tree):
     """Away from closed, the measured copy of each row of the joint has its value and gradient."""
     c = compiled(model(planar), tree=tree, switches=True)
     s, S = c.structure, c.system
-    c.work.switch[MODE] = HELD
+    c.work.modes.mode = HELD
     rng = np.random.default_rng(3)
     q = c.values.q + 0.05 * rng.standard_normal(s.nq)
     v = rng.standard_normal(s.nv)
@@ -78,7 +78,7 @@ def test_rows_that_let_go_are_measured_as_they_are(planar, tree):
     nr = len(S.rows.law)
     for k, row in enumerate(range(rows.start, rows.stop)):
         m = s.measured[own_row(s.model["W"], k)]
-        assert c.work.sensed[VALUE, m] == pytest.approx(c.work.row[G_VALUE, row], abs=1e-12)
+        assert c.work.sensed[VALUE, m] == pytest.approx(c.work.rows.value[row], abs=1e-12)
         gradient = np.zeros(s.nv)
         at = slice(S.row_start[nr + m], S.row_start[nr + m + 1])
         np.add.at(gradient, S.column[at], c.work.G[at])

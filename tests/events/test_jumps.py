@@ -48,7 +48,7 @@ def test_hinge_that_locks(coordinates):
     m = rows(rods(), Row("lock", of=("B.angle",)))
     here = standing(m, coordinates)
     here.kick = kicked(here, "a", (-2.0, 0.0), (0.0, 2.0))
-    here.c.work.switch[MODE, 0] = HELD
+    here.c.work.modes.mode[0] = HELD
     begin(here)
     w = -2.0 * 2.0 / (2 / 3 + 2.0)  # about the middle: r x P over the inertia of a rod of length 4 and mass 2
     now = moving(here)
@@ -89,7 +89,7 @@ def test_sudden_stop_of_a_double_rod(coordinates):
     (record,) = [r for r in here.records if r.kind == "impact"]
     # angular momentum about A: rod a 4/3 w, rod b 3 v_b + w_b / 3, before and after
     assert record.impulses["stop"] == pytest.approx((3 * w + w / 3) - (2.0 + 7.5 - 0.5 / 3), rel=1e-13)
-    assert modes(here) == [HELD] or here.c.work.switch[MODE, 0] == 0.0
+    assert modes(here) == [HELD] or here.c.work.modes.mode[0] == 0.0
 
 
 @BOTH
@@ -106,7 +106,7 @@ def test_second_hinge_of_a_double_pendulum_locks(coordinates):
     """Angular momentum about the first hinge is kept: (4/3 + 1/3 + 9) w = 4/3 w_a + 3 v_b + w_b / 3."""
     m = rows(turning(1.0, -2.0), Row("lock", of=("B.angle",)))
     here = standing(m, coordinates)
-    here.c.work.switch[MODE, 0] = HELD
+    here.c.work.modes.mode[0] = HELD
     begin(here)
     w = (4 / 3 + 0.0 - 2 / 3) / (4 / 3 + 1 / 3 + 9)
     np.testing.assert_allclose([moving(here)[x][2] for x in "ab"], w, rtol=1e-13)

@@ -29,7 +29,7 @@ def table(middle, load=1.0):
 def carried(here):
     c = here.c
     c.at(here.t, here.q, here.v, MOTION)
-    return np.array([c.work.row[LAM, s.row] for s in c.structure.switches])
+    return np.array([c.work.rows.multiplier[s.row] for s in c.structure.switches])
 
 
 @BOTH

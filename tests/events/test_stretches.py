@@ -59,7 +59,7 @@ def row(c, t, x, v):
     c.at(t, q, w, MOTION)
     dy = c.at(t, q, w, MOTION)[1]
     n = c.structure.nq
-    return np.r_[t, q, w, c.z, dy[n : n + 1], c.work.row[LAM]]
+    return np.r_[t, q, w, c.z, dy[n : n + 1], c.work.rows.multiplier]
 
 
 def two_stretches(damping=0.0):

@@ -62,7 +62,7 @@ def test_off_it_is_as_if_it_were_not_there(coordinates):
     wanted = plain.at(a.t, a.q, a.v, MOTION)[1]
     assert status == 0
     assert np.allclose(dy[: len(wanted)], wanted, rtol=1e-11, atol=1e-11)
-    assert c.work.row[LAM, c.structure.switches[0].row] == 0.0
+    assert c.work.rows.multiplier[c.structure.switches[0].row] == 0.0
 
 
 @pytest.mark.parametrize("coordinates", ["absolute", "joint"])
@@ -70,7 +70,7 @@ def test_held_it_is_a_pendulum_of_one_piece(coordinates):
     """Both bodies turn as one: (I_a + I_b + m_a 0.5^2 + m_b 1.5^2) alpha = -g (m_a 0.5 + m_b 1.5)."""
     a = double(("B.angle",), coordinates)
     c, k = a.compiled, a.compiled.structure.switches[0]
-    c.work.switch[MODE, 0], c.work.switch[HOLD, 0] = HELD, 0.0
+    c.work.modes.mode[0], c.work.modes.hold[0] = HELD, 0.0
     v = np.zeros_like(a.v)
     status, dy = c.at(a.t, a.q, v, MOTION)
     assert status == 0
@@ -81,7 +81,7 @@ def test_held_it_is_a_pendulum_of_one_piece(coordinates):
     turning = dy[nq + 2 :: 3] if coordinates == "absolute" else np.cumsum(dy[nq : nq + 2])
     assert np.allclose(turning, alpha, rtol=1e-12)
     held = 0.2 * alpha + 1.5 * (alpha * 1.5 + 9.81) - 1.0 * (alpha * 1.5 + 9.81)  # moments about B on body b
-    assert np.isclose(c.work.row[LAM, k.row], held, rtol=1e-11)
+    assert np.isclose(c.work.rows.multiplier[k.row], held, rtol=1e-11)
     assert c.work.row[0, k.row] == pytest.approx(0.0, abs=1e-15)
 
 
@@ -90,7 +90,7 @@ def test_weights_of_a_sum(coordinates):
     """A.angle - B.angle / 2 at rest in speed: accelerations keep the relation, the value counts for nothing."""
     a = double(("A.angle", "B.angle"), coordinates)
     c = a.compiled
-    c.work.switch[MODE, 0] = STEADY
+    c.work.modes.mode[0] = STEADY
     status, dy = c.at(a.t, a.q, np.zeros_like(a.v), MOTION)
     assert status == 0
     nq = c.structure.nq
@@ -109,5 +109,5 @@ def test_analyses_of_positions_know_nothing_of_it():
 
 def test_modes_begin_off():
     a = double(("A.angle",), "joint")
-    assert (a.compiled.work.switch[MODE] == OFF).all()
+    assert (a.compiled.work.modes.mode == OFF).all()
     assert a.compiled.work.sensed[VALUE, -1] == 0.0

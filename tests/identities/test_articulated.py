@@ -319,7 +319,7 @@ def test_newton_and_euler_agree(planar, floating):
     status, dy = c.at(0.0, c.values.q, v, MOTION)
     assert status == 0
     assert articulate(S, W) == 0
-    x, _ = solved(S, W, W.vel[F_APPLIED])
+    x, _ = solved(S, W, W.velocities.applied)
     assert x == pytest.approx(dy[s.nq : s.nq + s.nv], abs=1e-10 * np.abs(x).max())
     r = Records(c.values, c.values.q[None], v[None], x[None])
     left, terms = np.zeros(s.nv), 0.0
@@ -351,7 +351,7 @@ def test_a_mechanism_far_away_falls_as_a_near_one(planar):
         v = 2.0 * np.cos(np.arange(c.structure.nv))
         c.at(0.0, c.values.q, v, MOTION)
         assert articulate(c.values.system, c.work) == 0
-        found.append(solved(c.values.system, c.work, c.work.vel[F_APPLIED])[0])
+        found.append(solved(c.values.system, c.work, c.work.velocities.applied)[0])
     near, far = found
     assert far == pytest.approx(near, abs=1e-9 * np.abs(near).max())
 
@@ -365,7 +365,7 @@ def test_driven_joints_of_a_mechanism():
     assert c.at(0.0, c.values.q, c.values.v, MOTION)[0] == 0
     S.tree.law[0] = 0
     M = dense(S, W)
-    f = W.vel[F_APPLIED].copy()
+    f = W.velocities.applied.copy()
     assert articulate(S, W) == 0
     x, effort = solved(S, W, f, np.r_[3.0, np.zeros(s.nv - 1)])
     assert x[0] == 3.0

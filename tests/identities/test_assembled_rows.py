@@ -32,14 +32,14 @@ def moved(c, q, v, a, s):
     there, u = q.copy(), v + s * a
     retract(c.values.system, there, s * v)
     c.at(T + s, there, u)
-    return c.work.row[G_VALUE].copy(), c.jacobian() @ u - c.work.row[NU]
+    return c.work.rows.value.copy(), c.jacobian() @ u - c.work.rows.nu
 
 
 def examine(model, close=1e-6):
     for c, q, v, a in layers(model):
         (ahead, ahead_rate), (behind, behind_rate) = (moved(c, q, v, a, s) for s in (H, -H))
         c.at(T, q, v)
-        G, nu, gamma = c.jacobian(), c.work.row[NU].copy(), c.work.row[GAMMA].copy()
+        G, nu, gamma = c.jacobian(), c.work.rows.nu.copy(), c.work.rows.gamma.copy()
         valued = np.array([r.holonomic for r in c.structure.rows])
         assert (ahead - behind)[valued] / (2 * H) == pytest.approx((G @ v - nu)[valued], rel=1e-6, abs=1e-6)
         second = G @ a - gamma

@@ -115,7 +115,7 @@ def test_joint_coordinates_give_the_same_accelerations(case):
     for c, x, u in ((a.compiled, q, v), (tree, Q, V)):
         status, _ = c.at(T, x, u, MOTION)
         assert status == 0
-        r = Records(c.values, x[None], u[None], c.work.vel[X_SOLVED][None])
+        r = Records(c.values, x[None], u[None], c.work.velocities.solved[None])
         for name, b in c.structure.place.items():
             if b >= 0:
                 bodies.setdefault(name, []).append([np.ravel(part) for part in r.body(b)])
@@ -130,7 +130,7 @@ def test_joint_coordinates_give_the_same_accelerations(case):
     if case.startswith("four-bar"):
         rows = tree.structure.slices["C"]
         same = a.compiled.structure.slices["C"]
-        assert tree.work.row[LAM][rows] == pytest.approx(a.compiled.work.row[LAM][same], rel=1e-8)
+        assert tree.work.rows.multiplier[rows] == pytest.approx(a.compiled.work.rows.multiplier[same], rel=1e-8)
 
 
 def mass_matrix(c, t, q):
@@ -187,15 +187,15 @@ def test_joint_layer_solves_the_equations_of_motion(case):
     S, s, W = c.values.system, c.structure, c.work
     M = mass_matrix(c, T, Q)
     c.at(T, Q, V, MOTION)
-    G, x, f = c.jacobian(), W.vel[X_SOLVED], W.vel[F_APPLIED]
+    G, x, f = c.jacobian(), W.velocities.solved, W.velocities.applied
     driven = S.tree.v[list(s.prescribed.values())]
     free = np.delete(np.arange(s.nv), driven)
     K = np.block([[M[np.ix_(free, free)], G[:, free].T], [G[:, free], np.zeros((len(G), len(G)))]])
-    known = np.r_[f[free] - M[np.ix_(free, driven)] @ x[driven], W.row[GAMMA] - G[:, driven] @ x[driven]]
+    known = np.r_[f[free] - M[np.ix_(free, driven)] @ x[driven], W.rows.gamma - G[:, driven] @ x[driven]]
     exact = np.linalg.lstsq(K, known, rcond=1e-12)[0][: len(free)]
     assert x[free] == pytest.approx(exact, abs=2e-10 * np.abs(exact).max())
-    left = (M @ x - f - G.T @ W.row[LAM])[driven]
-    assert W.vel[EFFORT, driven] == pytest.approx(left, rel=1e-9)
+    left = (M @ x - f - G.T @ W.rows.multiplier)[driven]
+    assert W.velocities.effort[driven] == pytest.approx(left, rel=1e-9)
 
 
 def ladder(planar, n=45):

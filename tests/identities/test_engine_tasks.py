@@ -55,11 +55,11 @@ def test_baumgarte_restores_violated_rows(tree):
     c.work.option[[ALPHA, BETA, PASS]] = 5.0, 7.0, 1e-13
     found = []
     for choice in (NONE, BAUMGARTE):
-        c.work.option[STABILIZE] = choice
+        c.work.options.stabilize[0] = choice
         status, dy = evaluate(c.system, c.work, 0.3, np.r_[q, v, c.z], MOTION)
         assert status == 0
         found.append(c.jacobian() @ dy[len(q) : len(q) + len(v)])
-    g, lost = c.work.row[G_VALUE], c.jacobian() @ v - c.work.row[NU]
+    g, lost = c.work.rows.value, c.jacobian() @ v - c.work.rows.nu
     assert np.abs(lost).min() > 1e-3
     assert found[1] - found[0] == pytest.approx(-10.0 * lost - 49.0 * g, rel=1e-7, abs=1e-7)
 

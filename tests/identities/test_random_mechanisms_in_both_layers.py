@@ -46,8 +46,8 @@ def exact(a):
     """Accelerations in absolute coordinates by a dense solve; none where constraints are ill-conditioned or disagree."""
     c = a.compiled
     c.at(a.t, a.q, a.v, MOTION)
-    G, gamma, R = c.jacobian(), c.work.row[GAMMA], c.inverse_mass_root(np.ones(c.structure.nv))
-    x = R @ (R.T @ c.work.vel[F_APPLIED])  # without constraints
+    G, gamma, R = c.jacobian(), c.work.rows.gamma, c.inverse_mass_root(np.ones(c.structure.nv))
+    x = R @ (R.T @ c.work.velocities.applied)  # without constraints
     if len(G):
         B = G @ R
         size = np.linalg.norm(B, axis=1)

@@ -48,7 +48,7 @@ def test_jacobians_from_parts_are_those_of_the_whole(name, coordinates):
     full = Equations(x)
     SC, WC = full.complex_tables
     for slip in S.forces.switch[S.forces.family == SLIDING]:
-        WC.switch[MODE, slip], WC.switch[MODE, S.switches.other[slip]] = OFF, HELD
+        WC.modes.mode[slip], WC.modes.mode[S.switches.other[slip]] = OFF, HELD
     made, nv = layout(s, S), s.nv
 
     def by(kinds, terms, task):

@@ -79,7 +79,7 @@ def test_tasks_agree_with_each_other(coordinates):
     assert motion_kernel(S, W, R, clock, sheet.rows, MOTION) == 0
     vdot = clock.K[0, s.nq : s.nq + s.nv].copy()
     nr = len(S.rows.law)
-    lam = W.row[LAM].copy()
+    lam = W.rows.multiplier.copy()
     out = np.zeros((3, sheet.rows.shape[1]))
     out[1, : s.nv], out[2, :nr] = vdot, lam
     assert motion_kernel(S, W, R, clock, out, RESIDUAL) == 0
@@ -111,10 +111,10 @@ def test_a_kernel_with_its_structures_bound_to_it():
         clock.real[T] = t
         clock.y[0, s.nq : s.nq + s.nv] *= 1.0 - t
         status = motion_kernel(S, W, R, clock, sheet.rows, MOTION)
-        expected, lam = clock.K.copy(), W.row[LAM].copy()
+        expected, lam = clock.K.copy(), W.rows.multiplier.copy()
         clock.K[:], W.row[:], W.vel[:] = 0.0, 0.0, 0.0
         assert bound(MOTION) == status
-        assert (expected == clock.K).all() and (W.row[LAM] == lam).all()
+        assert (expected == clock.K).all() and (W.rows.multiplier == lam).all()
 
 
 def test_a_kernel_is_bound_to_structures_of_its_layout_only():

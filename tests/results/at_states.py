@@ -26,7 +26,7 @@ def result_at(c: Compiled, times: Sequence[float], states: Sequence[tuple[np.nda
         c.at(t, q, v)
         status, _ = c.at(t, q, v, MOTION)
         assert status == 0
-        rows.append((q, v, c.z.copy(), W.vel[X_SOLVED].copy(), np.r_[W.row[LAM], W.vel[EFFORT, driven]]))
+        rows.append((q, v, c.z.copy(), W.velocities.solved.copy(), np.r_[W.rows.multiplier, W.velocities.effort[driven]]))
     q, v, z, vdot, lam = (np.array(x) for x in zip(*rows, strict=True))
     return Result(s.model, c.values, np.array(times), q, v, z, vdot, lam, healthy())
 

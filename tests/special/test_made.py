@@ -87,9 +87,9 @@ def arrays(W, x):
     """What the engine leaves, by name."""
     nm = len(x.structure.measured)
     return {
-        "G": W.G, "g": W.row[G_VALUE], "nu": W.row[NU], "gamma": W.row[GAMMA], "f": W.vel[F_APPLIED],
-        "measured": W.sensed[VALUE, :nm], "rates": W.sensed[RATE, :nm], "x": W.vel[X_SOLVED], "M": W.M,
-        "effort": W.vel[EFFORT], "lam": W.row[LAM],
+        "G": W.G, "g": W.rows.value, "nu": W.rows.nu, "gamma": W.rows.gamma, "f": W.velocities.applied,
+        "measured": W.sensed[VALUE, :nm], "rates": W.sensed[RATE, :nm], "x": W.velocities.solved, "M": W.M,
+        "effort": W.velocities.effort, "lam": W.rows.multiplier,
     }  # fmt: skip
 
 

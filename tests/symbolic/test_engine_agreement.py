@@ -50,7 +50,7 @@ def engine_at(c, rng):
     M = np.zeros((s.nv, s.nv))
     i, j, _ = c.values.system.mass_entries
     M[i, j] = M[j, i] = W.M
-    found = {"M": M if len(i) else c.mass().toarray(), "f": W.vel[F_APPLIED], "G": c.jacobian()}
+    found = {"M": M if len(i) else c.mass().toarray(), "f": W.velocities.applied, "G": c.jacobian()}
     found |= {name: W.row[k] for name, k in (("g", G_VALUE), ("nu", NU), ("gamma", GAMMA))}
     found["measured"] = W.sensed[:3, :nm].T
     return state, {name: np.array(x) for name, x in found.items()}

@@ -98,12 +98,12 @@ def test_derivatives_of_the_constraints(name, seed):
     values, speeds = [], []
     for step in (-h, h):
         c.at(t + step, *carried_on(S, q, v, vdot, step))
-        values.append(W.row[G_VALUE].copy())
-        speeds.append(c.jacobian() @ (v + step * vdot) - W.row[NU])
+        values.append(W.rows.value.copy())
+        speeds.append(c.jacobian() @ (v + step * vdot) - W.rows.nu)
     c.at(t, q, v)
-    assert np.abs(W.row[G_VALUE]).max() > 1e-2, "off the constraints"
-    first = c.jacobian() @ v - W.row[NU]
-    second = c.jacobian() @ vdot - W.row[GAMMA]
+    assert np.abs(W.rows.value).max() > 1e-2, "off the constraints"
+    first = c.jacobian() @ v - W.rows.nu
+    second = c.jacobian() @ vdot - W.rows.gamma
     for row, what in enumerate(s.rows):
         title = (what.element.title, what.label)
         assert (values[1] - values[0])[row] / (2 * h) == pytest.approx(first[row], rel=1e-6, abs=1e-6), title

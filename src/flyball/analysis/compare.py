@@ -289,7 +289,7 @@ def _row(job: _Task, name: str, starts: dict[str, Start], truth: Result | None) 
     f = Formulation(name, way.meaning, not why, why or "reached the end", result.t, g, gv, result.energy.balance)
     f.steps, f.rejected, f.result = result.health.steps, result.health.rejected, result
     f.evaluations, f.factorisations = result.health.evaluations, result.health.factorisations
-    f.exchanges = int(start.assembly.compiled.work.info[EXCHANGES])
+    f.exchanges = int(start.assembly.compiled.work.counts.exchanges[0])
     if truth is not None and not why:
         f.difference = _difference(job.base.assembly.compiled, truth, start.assembly.compiled, result)
     return f
@@ -318,8 +318,8 @@ def _drifts(plain: Compiled, c: Compiled, result: Result) -> tuple[np.ndarray, n
         else:
             plain.z = c.z.copy()
         plain.at(t, q, v)
-        g[k] = np.abs(plain.work.row[G_VALUE]).max()
-        gv[k] = np.abs(plain.sparse_jacobian() @ v - plain.work.row[NU]).max()
+        g[k] = np.abs(plain.work.rows.value).max()
+        gv[k] = np.abs(plain.sparse_jacobian() @ v - plain.work.rows.nu).max()
     return g, gv
 
 

@@ -72,7 +72,7 @@ class Compiled:
         if self.system.const.dtype.kind in "fc":
             return self.scratch.fields  # type: ignore[no-any-return]
         w = work(self.structure, self.system)
-        w.option[STABILIZE], w.option[PASS] = NONE, 1e-13
+        w.options.stabilize[0], w.options.pass[0] = NONE, 1e-13
         return w
 
     @cached_property

@@ -125,19 +125,19 @@ class Prepared:
         AnalysisError
             If a law gives no finite number there, or the equations have no solution.
         """
-        return self._moving(t, q, v).work.vel[X_SOLVED].copy()
+        return self._moving(t, q, v).work.velocities.solved.copy()
 
     def multipliers(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Lam, (nr,): reactions are G^T lam."""
-        return self._moving(t, q, v).work.row[LAM].copy()
+        return self._moving(t, q, v).work.rows.multiplier.copy()
 
     def efforts(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """What drivers give along the coordinates that they prescribe, (nv,) [N, N m]; 0 for the others."""
-        return self._moving(t, q, v).work.vel[EFFORT].copy()
+        return self._moving(t, q, v).work.velocities.effort.copy()
 
     def forces(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """F, (nv,) [N, N m]: all forces but reactions, gyroscopic ones included."""
-        return self._moving(t, q, v).work.vel[F_APPLIED].copy()
+        return self._moving(t, q, v).work.velocities.applied.copy()
 
     def jacobian(self, t: float, q: np.ndarray) -> np.ndarray:
         """G, (nr, nv): derivatives of the constraint rows along the velocities."""
@@ -145,12 +145,12 @@ class Prepared:
 
     def constraint(self, t: float, q: np.ndarray) -> np.ndarray:
         """How far the constraint rows are from closed, g, (nr,) [m, rad, 1]; 0 for those of velocities only."""
-        return self._at(self._scratch(), t, q, np.zeros(len(self.v))).work.row[G_VALUE].copy()
+        return self._at(self._scratch(), t, q, np.zeros(len(self.v))).work.rows.value.copy()
 
     def constraint_rate(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """G v less what drivers ask for, (nr,) [m/s, rad/s]."""
         c = self._at(self._scratch(), t, q, v)
-        return c.jacobian() @ np.asarray(v, float) - c.work.row[NU]
+        return c.jacobian() @ np.asarray(v, float) - c.work.rows.nu
 
     def rates(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Qdot, (nq,): v, where coordinates are no quaternions."""
@@ -236,7 +236,7 @@ class Prepared:
 
     def _moving(self, t: float, q: np.ndarray, v: np.ndarray) -> Compiled:
         c = self._at(self._scratch(), t, q, v, MOTION)
-        if not np.isfinite(c.work.vel[X_SOLVED]).all():
+        if not np.isfinite(c.work.velocities.solved).all():
             found = c.structure.missed(c.work.stack) or fault(c.work.stack, c.structure.functions)
             why = found.message if found else "a force or a law gives no finite number, or the equations no solution"
             raise AnalysisError(f"{self.model.name!r} at t = {float(t):.6g} s: {why}")

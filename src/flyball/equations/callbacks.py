@@ -38,7 +38,7 @@ def levels(A, K, at):
     W = A[W_]
     n = K.rows.shape[0]
     for k in range(n):
-        K.levels[at, k] = W.row[LAM, K.rows[k]]
+        K.levels[at, k] = W.rows.multiplier[K.rows[k]]
     for k in range(K.spots.shape[0]):
         K.levels[at, n + k] = W.sensed[K.spots[k, 0], K.spots[k, 1]]
 

@@ -67,10 +67,10 @@ def settle_at(A, P, t, state):
     for i in range(state.shape[0]):
         B.state[i] = complex(state[i], 0.0)
     for d in range(P.effort.shape[0]):
-        B.vdot[d] = complex(W.vel[X_SOLVED, d], 0.0)
-        P.effort[d] = W.vel[EFFORT, d]
+        B.vdot[d] = complex(W.velocities.solved[d], 0.0)
+        P.effort[d] = W.velocities.effort[d]
     for k in range(B.lam.shape[0]):
-        B.lam[k] = complex(W.row[LAM, k], 0.0)
+        B.lam[k] = complex(W.rows.multiplier[k], 0.0)
 
 
 @formula
@@ -140,12 +140,12 @@ def change(A, P, k, dq, dv, rate, powers):
         shared(P, found, powers, nv)
     for r in range(nr):
         if S.rows.work[r] >= 0:
-            nu = WC.row[NU, r]
-            powers[S.rows.work[r]] = found[nv + r] * nu.real + W.row[LAM, r] * nu.imag / STEP
+            nu = WC.rows.nu[r]
+            powers[S.rows.work[r]] = found[nv + r] * nu.real + W.rows.multiplier[r] * nu.imag / STEP
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:
             d = S.tree.v[b]
-            found[d] = WC.vel[GIVEN, d].imag / STEP
+            found[d] = WC.velocities.prescribed[d].imag / STEP
             powers[S.tree.work[b]] = found[nv + nr + d] * A[BENCH].state[P.size[NQ] + d].real + P.effort[d] * dv[d]
     for d in range(nv):
         rate[d] = dv[d]
@@ -165,7 +165,7 @@ def solved(A, P, found, sign):
     respond(A)
     for d in range(nv):
         found[d] = rows[2, d]
-        found[nv + nr + d] = W.vel[EFFORT, d]
+        found[nv + nr + d] = W.velocities.effort[d]
     for r in range(nr):
         found[nv + r] = rows[3, r]
 
@@ -188,9 +188,9 @@ def press(A, P):
     S, W, WC, B = A[S_], A[W_], A[WC_], A[BENCH]
     for j in range(P.pressing.shape[0]):
         r = P.pressing[j]
-        B.lam[r] = complex(W.row[LAM, r], STEP)
+        B.lam[r] = complex(W.rows.multiplier[r], STEP)
         step_along(A, P.zero, P.zero, STEPS)
-        B.lam[r] = complex(W.row[LAM, r], 0.0)
+        B.lam[r] = complex(W.rows.multiplier[r], 0.0)
         for e in range(S.row_start[r], S.row_start[r + 1]):  # less what the reaction itself does
             B.out[0, S.column[e]] += complex(0.0, STEP * W.G[e])
         solved(A, P, P.by_press[j], 0.0)

@@ -33,7 +33,7 @@ def unit_rows(S, W, scale):
         s = s**0.5 if s > 0.0 else 1.0
         for e in range(S.row_start[k], S.row_start[k + 1]):
             W.H[e] /= s
-        W.row[DIAGONAL, k] = s
+        W.rows.diagonal[k] = s
 
 
 @formula
@@ -65,12 +65,12 @@ def each(address, S, W, R, clock, sheet, states, scale, block, kept, out):
             for i in range(3):
                 out[n, i] = np.nan
             continue
-        out[n, 0] = strongest(S.row_start, S.column, W.H, block[last + 1], W.vel[V1])
+        out[n, 0] = strongest(S.row_start, S.column, W.H, block[last + 1], W.velocities.v1)
         X = block[: last + 1]
-        out[n, 1], out[n, 2] = weakest(S.ldl, W.L, W.D[0], S.row_start, S.column, W.H, X, W.vel[V1], W.D[2])
+        out[n, 1], out[n, 2] = weakest(S.ldl, W.L, W.D[0], S.row_start, S.column, W.H, X, W.velocities.v1, W.D[2])
         for i in range(last):
             for k in range(S.rows.law.shape[0]):
-                kept[n, k, i] = X[i, k] / W.row[DIAGONAL, k]
+                kept[n, k, i] = X[i, k] / W.rows.diagonal[k]
 
 
 @kernel

@@ -60,11 +60,11 @@ def reaction_loads(S, W):
             continue
         if S.forces.family[k] == SLIDING:
             s = S.forces.switch[k]
-            W.sensed[RETURNED, n] = W.row[LAM, S.switches.row[S.switches.other[s]]]
+            W.sensed[RETURNED, n] = W.rows.multiplier[S.switches.row[S.switches.other[s]]]
             if not slides(S, W, s):  # nothing follows from it
                 W.sensed[LOAD, n] = W.sensed[RETURNED, n]
             continue
-        o = 0.0 * W.row[LAM, 0]
+        o = 0.0 * W.rows.multiplier[0]
         force = (o, o, o)
         torque = (o, o, o)
         for x in range(S.load_terms.load.shape[0]):
@@ -118,7 +118,7 @@ def returned(S, W):
         change = abs(new - W.sensed[LOAD, n]) / (small + abs(new) + abs(W.sensed[LOAD, n]))
         if not change <= worst:
             worst = change
-            W.info[GUILTY] = k
+            W.counts.guilty[0] = k
     return worst
 
 
@@ -127,10 +127,10 @@ def force_scale(S, W):
     """The largest force that moves anything, or that would keep a constraint: loads far below it are rounding."""
     size = 1e-300
     for d in range(W.vel.shape[1]):
-        size = max(size, abs(W.vel[F_APPLIED, d]))
+        size = max(size, abs(W.velocities.applied[d]))
     for k in range(S.rows.law.shape[0]):
-        if W.row[DIAGONAL, k] > 0.0:
-            size = max(size, abs(W.row[GAMMA, k]) / W.row[DIAGONAL, k])
+        if W.rows.diagonal[k] > 0.0:
+            size = max(size, abs(W.rows.gamma[k]) / W.rows.diagonal[k])
     return size
 
 
@@ -149,12 +149,12 @@ def improve(S, W, attempt):
     """
     first, last = 2 * measured(S), loads_end(S, W)
     if attempt == tries(W):
-        W.info[LEARNT] = FORGOTTEN
+        W.counts.learnt[0] = FORGOTTEN
         for n in range(first, last):
             W.sensed[LOAD, n] = 0.0
         return
-    if W.info[LEARNT] == FORGOTTEN or (attempt == 0 and W.info[LEARNT] == 0):
-        W.info[LEARNT] = 0
+    if W.counts.learnt[0] == FORGOTTEN or (attempt == 0 and W.counts.learnt[0] == 0):
+        W.counts.learnt[0] = 0
         for n in range(first, last):
             for k in range(first, last):
                 W.sensed[INVERSE_JACOBIAN + n - first, k] = 1.0 if n == k else 0.0
@@ -163,10 +163,10 @@ def improve(S, W, attempt):
     for n in range(first, last):
         W.sensed[LOAD_BEFORE, n] = W.sensed[LOAD, n]
         W.sensed[GAP_BEFORE, n] = W.sensed[LOAD, n] - W.sensed[RETURNED, n]
-    if W.info[LEARNT] < last - first:
-        n = first + W.info[LEARNT]
+    if W.counts.learnt[0] < last - first:
+        n = first + W.counts.learnt[0]
         W.sensed[LOAD, n] -= TRIAL * W.sensed[GAP_BEFORE, n]
-        W.info[LEARNT] += 1
+        W.counts.learnt[0] += 1
         return
     for n in range(first, last):
         new = W.sensed[LOAD, n]
@@ -178,7 +178,7 @@ def improve(S, W, attempt):
 @formula
 def learnt(S, W):
     """Whether the slopes of all loads are known: until then the steps are small and tell nothing of convergence."""
-    return W.info[LEARNT] >= W.sensed.shape[0] - INVERSE_JACOBIAN
+    return W.counts.learnt[0] >= W.sensed.shape[0] - INVERSE_JACOBIAN
 
 
 @formula

@@ -88,25 +88,25 @@ def watch(S, W, t, out):
 @formula
 def watched(S, W, t, kind, s):
     """Value of a guard of switch s."""
-    if kind == G_SHARED or (W.switch[SHARED, s] > 0.0 and (kind == G_PULL or kind == G_HOLDS or kind == G_CONE)):
+    if kind == G_SHARED or (W.modes.shared[s] > 0.0 and (kind == G_PULL or kind == G_HOLDS or kind == G_CONE)):
         return NOT_WATCHED
     way = W.sensed[VALUE, way_of(S, W, s)]
     if kind == G_CORNER:
-        return way * corner(S, W, t, s) if W.switch[MODE, s] == OFF else 1.0 - magnitude(way)
+        return way * corner(S, W, t, s) if W.modes.mode[s] == OFF else 1.0 - magnitude(way)
     if kind == G_PRESS_LOWER or kind == G_PRESS_UPPER:
         return pressing(S, W, s, kind, way - FROZEN)
     if kind == G_TURNS and S.switches.partner[s] < 0 and slides(S, W, s):
         m = S.switches.measured[s]
         return way * moving(S, m, W.sensed[RATE, m])
     if kind >= G_CONE:
-        return watched_place(S, W, W.sensed, W.row[LAM], kind, s)
+        return watched_place(S, W, W.sensed, W.rows.multiplier, kind, s)
     m, k = S.switches.measured[s], S.switches.row[s]
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
-    if W.switch[MODE, s] == OFF:
+    if W.modes.mode[s] == OFF:
         if kind == G_LOWER:
-            return distance(S, m, x - W.switch[LOWER, s], rate)
+            return distance(S, m, x - W.modes.lower[s], rate)
         if kind == G_UPPER:
-            return distance(S, m, W.switch[UPPER, s] - x, -rate)
+            return distance(S, m, W.modes.upper[s] - x, -rate)
         if kind == G_SLIDES:
             if way == BY_RATE:
                 return NOT_WATCHED
@@ -116,9 +116,9 @@ def watched(S, W, t, kind, s):
             return moving(S, m, rate)
         return NOT_WATCHED
     if kind == G_PULL:
-        return way * W.row[LAM, k]
+        return way * W.rows.multiplier[k]
     if kind == G_HOLDS:
-        return most(S, W, t, S.switches.force[s]) - magnitude(W.row[LAM, k])
+        return most(S, W, t, S.switches.force[s]) - magnitude(W.rows.multiplier[k])
     return NOT_WATCHED
 
 
@@ -142,7 +142,7 @@ def grains(S, W, t, trial, so_far, out):
     """
     fastest, strongest = quickest(S, W), 0.0
     for k in range(S.rows.law.shape[0]):
-        strongest = max(strongest, magnitude(W.row[LAM, k]))
+        strongest = max(strongest, magnitude(W.rows.multiplier[k]))
     for g in range(S.guards.kind.shape[0]):
         kind, of = S.guards.kind[g], S.guards.of[g]
         out[g] = 0.0
@@ -212,7 +212,7 @@ def astray(S, W, t, out):
         if S.guards.kind[g] == G_CORNER:
             fastest = quickest(S, W) if fastest < 0.0 else fastest
             s = S.guards.of[g]
-            out[g] = OTHER * (terms(S, W, t, s, fastest) if W.switch[MODE, s] == OFF else 1.0)
+            out[g] = OTHER * (terms(S, W, t, s, fastest) if W.modes.mode[s] == OFF else 1.0)
 
 
 @formula
@@ -236,7 +236,7 @@ def terms(S, W, t, s, fastest):
 def pressing(S, W, s, kind, way):
     """Of an elastic switch that is pressed at a side: what it pushes with there; of an open side: how far that is."""
     m, side = S.switches.measured[s], 1.0 if kind == G_PRESS_LOWER else -1.0
-    bound = W.switch[LOWER, s] if kind == G_PRESS_LOWER else W.switch[UPPER, s]
+    bound = W.modes.lower[s] if kind == G_PRESS_LOWER else W.modes.upper[s]
     depth = side * (bound - W.sensed[VALUE, m])
     push = S.switch_numbers.stiffness[s] * depth - S.switch_numbers.damping[s] * side * W.sensed[RATE, m]
     told = way > -1.5  # an interpolated one is not exact; one that looks where it is by itself is far below

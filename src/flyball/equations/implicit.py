@@ -183,7 +183,7 @@ def powers(A, K, k):
             rate[i] = W.y[1, i]
     for r in range(S.rows.law.shape[0]):
         if S.rows.work[r] >= 0:
-            rate[S.rows.work[r]] = K.lam[k, r] * W.row[NU, r]
+            rate[S.rows.work[r]] = K.lam[k, r] * W.rows.nu[r]
     progress(S, W, K.z[k], rate)
 
 
@@ -232,7 +232,7 @@ def rows_of(S, W, K, P, k):
             J[P.first[ROWS] + e] = g
             J[P.first[ROWS_METRIC] + e] = -P.metric[S.column[e]] * g * P.valued[r]
             J[P.first[ROWS_HELD] + e] = g * P.valued[r]
-        size = W.row[DIAGONAL, r]
+        size = W.rows.diagonal[r]
         J[P.first[SIZES] + r] = K.real[SOFT] * (size if size > 0.0 else 1.0)
     for n in range(P.negative.shape[0]):
         J[P.first[END] + 1 + n] = -J[P.negative[n]]
@@ -289,7 +289,7 @@ def arrive(t, y, dy, A, K):
     status, moved = arrive_there(t, y, dy, A, K)
     if status == 0:
         for r in range(K.found.shape[0]):
-            K.found[r] = A[W_].row[LAM, r]
+            K.found[r] = A[W_].rows.multiplier[r]
     return status, moved
 
 
@@ -322,7 +322,7 @@ def as_modes_are(A):
         WC.sensed[VALUE, m] = complex(W.sensed[VALUE, m], 0.0)
         r = S.switches.row[s]
         if r >= 0:
-            P.valued[r] = 0 if W.switch[MODE, s] == STEADY else P.holonomic[r]
+            P.valued[r] = 0 if W.modes.mode[s] == STEADY else P.holonomic[r]
 
 
 @formula

@@ -92,9 +92,9 @@ def bare(address, S, W, R, clock, sheet, B, P):
     """The motion with everything off, and what every row does: A, b of the problem. Returns a status."""
     status = call(address, S, W, R, clock, sheet, MOTION)
     for d in range(W.vel.shape[1]):
-        B.free[d] = W.vel[X_SOLVED, d]
+        B.free[d] = W.velocities.solved[d]
     for k in range(S.rows.law.shape[0]):
-        B.loaded[k] = W.row[LAM, k]
+        B.loaded[k] = W.rows.multiplier[k]
     if status != 0:
         return status
     for i in range(B.which.shape[0]):
@@ -137,7 +137,7 @@ def respond(address, S, W, R, clock, sheet, B, i):
         out[0, S.column[e]] += B.sign[i] * W.G[e]
     call(address, S, W, R, clock, sheet, SOLVE)
     for d in range(nv):
-        B.Y[i, d], B.E[i, d] = out[2, d], W.vel[EFFORT, d]
+        B.Y[i, d], B.E[i, d] = out[2, d], W.velocities.effort[d]
     for k in range(nr):
         B.L[i, k] = out[3, k]
 
@@ -174,7 +174,7 @@ def carry(S, W, B, P, j, more):
         s = B.loaded[k]
         for i in range(B.which.shape[0]):
             s += (P.x[i] + (more if i == j else 0.0)) * B.L[i, k]
-        W.row[LAM, k] = s
+        W.rows.multiplier[k] = s
     reaction_loads(S, W)
 
 

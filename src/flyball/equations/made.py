@@ -38,7 +38,7 @@ def run(address, S, W, t, a, b, c, d):  # type: ignore[no-untyped-def]
 def choose_code(S, W, task):
     """Say whether code made for the mechanism is in use for this task."""
     wanted = task == INTEGRATE or task == COMPLETE or task == FOLLOW
-    if W.option[STABILIZE] == PARTITIONING:
+    if W.options.stabilize[0] == PARTITIONING:
         wanted = False
     W.info[MADE + SCRATCH] = 0
     for k in range(SCRATCH + 1, FLAT):

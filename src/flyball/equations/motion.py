@@ -100,13 +100,13 @@ def accelerate(S, W, t, p, dy, factored):
     nv = W.vel.shape[1]
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
-    if W.option[STABILIZE] == BAUMGARTE:
-        a = 2.0 * W.option[ALPHA]
-        b = W.option[BETA] * W.option[BETA]
+    if W.options.stabilize[0] == BAUMGARTE:
+        a = 2.0 * W.options.alpha[0]
+        b = W.options.beta[0] * W.options.beta[0]
         for k in range(S.rows.law.shape[0]):
-            W.row[GAMMA, k] -= a * (row_times(S, W, k, v) - W.row[NU, k]) + b * W.row[G_VALUE, k]
-    if W.option[PARTED] > 0.0:  # from here on with the masses
-        W.option[PARTED] = 0.0
+            W.rows.gamma[k] -= a * (row_times(S, W, k, v) - W.rows.nu[k]) + b * W.rows.value[k]
+    if W.options.parted[0] > 0.0:  # from here on with the masses
+        W.options.parted[0] = 0.0
         factored = OLD
     if factored == NEAR:
         if S.solver[0] == SCHUR:
@@ -119,14 +119,14 @@ def accelerate(S, W, t, p, dy, factored):
             return status
         if not bound(S, W) or settled(S, W, t, n):
             return finish(S, W, t, p, dy)
-    W.info[STATUS] = NOT_FINITE
+    W.counts.status[0] = NOT_FINITE
     return NOT_FINITE
 
 
 @formula
 def balance(S, W, t, p, work, factored):
     """Accelerations and multipliers into W, with the loads of joints that return themselves: (status, factored)."""
-    x = W.vel[X_SOLVED]
+    x = W.velocities.solved
     change = 1e300
     # joints with friction need the solution to know their loads: again until these return themselves
     most = 2 * tries(W)
@@ -135,13 +135,13 @@ def balance(S, W, t, p, work, factored):
         loaded(S, W, t, p, work)
         if (
             factored == OLD
-            or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]
+            or solve(S, W, W.velocities.applied, W.rows.gamma, x, W.rows.multiplier, True, REFINEMENTS) > STALE * W.options.pass[0]
         ):
             if factor(S, W) != 0:
-                W.info[STATUS] = SINGULAR
+                W.counts.status[0] = SINGULAR
                 return SINGULAR, factored
             factored = HERE
-            solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
+            solve(S, W, W.velocities.applied, W.rows.gamma, x, W.rows.multiplier, True, REFINEMENTS)
         if S.load_terms.load.shape[0] == 0:
             break
         last = change
@@ -149,8 +149,8 @@ def balance(S, W, t, p, work, factored):
         if change <= CONVERGED or (change <= BLURRED and change > 0.5 * last and learnt(S, W)):
             break
         if attempt == most - 1:
-            W.info[STATUS] = JAMMED if finite(x) == 0 else NOT_FINITE
-            return W.info[STATUS], factored
+            W.counts.status[0] = JAMMED if finite(x) == 0 else NOT_FINITE
+            return W.counts.status[0], factored
         improve(S, W, attempt)
     return 0, factored
 
@@ -163,8 +163,8 @@ def loaded(S, W, t, p, work):
         return
     inertial(S, W)
     forces(S, W, t, work)
-    gather(S, W, W.vel[F_APPLIED])
-    efforts(S, W, t, work, W.vel[F_APPLIED])
+    gather(S, W, W.velocities.applied)
+    efforts(S, W, t, work, W.velocities.applied)
 
 
 @formula
@@ -172,26 +172,26 @@ def finish(S, W, t, p, dy):
     """Dy at the state p from the solution in W. Returns a status."""
     nq = S.coordinates[0]
     nv = W.vel.shape[1]
-    x = W.vel[X_SOLVED]
+    x = W.velocities.solved
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
     if W.info[MADE + FINISH] != 0:
-        W.info[STATUS] = 0 if run(W.info[MADE + FINISH], S, W, t, p, dy, x, W.row[LAM]) == 0.0 else NOT_FINITE
-        return W.info[STATUS]
+        W.counts.status[0] = 0 if run(W.info[MADE + FINISH], S, W, t, p, dy, x, W.rows.multiplier) == 0.0 else NOT_FINITE
+        return W.counts.status[0]
     rates(S, p, v, dy)
     for d in range(nv):
         dy[nq + d] = x[d]
     for k in range(S.rows.law.shape[0]):
         if S.rows.work[k] >= 0:
-            work[S.rows.work[k]] = W.row[LAM, k] * W.row[NU, k]
+            work[S.rows.work[k]] = W.rows.multiplier[k] * W.rows.nu[k]
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:
             d = S.tree.v[b]
-            work[S.tree.work[b]] = W.vel[EFFORT, d] * v[d]
+            work[S.tree.work[b]] = W.velocities.effort[d] * v[d]
     progress(S, W, p[nq + nv :], work)
     readings(S, W, t)
-    W.info[STATUS] = finite(dy)
-    return W.info[STATUS]
+    W.counts.status[0] = finite(dy)
+    return W.counts.status[0]
 
 
 @formula
@@ -201,8 +201,8 @@ def respond(S, W, f, gamma, x, lam):
     Prescribed velocities do not change; what that takes is left in W.vel[EFFORT].
     """
     for d in range(x.shape[0]):
-        W.vel[GIVEN, d] = 0.0
-    if solve(S, W, f, gamma, x, lam, True, REFINEMENTS) > STALE * W.option[PASS] and factor(S, W) == 0:
+        W.velocities.prescribed[d] = 0.0
+    if solve(S, W, f, gamma, x, lam, True, REFINEMENTS) > STALE * W.options.pass[0] and factor(S, W) == 0:
         solve(S, W, f, gamma, x, lam, True, REFINEMENTS)
 
 
@@ -227,10 +227,10 @@ def derivative(t, y, dy, S, W):
     z = p[nq + W.vel.shape[1] :]
     prepare(S, W, t, q, v)
     factored = OLD
-    if W.option[STABILIZE] >= STAGES:
-        status, _, factored = settle(S, W, t, q, v, z, W.option[TOL_G], W.option[TOL_V])
+    if W.options.stabilize[0] >= STAGES:
+        status, _, factored = settle(S, W, t, q, v, z, W.options.tol_g[0], W.options.tol_v[0])
         if status != 0:
-            W.info[STATUS] = status
+            W.counts.status[0] = status
             return status
     else:
         place(S, W, t, q, z)
@@ -252,20 +252,20 @@ def arrive(t, y, dy, S, W):
     if W.stack[fault, 0].real > 0.0:  # overcome: the step that met it was taken again, shorter
         W.stack[fault, 0] = -W.stack[fault, 0]
     prepare(S, W, t, q, v)
-    if W.option[STABILIZE] >= STEPS:
+    if W.options.stabilize[0] >= STEPS:
         status, found, factored = settle(S, W, t, q, v, z, TIGHT_G * S.length[0], TIGHT_V)
         if status != 0:
-            W.info[STATUS] = status
+            W.counts.status[0] = status
             return status, found
         found = max(0.0, found - rounding(S, W, q) / S.length[0])
-        if W.option[PARTED] > 0.0:
+        if W.options.parted[0] > 0.0:
             exchange(S, W)
     else:
         place(S, W, t, q, z)
         move(S, W, t, v, z)
         show_frames(S, W, q)
     remember(S, W, z)
-    if W.option[PLACED] > 0.0:
+    if W.options.placed[0] > 0.0:
         return 0, max(found, astray_by)
     return accelerate(S, W, t, y, dy, factored), max(found, astray_by)
 
@@ -273,9 +273,9 @@ def arrive(t, y, dy, S, W):
 @formula
 def report(t, y, out, S, W):
     """Write t, the state (projected first), vdot and lam to a row of the output; with LATER these two stay open."""
-    W.option[PLACED] = W.option[LATER]
+    W.options.placed[0] = W.options.later[0]
     status, _ = arrive(t, y, W.y[1], S, W)
-    W.option[PLACED] = 0.0
+    W.options.placed[0] = 0.0
     write_row(t, y, out, S, W)
     return status
 
@@ -287,18 +287,18 @@ def write_row(t, y, out, S, W):
     nv = W.vel.shape[1]
     ny = y.shape[0]
     if S.rows.law.shape[0] > 0:
-        W.option[WORST_G] = max(W.option[WORST_G], violation(W, W.row[R2]))
-        W.option[WORST_V] = max(W.option[WORST_V], drift(S, W, y[nq : nq + nv], W.row[R2])[0])
+        W.options.worst_g[0] = max(W.options.worst_g[0], violation(W, W.rows.r2))
+        W.options.worst_v[0] = max(W.options.worst_v[0], drift(S, W, y[nq : nq + nv], W.rows.r2)[0])
     out[0] = t
     for i in range(ny):
         out[1 + i] = y[i]
     for d in range(nv):
-        out[1 + ny + d] = W.vel[X_SOLVED, d]
+        out[1 + ny + d] = W.velocities.solved[d]
     to = 1 + ny + nv
     for k in range(S.rows.law.shape[0]):
-        out[to + k] = W.row[LAM, k]
+        out[to + k] = W.rows.multiplier[k]
     to += S.rows.law.shape[0]
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:
-            out[to] = W.vel[EFFORT, S.tree.v[b]]
+            out[to] = W.velocities.effort[S.tree.v[b]]
             to += 1

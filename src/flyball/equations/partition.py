@@ -22,8 +22,8 @@ def exchange(S, W):
     Each exchange multiplies the volume |det G_d| by that entry, so this comes to an end, and the pivots stay away from
     zero (the exchange is that of Goreinov, Tyrtyshnikov and Zamarashkin 1997, for submatrices of large volume).
     """
-    way = W.vel[V3]
-    r = W.row[R2]
+    way = W.velocities.v3
+    r = W.rows.r2
     n = way.shape[0]
     for _ in range(n):
         if r.shape[0] == 0 or factor(S, W) != 0:
@@ -32,20 +32,20 @@ def exchange(S, W):
         out = -1
         taken = -1
         for i in range(n):
-            size = -W.vel[PARTITION, i].real
+            size = -W.velocities.partition[i].real
             if size > 0.0:
                 column(S, W, i, r)
-                solve(S, W, W.vel[F_APPLIED], r, way, W.row[RESIDUAL], False, REFINEMENTS)
+                solve(S, W, W.velocities.applied, r, way, W.rows.residual, False, REFINEMENTS)
                 for d in range(n):
-                    own = W.vel[PARTITION, d].real
+                    own = W.velocities.partition[d].real
                     if own > 0.0 and magnitude(way[d]) * size > most * own:
                         most = magnitude(way[d]) * size / own
                         out, taken = i, d
         if out < 0:
             return
-        W.vel[PARTITION, out] = -W.vel[PARTITION, out]
-        W.vel[PARTITION, taken] = -W.vel[PARTITION, taken]
-        W.info[EXCHANGES] += 1
+        W.velocities.partition[out] = -W.velocities.partition[out]
+        W.velocities.partition[taken] = -W.velocities.partition[taken]
+        W.counts.exchanges[0] += 1
 
 
 @formula

@@ -23,4 +23,4 @@ def prepare(S, W, t, q, v):
             f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
             q[S.tree.q[b]] = f - S.bodies.offset[b]
             v[S.tree.v[b]] = f1
-            W.vel[GIVEN, S.tree.v[b]] = f2
+            W.velocities.prescribed[S.tree.v[b]] = f2

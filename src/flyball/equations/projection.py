@@ -48,7 +48,7 @@ FAR = 1e3  # a state this far off is given up at once
 @formula
 def place(S, W, t, q, z):
     """Poses, and the constraint rows as far as they follow from them: g, G, nu. ``z`` tells angles their turns."""
-    W.info[EVALUATIONS] += 1
+    W.counts.evaluations[0] += 1
     if W.info[MADE + PLACE] != 0:
         run(W.info[MADE + PLACE], S, W, t, q, z, q, z)
     else:
@@ -71,12 +71,12 @@ def violation(W, out):
     """Largest |g| (its row goes to W.info[GUILTY]) and -g into ``out``."""
     worst = 0.0
     for k in range(out.shape[0]):
-        g = W.row[G_VALUE, k]
+        g = W.rows.value[k]
         out[k] = -g
         size = magnitude(g)
         if not size <= worst:
             worst = size
-            W.info[GUILTY] = k
+            W.counts.guilty[0] = k
     return worst
 
 
@@ -107,7 +107,7 @@ def drift(S, W, v, out):
     worst = 0.0
     size = 0.0
     for k in range(out.shape[0]):
-        r = W.row[NU, k]
+        r = W.rows.nu[k]
         for e in range(S.row_start[k], S.row_start[k + 1]):
             p = W.G[e] * v[S.column[e]]
             r -= p
@@ -128,8 +128,8 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, what the factor in W is:
     OLD, of poses NEARby or of those HERE).
     """
-    W.option[PARTED] = 1.0 if W.option[STABILIZE] == PARTITIONING else 0.0
-    still = W.option[PLACED] > 0.0  # nobody asks for accelerations there
+    W.options.parted[0] = 1.0 if W.options.stabilize[0] == PARTITIONING else 0.0
+    still = W.options.placed[0] > 0.0  # nobody asks for accelerations there
     if S.rows.law.shape[0] == 0 and still and S.angles.F.shape[0] == 0:
         return 0, 0.0, OLD
     place(S, W, t, q, z)
@@ -141,11 +141,11 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     found = 0.0
     lost = 0.0
     factored = OLD
-    if W.option[STABILIZE] != VELOCITIES:
+    if W.options.stabilize[0] != VELOCITIES:
         status, found, factored = close(S, W, t, q, z, tol_g)
         if status != 0:
             return status, found, OLD
-    if W.option[STABILIZE] != POSITIONS:
+    if W.options.stabilize[0] != POSITIONS:
         status, lost, factored = steer(S, W, v, tol_v, factored)
         if status != 0:
             return status, found, OLD
@@ -162,9 +162,9 @@ def close(S, W, t, q, z, tol_g):
 
     Kinematics and rows are those of q, before and after. Returns (status, the violation found, what the factor is).
     """
-    none = W.vel[F_APPLIED]
-    step = W.vel[V3]
-    r = W.row[R2]
+    none = W.velocities.applied
+    step = W.velocities.v3
+    r = W.rows.r2
     worst = violation(W, r)
     found = worst
     last = 1e300
@@ -183,16 +183,16 @@ def close(S, W, t, q, z, tol_g):
         else:
             reuse(S, W)
         last = worst
-        left = solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
+        left = solve(S, W, none, r, step, W.rows.residual, False, REFINEMENTS)
         if factored == NEAR and left > SLOW:  # too far from where it was made to serve
             if factor(S, W) != 0:
                 return NOT_CLOSED, found, OLD
-            solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
+            solve(S, W, none, r, step, W.rows.residual, False, REFINEMENTS)
         factored = NEAR
         retract(S, q, step)
         place(S, W, t, q, z)
         worst = violation(W, r)
-        W.info[PROJECTIONS] += 1
+        W.counts.projections[0] += 1
     if not worst <= CLOSED and not worst <= tol_g and not worst <= rounding(S, W, q):
         return NOT_CLOSED, found, OLD
     return 0, found, factored
@@ -201,18 +201,18 @@ def close(S, W, t, q, z, tol_g):
 @formula
 def steer(S, W, v, tol_v, factored):
     """Put v on G v = nu. Returns (status, the violation found relative to size and speed, what the factor is)."""
-    none = W.vel[F_APPLIED]
-    step = W.vel[V3]
-    r = W.row[R2]
+    none = W.velocities.applied
+    step = W.velocities.v3
+    r = W.rows.r2
     worst, size = drift(S, W, v, r)
     if worst > tol_v * (min(METRE, S.length[0]) * S.rate[0] + size):
         if factored == NEAR:
             reuse(S, W)
-        if factored == OLD or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]:
+        if factored == OLD or solve(S, W, none, r, step, W.rows.residual, False, REFINEMENTS) > STALE * W.options.pass[0]:
             if factor(S, W) != 0:
                 return NOT_CLOSED, worst, OLD
             factored = HERE
-            solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
+            solve(S, W, none, r, step, W.rows.residual, False, REFINEMENTS)
         for d in range(step.shape[0]):
             v[d] += step[d]
     return 0, worst / (own_speed(S) + size), factored
@@ -224,11 +224,11 @@ def tangent(y, e, S, W):
 
     Near a singular position rounding is large along what the constraints forbid, and small along what they allow.
     """
-    choice = W.option[STABILIZE]
+    choice = W.options.stabilize[0]
     if S.rows.law.shape[0] == 0 or choice < STEPS or choice == PARTITIONING:
         return
     nq = S.coordinates[0]
-    way = W.vel[F_APPLIED]
+    way = W.velocities.applied
     if choice != VELOCITIES:
         unrated(S, y, e, way)
         stay(S, W, way)
@@ -240,13 +240,13 @@ def tangent(y, e, S, W):
 @formula
 def stay(S, W, v):
     """Take from v what changes the constraints, with the factor in W."""
-    r = W.row[R2]
+    r = W.rows.r2
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:
             v[S.tree.v[b]] = 0.0
     for k in range(r.shape[0]):
         r[k] = -row_times(S, W, k, v)
-    step = W.vel[V3]
-    solve(S, W, W.vel[F_APPLIED], r, step, W.row[RESIDUAL], False, REFINEMENTS)
+    step = W.velocities.v3
+    solve(S, W, W.velocities.applied, r, step, W.rows.residual, False, REFINEMENTS)
     for d in range(step.shape[0]):
         v[d] += step[d]

@@ -51,7 +51,7 @@ def along(S, W, t, what):
     """What a row, a force along a quantity or a driver that prescribes does along its quantity."""
     nr, nk = S.rows.law.shape[0], S.forces.F.shape[0]
     if what < nr:
-        return W.row[LAM, what]
+        return W.rows.multiplier[what]
     if what < nr + nk:
         return effort_of(S, W, t, what - nr)[0]
-    return W.vel[EFFORT, what - nr - nk]
+    return W.velocities.effort[what - nr - nk]

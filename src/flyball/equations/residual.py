@@ -61,7 +61,7 @@ def residuals(S, W, bench, task):
     nr = S.rows.law.shape[0]
     known = nv + 3 * nr + 3 * measured(S)
     behind = known + bench.steps.shape[1] - (3 * nv + 1)
-    a = W.vel[V2]
+    a = W.velocities.v2
     p = W.y[0]
     for n in range(bench.steps.shape[0]):
         t = bench.t[0] + bench.steps[n, 3 * nv]
@@ -77,13 +77,13 @@ def residuals(S, W, bench, task):
             prepare(S, W, t, p[:nq], p[nq : nq + nv])
             for b in range(S.tree.parent.shape[0]):
                 if S.tree.law[b] >= 0:
-                    a[S.tree.v[b]] = W.vel[GIVEN, S.tree.v[b]]
+                    a[S.tree.v[b]] = W.velocities.prescribed[S.tree.v[b]]
         if task == GAPS:
             poses(S, W, p[:nq])
             row_values(S, W, t, p[nq + nv :])
             for k in range(nr):
-                bench.out[n, nv + k] = W.row[G_VALUE, k]
-                bench.out[n, nv + nr + k] = row_times(S, W, k, p[nq : nq + nv]) - W.row[NU, k]
+                bench.out[n, nv + k] = W.rows.value[k]
+                bench.out[n, nv + nr + k] = row_times(S, W, k, p[nq : nq + nv]) - W.rows.nu[k]
         elif task == PUSHES:
             for b in range(S.tree.parent.shape[0]):
                 pose(S, W, b, p[:nq])
@@ -135,15 +135,15 @@ def missed(S, W, t, p, lam, out):
     nr = S.rows.law.shape[0]
     v = p[nq : nq + nv]
     for k in range(nr):
-        out[nv + k] = W.row[G_VALUE, k]
-        out[nv + nr + k] = row_times(S, W, k, v) - W.row[NU, k]
-        out[nv + 2 * nr + k] = -W.row[GAMMA, k]
+        out[nv + k] = W.rows.value[k]
+        out[nv + nr + k] = row_times(S, W, k, v) - W.rows.nu[k]
+        out[nv + 2 * nr + k] = -W.rows.gamma[k]
     nm = measured(S)
     for m in range(nm):
         out[nv + 3 * nr + m] = W.sensed[VALUE, m]
         out[nv + 3 * nr + nm + m] = W.sensed[RATE, m]
         out[nv + 3 * nr + 2 * nm + m] = W.sensed[BIAS, m]
-    f = W.vel[F_APPLIED]
+    f = W.velocities.applied
     told(S, W, t, p, lam)
     inertial(S, W)
     forces(S, W, t, W.y[1])
@@ -162,7 +162,7 @@ def missed_by_parts(S, W, t, p, lam, out, first):
     nv, nr = W.vel.shape[1], S.rows.law.shape[0]
     v = p[S.coordinates[0] : S.coordinates[0] + nv]
     for k in range(nr):
-        out[nv + nr + k] = row_times(S, W, k, v) - W.row[NU, k]
+        out[nv + nr + k] = row_times(S, W, k, v) - W.rows.nu[k]
     told(S, W, t, p, lam)
     parts(S, W, t, lam, out[first:])
 
@@ -171,7 +171,7 @@ def missed_by_parts(S, W, t, p, lam, out, first):
 def told(S, W, t, p, lam):
     """What forces are told besides motions: multipliers, loads of joints, states of controllers."""
     for k in range(S.rows.law.shape[0]):
-        W.row[LAM, k] = lam[k]
+        W.rows.multiplier[k] = lam[k]
     reaction_loads(S, W)
     for n in range(2 * measured(S), loads_end(S, W)):
         W.sensed[LOAD, n] = W.sensed[RETURNED, n]

@@ -50,7 +50,7 @@ def measured(S):
 @formula
 def carried(S, W, k):
     """What the multiplier of term k's row does through it: (force, torque) on its second body, about M's origin."""
-    c = W.row[LAM, S.terms.row[k]] * S.term_parameters[k, COEFFICIENT]
+    c = W.rows.multiplier[S.terms.row[k]] * S.term_parameters[k, COEFFICIENT]
     return scale(c, load3(W.T, k, 0)), scale(c, load3(W.T, k, 3))
 
 
@@ -70,7 +70,7 @@ def on_second(S, W, what):
 def begin(S, W):
     """Start every row and measured quantity from nothing."""
     for k in range(W.row.shape[1]):
-        W.row[G_VALUE, k] = 0.0
+        W.rows.value[k] = 0.0
     for m in range(measured(S)):
         W.sensed[VALUE, m] = 0.0
     for e in range(W.G.shape[0]):
@@ -91,7 +91,7 @@ def add_value(S, W, k, g, force, torque_M, torque_F, from_F, from_M):
     r = S.terms.row[k]
     nr = S.rows.law.shape[0]
     if r < nr:
-        W.row[G_VALUE, r] += c * g
+        W.rows.value[r] += c * g
     else:
         W.sensed[VALUE, r - nr] += c * g
     if W.T.shape[0] > 0:
@@ -110,7 +110,7 @@ def add_bias(S, W, k, bias):
     r = S.terms.row[k]
     nr = S.rows.law.shape[0]
     if r < nr:
-        W.row[GAMMA, r] -= S.term_parameters[k, COEFFICIENT] * bias
+        W.rows.gamma[r] -= S.term_parameters[k, COEFFICIENT] * bias
     else:
         W.sensed[BIAS, r - nr] += S.term_parameters[k, COEFFICIENT] * bias
 
@@ -192,7 +192,7 @@ def begin_rows(S, W):
     """Start rows and measured quantities, their biases too, from nothing."""
     begin(S, W)
     for k in range(S.rows.law.shape[0]):
-        W.row[GAMMA, k] = 0.0
+        W.rows.gamma[k] = 0.0
     for m in range(measured(S)):
         W.sensed[BIAS, m] = 0.0
 
@@ -203,7 +203,7 @@ def end_rows(S, W, t, v):
     end(S, W, t)
     rates(S, W, v)
     for k in range(S.rows.law.shape[0]):
-        W.row[GAMMA, k] += W.row[NU_DOT, k]
+        W.rows.gamma[k] += W.rows.nu_dot[k]
     end_biases(S, W, t)
 
 
@@ -214,13 +214,13 @@ def end(S, W, t):
         law = S.rows.law[k]
         if law >= 0:
             f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
-            g = W.row[G_VALUE, k] - f
-            W.row[G_VALUE, k] = atan2(sin(g), cos(g)) if S.rows.wrapped[k] == 1 else g
-            W.row[NU, k] = f1
-            W.row[NU_DOT, k] = f2
+            g = W.rows.value[k] - f
+            W.rows.value[k] = atan2(sin(g), cos(g)) if S.rows.wrapped[k] == 1 else g
+            W.rows.nu[k] = f1
+            W.rows.nu_dot[k] = f2
         else:
-            W.row[NU, k] = 0.0
-            W.row[NU_DOT, k] = 0.0
+            W.rows.nu[k] = 0.0
+            W.rows.nu_dot[k] = 0.0
     switch_rows(S, W)
     for x in range(S.sensor_drivers.row.shape[0]):
         law = S.rows.law[S.sensor_drivers.row[x]]
@@ -242,14 +242,14 @@ def switch_rows(S, W):
         k = S.switches.row[s]
         if k < 0:
             continue
-        if W.switch[MODE, s].real == OFF:
+        if W.modes.mode[s].real == OFF:
             for e in range(S.row_start[k], S.row_start[k + 1]):
                 W.G[e] = 0.0
-            W.row[G_VALUE, k] = 0.0
-        elif W.switch[MODE, s].real == STEADY:
-            W.row[G_VALUE, k] = 0.0
+            W.rows.value[k] = 0.0
+        elif W.modes.mode[s].real == STEADY:
+            W.rows.value[k] = 0.0
         else:
-            W.row[G_VALUE, k] -= W.switch[HOLD, s]
+            W.rows.value[k] -= W.modes.hold[s]
 
 
 @formula
@@ -257,8 +257,8 @@ def switch_biases(S, W):
     """What is off has no right-hand side."""
     for s in range(S.switches.row.shape[0]):
         k = S.switches.row[s]
-        if k >= 0 and W.switch[MODE, s].real == OFF:
-            W.row[GAMMA, k] = 0.0
+        if k >= 0 and W.modes.mode[s].real == OFF:
+            W.rows.gamma[k] = 0.0
 
 
 @formula
@@ -266,8 +266,8 @@ def size_rows_off(S, W):
     """Rows that are off have a size, though nothing of them is left."""
     for s in range(S.switches.row.shape[0]):
         k = S.switches.row[s]
-        if k >= 0 and W.switch[MODE, s].real == OFF:
-            W.row[DIAGONAL, k] = W.row[DIAGONAL, k] + 1.0
+        if k >= 0 and W.modes.mode[s].real == OFF:
+            W.rows.diagonal[k] = W.rows.diagonal[k] + 1.0
 
 
 @formula
@@ -277,7 +277,7 @@ def begin_biases(S, W, v):
     for m in range(measured(S)):
         W.sensed[BIAS, m] = 0.0
     for k in range(S.rows.law.shape[0]):
-        W.row[GAMMA, k] = W.row[NU_DOT, k]
+        W.rows.gamma[k] = W.rows.nu_dot[k]
 
 
 @formula
@@ -302,14 +302,14 @@ def end_biases(S, W, t):
         k = S.sensor_drivers.row[x]
         if k != last:
             _, _, f2 = evaluate_jet(S.code, S.const, S.rows.law[k], W.stack, t, W.sensed, WHOLE)
-            W.row[GAMMA, k] += f2 - W.row[NU_DOT, k]
+            W.rows.gamma[k] += f2 - W.rows.nu_dot[k]
         last = k
 
 
 @formula
 def row_times(S, W, k, x):
     """G[k] . x."""
-    s = 0.0 * W.row[G_VALUE, k]
+    s = 0.0 * W.rows.value[k]
     for e in range(S.row_start[k], S.row_start[k + 1]):
         s += W.G[e] * x[S.column[e]]
     return s

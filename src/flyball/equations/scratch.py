@@ -33,7 +33,7 @@ def work(s: Structure, system: System, dtype: Any = None) -> Work:
     if dtype.kind in "fc":
         return scratch(s, system, dtype).fields  # type: ignore[no-any-return]
     W = blank(s, system, dtype)
-    W.switch[LOWER], W.switch[UPPER] = system.switch_numbers.lower, system.switch_numbers.upper
+    W.modes.lower, W.modes.upper = system.switch_numbers.lower, system.switch_numbers.upper
     ground_frames(system, W)
     return W
 

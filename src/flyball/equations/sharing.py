@@ -72,28 +72,28 @@ def cell_of(S, W, t, G, s, c):
             D[c, i, j] = 0.0
     if kind == SLIP:
         mu, gap = S.switch_numbers.static_friction[s], S.switches.row[S.switches.other[s]]
-        D[c, 0, 0], D[c, 1, 0] = mu * W.row[LAM, gap], W.row[LAM, row]
+        D[c, 0, 0], D[c, 1, 0] = mu * W.rows.multiplier[gap], W.rows.multiplier[row]
         for j in range(k):
             D[c, 0, 1 + j], D[c, 1, 1 + j] = mu * G.null[j, gap], G.null[j, row]
         if other >= 0:
             along = S.switches.row[other]
-            D[c, 2, 0] = W.row[LAM, along]
+            D[c, 2, 0] = W.rows.multiplier[along]
             for j in range(k):
                 D[c, 2, 1 + j] = G.null[j, along]
     elif kind == FRICTION:
-        D[c, 0, 0], D[c, 1, 0] = most(S, W, t, S.switches.force[s]), W.row[LAM, row]
+        D[c, 0, 0], D[c, 1, 0] = most(S, W, t, S.switches.force[s]), W.rows.multiplier[row]
         for j in range(k):
             D[c, 0, 1 + j], D[c, 1, 1 + j] = G.bend[j, s], G.null[j, row]
     else:
         way = W.sensed[VALUE, way_of(S, W, s)]
         if way == 0.0:  # it holds both ways
             return False
-        D[c, 0, 0] = way * W.row[LAM, row]
+        D[c, 0, 0] = way * W.rows.multiplier[row]
         for j in range(k):
             D[c, 0, 1 + j] = way * G.null[j, row]
     for i in range(3):
         for j in range(k + 1):
-            D[c, i, j] *= W.switch[SHARED, s]
+            D[c, i, j] *= W.modes.shared[s]
     return True
 
 
@@ -102,7 +102,7 @@ def fill(S, W, t, G):
     """Bounds of all that is in the group, by the multipliers in W."""
     c, size = 0, 0.0
     for s in range(S.switches.row.shape[0]):
-        if W.switch[SHARED, s] > 0.0 and cell_of(S, W, t, G, s, c):
+        if W.modes.shared[s] > 0.0 and cell_of(S, W, t, G, s, c):
             for i in range(3):
                 size = max(size, magnitude(G.Q.D[c, i, 0]))
             c += 1
@@ -202,7 +202,7 @@ def shared(S, W, t, G):
             low = x
     for j in range(Q.count[OPEN]):
         for k in range(S.rows.law.shape[0]):
-            W.row[LAM, k] += high * Q.y[j] * G.null[j, k]
+            W.rows.multiplier[k] += high * Q.y[j] * G.null[j, k]
 
 
 @formula

@@ -32,7 +32,7 @@ NOT_WATCHED = float("nan")
 @formula
 def slides(S, W, s):
     """Whether the place of contact whose first slip is switch s is closed and does not stick."""
-    return W.switch[MODE, s].real == OFF and W.switch[MODE, S.switches.other[s]].real != OFF
+    return W.modes.mode[s].real == OFF and W.modes.mode[S.switches.other[s]].real != OFF
 
 
 @formula
@@ -113,11 +113,11 @@ def friction(S, W, k):
 def watched_place(S, W, sensed, lam, kind, s):
     """Value of a guard of a place: friction that its stick has left; whether it slides its way; whether it is there."""
     if kind == G_ASTRAY:
-        held = W.switch[MODE, S.switches.other[s]] != OFF
+        held = W.modes.mode[S.switches.other[s]] != OFF
         return sensed[VALUE, S.switches.measured[s]] if held else NOT_WATCHED
     other = S.switches.partner[s]
     if kind == G_CONE:
-        if W.switch[MODE, s] == OFF:
+        if W.modes.mode[s] == OFF:
             return NOT_WATCHED
         pressed = lam[S.switches.row[S.switches.other[s]]]
         a = lam[S.switches.row[s]]

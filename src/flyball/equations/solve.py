@@ -67,7 +67,7 @@ def inverse_mass(S, b, x, at, out, to):
 @formula
 def factor(S, W):
     """Factor the matrix of the solve at the kinematics and rows now in W. Returns 0 or 1 + a guilty unknown."""
-    W.info[FACTORISATIONS] += 1
+    W.counts.factorisations[0] += 1
     if W.info[MADE + FACTOR] != 0:
         return int(run(W.info[MADE + FACTOR], S, W, 0.0, W.A, W.A, W.A, W.A))
     if S.solver[0] == SCHUR:
@@ -82,7 +82,7 @@ def turn_rows(S, W):
     """H = M^-1 G^T for the rows now in W."""
     for e in range(S.blocks.body.shape[0]):
         at = S.blocks.entry[e]
-        if W.option[PARTED] > 0.0:
+        if W.options.parted[0] > 0.0:
             turn_dependent(S, W, S.blocks.body[e], at)
         else:
             inverse_mass(S, S.blocks.body[e], W.G, at, W.H, at)
@@ -94,7 +94,7 @@ def turn_dependent(S, W, b, at):
     n = S.tree.nv[b]
     for k in range(n):
         per = S.bodies.inverse_mass[b] if k <= n // 3 else S.bodies.inverse_reference_inertia[b]
-        W.H[at + k] = per * W.G[at + k] if W.vel[PARTITION, S.tree.v[b] + k].real > 0.0 else 0.0
+        W.H[at + k] = per * W.G[at + k] if W.velocities.partition[S.tree.v[b] + k].real > 0.0 else 0.0
 
 
 @formula
@@ -104,7 +104,7 @@ def natural_size(S, W):
     A slender body makes entries a million times larger along its own axis, which say nothing about the others.
     """
     for k in range(S.rows.law.shape[0]):
-        W.row[DIAGONAL, k] = 0.0
+        W.rows.diagonal[k] = 0.0
     for e in range(S.blocks.body.shape[0]):
         b, at, k = S.blocks.body[e], S.blocks.entry[e], S.blocks.row[e]
         n = S.tree.nv[b]
@@ -115,7 +115,7 @@ def natural_size(S, W):
             turn += W.G[at + 3] * W.G[at + 3] + W.G[at + 4] * W.G[at + 4] + W.G[at + 5] * W.G[at + 5]
         elif n == 3:
             turn += W.G[at + 2] * W.G[at + 2]
-        W.row[DIAGONAL, k] += shift * S.bodies.inverse_reference_mass[b] + turn * S.bodies.inverse_reference_inertia[b]
+        W.rows.diagonal[k] += shift * S.bodies.inverse_reference_mass[b] + turn * S.bodies.inverse_reference_inertia[b]
     size_rows_off(S, W)
 
 
@@ -144,7 +144,7 @@ def factor_schur(S, W):
     natural_size(S, W)
     for k in range(S.rows.law.shape[0]):
         place = S.ldl.Ap[S.ldl.perm[k] + 1] - 1
-        W.A[place] += S.regularization[0] * W.row[DIAGONAL, k] + ROUNDING * W.A[place]
+        W.A[place] += S.regularization[0] * W.rows.diagonal[k] + ROUNDING * W.A[place]
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
 
 
@@ -156,7 +156,7 @@ def factor_coupled(S, W):
     move just now, or never, must not vanish with them.
     """
     nv = W.vel.shape[1]
-    per = W.vel[V1]
+    per = W.velocities.v1
     lever = minimum(1.0, S.length[0]) ** 2
     mass_entries(S, W)
     for e in range(S.mass_entries.row.shape[0]):
@@ -164,17 +164,17 @@ def factor_coupled(S, W):
         own = d == S.mass_entries.column[e]
         if own:
             per[d] = 1.0 / W.M[e]
-        if W.option[PARTED] > 0.0:  # masses of the dependent coordinates alone
-            W.M[e] *= (RIGID if W.vel[PARTITION, d].real < 0.0 else 1.0) if own else 0.0
+        if W.options.parted[0] > 0.0:  # masses of the dependent coordinates alone
+            W.M[e] *= (RIGID if W.velocities.partition[d].real < 0.0 else 1.0) if own else 0.0
         W.A[S.mass_entries.place[e]] = W.M[e]
     for k in range(S.rows.law.shape[0]):
-        s = 0.0 * W.row[DIAGONAL, k]
+        s = 0.0 * W.rows.diagonal[k]
         for e in range(S.row_start[k], S.row_start[k + 1]):
             W.A[S.pairs.place[e]] = W.G[e]
             if S.pairs.place[e] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
                 s += (W.G[e] * W.G[e] + lever) * per[S.column[e]]
         s = choose(s, s, s + 1.0)
-        W.row[DIAGONAL, k] = s
+        W.rows.diagonal[k] = s
         W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.regularization[0] * s
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
 
@@ -187,19 +187,19 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
     M + E is factored in its place and the refinement takes E out again. Returns the residual left, relative to the size
     of its terms.
     """
-    W.info[SOLVES] += 1
+    W.counts.solves[0] += 1
     if W.info[MADE + STEP] != 0:
         return solve_made(S, W, f, gamma, x, lam, loaded, refinements)
     for d in range(x.shape[0]):
-        x[d] = W.vel[GIVEN, d] if loaded else 0.0
+        x[d] = W.velocities.prescribed[d] if loaded else 0.0
     for k in range(lam.shape[0]):
         lam[k] = 0.0
-        W.row[R1, k] = gamma[k]
+        W.rows.r1[k] = gamma[k]
     if S.solver[0] == SCHUR:
         return solve_schur(S, W, f, gamma, x, lam, loaded, refinements)
     if S.solver[0] == COUPLED:
         return solve_coupled(S, W, f, gamma, x, lam, loaded, refinements)
-    articulated_solve(S, W, f, x, W.vel[EFFORT])
+    articulated_solve(S, W, f, x, W.velocities.effort)
     return 0.0
 
 
@@ -210,7 +210,7 @@ def solve_made(S, W, f, gamma, x, lam, loaded, refinements):
     last = 1e300
     for _ in range(refinements + 1 if W.info[MADE + REFINE] != 0 else 0):
         worst = run(W.info[MADE + REFINE], S, W, 0.0, f, gamma, x, lam)
-        if not worst > W.option[PASS] or worst > STALLED * last:
+        if not worst > W.options.pass[0] or worst > STALLED * last:
             break
         last = worst
     return worst
@@ -219,15 +219,15 @@ def solve_made(S, W, f, gamma, x, lam, loaded, refinements):
 @formula
 def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
     """Through S = G M^-1 G^T: one pass, then as many for what is left as it takes."""
-    rhs = W.vel[V2]
-    semidefinite = S.semidefinite[0] > 0.0 and not W.option[PARTED] > 0.0
+    rhs = W.velocities.v2
+    semidefinite = S.semidefinite[0] > 0.0 and not W.options.parted[0] > 0.0
     for d in range(x.shape[0]):
         rhs[d] = f[d] if loaded else 0.0
     if loaded and not semidefinite:
         for b in range(S.tree.parent.shape[0]):
             inverse_mass(S, b, f, S.tree.v[b], x, S.tree.v[b])
         for k in range(lam.shape[0]):
-            W.row[R1, k] = gamma[k] - row_times(S, W, k, x)
+            W.rows.r1[k] = gamma[k] - row_times(S, W, k, x)
     pass_schur(S, W, rhs, x, lam, semidefinite)
     worst = 0.0
     last = 1e300
@@ -235,8 +235,8 @@ def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
         if lam.shape[0] > 0:
             worst = residual(S, W, gamma, x)
         if semidefinite:
-            worst = larger(worst, excess(S, W.vel[V1], rhs, x))
-        if not worst > W.option[PASS] or worst > STALLED * last:
+            worst = larger(worst, excess(S, W.velocities.v1, rhs, x))
+        if not worst > W.options.pass[0] or worst > STALLED * last:
             break
         last = worst
         pass_schur(S, W, rhs, x, lam, semidefinite)
@@ -249,8 +249,8 @@ def pass_schur(S, W, rhs, x, lam, loaded):
 
     The step is left in W.vel[V1].
     """
-    dx = W.vel[V1]
-    r = W.row[R1]
+    dx = W.velocities.v1
+    r = W.rows.r1
     z = W.D[2]
     for d in range(x.shape[0]):
         dx[d] = 0.0
@@ -273,7 +273,7 @@ def pass_schur(S, W, rhs, x, lam, loaded):
 @formula
 def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
     """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving."""
-    rhs = W.vel[V2]
+    rhs = W.velocities.v2
     worst, last = 1.0, 1e300
     for d in range(x.shape[0]):
         rhs[d] = 0.0
@@ -281,7 +281,7 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
         remainder(S, W, f, gamma, x, lam, rhs, loaded)
     for attempt in range(refinements):
         worst = pass_coupled(S, W, f, gamma, x, lam, rhs, loaded)
-        if not worst > W.option[PASS] or (attempt > 0 and worst > STALLED * last):
+        if not worst > W.options.pass[0] or (attempt > 0 and worst > STALLED * last):
             break
         last = worst
     return worst
@@ -295,7 +295,7 @@ def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
     for d in range(nv):
         z[S.ldl.perm[d]] = rhs[d]
     for k in range(lam.shape[0]):
-        z[S.ldl.perm[nv + k]] = W.row[R1, k]
+        z[S.ldl.perm[nv + k]] = W.rows.r1[k]
     ldl_solve(S.ldl, W.L, W.D[0], z)
     for d in range(nv):
         x[d] += z[S.ldl.perm[d]]
@@ -316,7 +316,7 @@ def residual(S, W, gamma, x):
             p = W.G[e] * x[S.column[e]]
             s -= p
             a += magnitude(p)
-        W.row[R1, k] = s
+        W.rows.r1[k] = s
         worst = larger(worst, magnitude(s))
         size = larger(size, a)
     return worst / size
@@ -353,13 +353,13 @@ def remainder(S, W, f, gamma, x, lam, rhs, loaded):
             p = W.G[e] * x[d]
             s -= p
             a += magnitude(p)
-        W.row[R1, k] = s
+        W.rows.r1[k] = s
         off = larger(off, magnitude(s))
         wide = larger(wide, a)
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:
             d = S.tree.v[b]
-            W.vel[EFFORT, d] = -rhs[d]
+            W.velocities.effort[d] = -rhs[d]
             rhs[d] = 0.0
     worst = 0.0
     for d in range(x.shape[0]):

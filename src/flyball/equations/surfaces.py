@@ -41,7 +41,7 @@ FLAT = 1e-9
 @formula
 def along(S, W, s):
     """Whether the motion is held on the corner of switch s."""
-    return S.switches.kind[s] == BRANCH and W.switch[MODE, s] != OFF
+    return S.switches.kind[s] == BRANCH and W.modes.mode[s] != OFF
 
 
 @formula
@@ -61,7 +61,7 @@ def drifts(S, W, t):
     for m in range(nm):
         a = W.sensed[BIAS, m]
         for e in range(S.row_start[nr + m], S.row_start[nr + m + 1]):
-            a += W.G[e] * W.vel[X_SOLVED, S.column[e]]
+            a += W.G[e] * W.velocities.solved[S.column[e]]
         W.sensed[RATE, nm + m] = a
         W.sensed[BIAS, nm + m] = W.sensed[BIAS, m]
         W.sensed[BIAS, m] = a
@@ -73,7 +73,7 @@ def drifts(S, W, t):
         if S.switches.kind[s] == BRANCH:
             law = S.switches.law[s]
             jet = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, WHOLE)
-            W.switch[DRIFT_OFF, s] = jet[2] if W.switch[MODE, s] == STEADY else jet[1]
+            W.modes.drift[s] = jet[2] if W.modes.mode[s] == STEADY else jet[1]
     for m in range(nm):
         W.sensed[BIAS, m] = W.sensed[BIAS, nm + m]
         W.sensed[BIAS, nm + m] = 0.0 * W.sensed[VALUE, m]
@@ -93,8 +93,8 @@ def settled(S, W, t, n):
             change = 0.0
             for k in range(ns):
                 if along(S, W, k):
-                    change += W.switch[INVERSE_SLOPES + s, k] * W.switch[DRIFT_OFF, k]
-            W.switch[SIDE_MOVED, s] = change
+                    change += W.switch[INVERSE_SLOPES + s, k] * W.modes.drift[k]
+            W.modes.moved_side[s] = change
             if not abs(change) <= worst:
                 worst = abs(change)
     if worst <= SETTLED:
@@ -102,9 +102,9 @@ def settled(S, W, t, n):
     for s in range(ns):
         if along(S, W, s):
             at = way_of(S, W, s)
-            W.switch[SIDE_BEFORE, s] = W.sensed[VALUE, at]
-            W.switch[DRIFT_BEFORE, s] = W.switch[DRIFT_OFF, s]
-            W.sensed[VALUE, at] -= W.switch[SIDE_MOVED, s]
+            W.modes.previous_side[s] = W.sensed[VALUE, at]
+            W.modes.previous_drift[s] = W.modes.drift[s]
+            W.sensed[VALUE, at] -= W.modes.moved_side[s]
     return False
 
 
@@ -115,23 +115,23 @@ def learn(S, W):
     moved = 0.0
     share = 0.0
     for s in range(ns):
-        W.switch[SIDE_MOVED, s] = 0.0
-        W.switch[SIDE_TOLD, s] = 0.0
+        W.modes.moved_side[s] = 0.0
+        W.modes.given_side[s] = 0.0
     for s in range(ns):
         if along(S, W, s):
-            dx = W.sensed[VALUE, way_of(S, W, s)] - W.switch[SIDE_BEFORE, s]
+            dx = W.sensed[VALUE, way_of(S, W, s)] - W.modes.previous_side[s]
             for k in range(ns):
                 if along(S, W, k):
                     b = W.switch[INVERSE_SLOPES + s, k]
-                    W.switch[SIDE_MOVED, s] += b * (W.switch[DRIFT_OFF, k] - W.switch[DRIFT_BEFORE, k])
-                    W.switch[SIDE_TOLD, k] += dx * b
+                    W.modes.moved_side[s] += b * (W.modes.drift[k] - W.modes.previous_drift[k])
+                    W.modes.given_side[k] += dx * b
             moved += dx * dx
-            share += dx * W.switch[SIDE_MOVED, s]
+            share += dx * W.modes.moved_side[s]
     if not share > FLAT * moved or moved < SETTLED * SETTLED:
         return
     for s in range(ns):
         if along(S, W, s):
-            dx = W.sensed[VALUE, way_of(S, W, s)] - W.switch[SIDE_BEFORE, s]
+            dx = W.sensed[VALUE, way_of(S, W, s)] - W.modes.previous_side[s]
             for k in range(ns):
                 if along(S, W, k):
-                    W.switch[INVERSE_SLOPES + s, k] += (dx - W.switch[SIDE_MOVED, s]) * W.switch[SIDE_TOLD, k] / share
+                    W.switch[INVERSE_SLOPES + s, k] += (dx - W.modes.moved_side[s]) * W.modes.given_side[k] / share

@@ -176,7 +176,7 @@ def place(t, y, g, A):
         y[i] = own.y[0, i]
     worst = 0.0
     for r in range(g.shape[0]):
-        g[r] = W.row[G_VALUE, r]
+        g[r] = W.rows.value[r]
         x = abs(g[r])
         if not x <= worst:
             worst = x

@@ -117,7 +117,7 @@ def note(A, K, row):
     for m in range(measured(S)):
         a = W.sensed[BIAS, m]
         for e in range(S.row_start[nr + m], S.row_start[nr + m + 1]):
-            a += W.G[e] * W.vel[X_SOLVED, S.column[e]]
+            a += W.G[e] * W.velocities.solved[S.column[e]]
         K.moving[end, 0, m], K.moving[end, 1, m], K.moving[end, 2, m] = W.sensed[VALUE, m], W.sensed[RATE, m], a
     levels(A, K, 0 if row == START else K.levels.shape[0] - 1)
     balanced(A)
@@ -225,7 +225,7 @@ def _desk(S: System, expected: Work, c: np.ndarray, stages: int) -> Watch:
     columns = np.arange(2 * nm, expected.sensed.shape[1])
     loads = columns[: len(columns) - len(S.switches.row)]
     spots = [(VALUE, m) for m in columns] + [(RETURNED, m) for m in loads]
-    there = expected.sensed, expected.row[LAM]
+    there = expected.sensed, expected.rows.multiplier
     guarded = S.guards.direction, keeps(S)
     return watching(*guarded, c, stages, nm, rows, np.array(spots, int), there, 3 * len(S.switches.row))
 

@@ -122,7 +122,7 @@ def _jumped(result: Any) -> dict[str, list[float]]:
     for k, x in enumerate(every):
         old = every[k - 1] if k else x
         other = x.values is not old.values
-        if other or (x.switch[SPARE] != old.switch[SPARE]).any():
+        if other or (x.modes.released != old.modes.released).any():
             now, then = (_stored(result, by, old.end) for by in ((x.values, x.switch), (old.values, old.switch)))
             total |= {name: total[name] + now[name] - then[name] for name in names if name != ALL}
             if other:

@@ -58,21 +58,21 @@ class Solves(Recorder):
         f, gamma = self.numbered("f", self.nv), self.numbered("gamma", self.nr)
         reads = {**reads, **self.given("a", f), **self.given("b", gamma)}
         x, lam = np.array([0.0] * self.nv, object), np.array([0.0] * self.nr, object)
-        W.row[R1] = gamma
-        W.vel[V2] = W.vel[EFFORT] = 0.0
+        W.rows.r1 = gamma
+        W.velocities.v2 = W.velocities.effort = 0.0
         if is_loaded:
             reads |= self.fresh("vel", GIVEN, self.driven)
-            x[self.driven] = W.vel[GIVEN, self.driven]
+            x[self.driven] = W.velocities.prescribed[self.driven]
         if S.solver[0] == SCHUR and self.semidefinite:  # what a pass gives back of E is of all that it has moved
-            W.vel[V2] = f if is_loaded else 0.0
+            W.velocities.v2 = f if is_loaded else 0.0
         elif S.solver[0] == SCHUR:
             for b in range(len(S.tree.parent)) if is_loaded else ():
                 inverse_mass(S, b, f, S.tree.v[b], x, S.tree.v[b])
-            W.row[R1] = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]
+            W.rows.r1 = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]
         elif S.solver[0] == COUPLED and is_loaded:
-            remainder(S, W, f, gamma, x, lam, W.vel[V2], True)
+            remainder(S, W, f, gamma, x, lam, W.velocities.v2, True)
         elif S.solver[0] == ARTICULATED:
-            articulated_solve(S, W, f, x, W.vel[EFFORT])
+            articulated_solve(S, W, f, x, W.velocities.effort)
         stores = [*self.solution(x, lam), (("W_flat", LOADED), 1.0 if is_loaded else 0.0)]
         self.add(name, reads, stores)
 
@@ -96,7 +96,7 @@ class Solves(Recorder):
         """What is left after a pass, and its size."""
         S, W = self.S, self.W
         worst = residual(S, W, gamma, x) if self.nr else 0.0
-        return larger(worst, excess(S, W.vel[V1], W.vel[V2], x)) if self.semidefinite else worst
+        return larger(worst, excess(S, W.velocities.v1, W.velocities.v2, x)) if self.semidefinite else worst
 
     def refined(self, reads: dict[int, Place]) -> None:
         """A pass for what is left."""
@@ -107,13 +107,13 @@ class Solves(Recorder):
         reads |= self.fresh("row", R1, range(self.nr)) | self.fresh("vel", V2, range(self.nv))
         x, lam = x.copy(), lam.copy()
         if S.solver[0] == SCHUR:
-            pass_schur(S, W, W.vel[V2], x, lam, self.semidefinite)
+            pass_schur(S, W, W.velocities.v2, x, lam, self.semidefinite)
             worst = self.schur_left(gamma, x)
         else:
             is_loaded = self.graph.symbol("loaded")
             reads[is_loaded.index] = ("W_flat", LOADED)
             f = np.array([choose(is_loaded, y, 0.0) for y in f] or [0.0], object)[: self.nv]
-            worst = pass_coupled(S, W, f, gamma, x, lam, W.vel[V2], True)
+            worst = pass_coupled(S, W, f, gamma, x, lam, W.velocities.v2, True)
         self.add("REFINE", reads, self.solution(x, lam), worst)
 
     def drifted(self) -> None:

@@ -70,7 +70,7 @@ class Stages(Solves):
         prepare(self.S, self.W, self.t, q, v)
         stores = [(("a", k), x) for k, x in enumerate(q) if x is not self.q[k]]
         stores += [(("b", k), x) for k, x in enumerate(v) if x is not self.v[k]]
-        stores += [(self.at("vel", GIVEN, d), self.W.vel[GIVEN, d]) for d in self.driven]
+        stores += [(self.at("vel", GIVEN, d), self.W.velocities.prescribed[d]) for d in self.driven]
         self.add("PREPARE", {**self.given("a", self.q), **self.given("b", self.v), **self.time}, stores)
 
     def placed(self) -> None:
@@ -171,14 +171,14 @@ class Stages(Solves):
         if not self.finishes:
             return
         nq, nv = self.s.nq, self.nv
-        given = self.W.vel[X_SOLVED], self.W.row[LAM]
+        given = self.W.velocities.solved, self.W.rows.multiplier
         x, lam = self.numbered("x", nv), self.numbered("lam", self.nr)
-        self.W.vel[X_SOLVED], self.W.row[LAM] = x, lam
+        self.W.velocities.solved, self.W.rows.multiplier = x, lam
         reads = self.fresh("vel", EFFORT, self.driven)
         before = self.numbered("dy", nq + nv + len(self.z))  # works stand there already
         dy = before.copy()
         finish(self.S, self.W, self.t, np.concatenate([self.q, self.v, self.z]), dy)
-        self.W.vel[X_SOLVED], self.W.row[LAM] = given
+        self.W.velocities.solved, self.W.rows.multiplier = given
         stores = [(("b", k), y) for k, y in enumerate(dy) if y is not before[k]]
         reads |= {**self.state, **self.given("b", before), **self.given("c", x), **self.given("d", lam)}
         made = self.add("FINISH", reads, stores)

@@ -122,7 +122,7 @@ def make_consistent(A, X):
     for d in range(A.wide.shape[1]):
         rows[0, d] = 0.0
     for r in range(A.S.rows.law.shape[0]):
-        rows[1, r] = A.W.row[NU, r] - row_times(A.S, A.W, r, X.wide)
+        rows[1, r] = A.W.rows.nu[r] - row_times(A.S, A.W, r, X.wide)
     call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, SOLVE)
     for d in range(A.wide.shape[1]):
         A.wide[WAY, d] = X.wide[d] + 0.5 * rows[2, d]
@@ -204,7 +204,7 @@ def keep(A, P, X):
     for r in range(A.lam.shape[1]):
         A.lam[1, r] = A.sheet.rows[3, r]
     for d in range(nv):
-        A.wide[EFFORTS, d] += A.W.vel[EFFORT, d] / h
+        A.wide[EFFORTS, d] += A.W.velocities.effort[d] / h
         A.wide[V_AFTER, d] = before[d] + A.wide[SMOOTH, d] + A.wide[STRUCK, d]
         A.wide[STRUCK, d] = A.wide[V_AFTER, d] - before[d] - A.wide[CHANGE, d]  # by contact and lines
     for d in range(nv):
@@ -292,7 +292,7 @@ def account(A, h):
     work = A.clock.K[0, S.coordinates[0] + A.wide.shape[1] :]
     for r in range(S.rows.law.shape[0]):
         if S.rows.work[r] >= 0:
-            work[S.rows.work[r]] = (A.lam[0, r] + A.lam[1, r] / h) * W.row[NU, r]
+            work[S.rows.work[r]] = (A.lam[0, r] + A.lam[1, r] / h) * W.rows.nu[r]
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:
             d = S.tree.v[b]
@@ -347,9 +347,9 @@ def finish(A, M, X):
         call(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)
         A.real[KINETIC] = kinetic(A)
         put_aside_poses(A)
-    A.W.option[PLACED] = 1.0
+    A.W.options.placed[0] = 1.0
     status = call(A.door[0], S, A.W, A.R, A.clock, A.sheet, ARRIVE)
-    A.W.option[PLACED] = 0.0
+    A.W.options.placed[0] = 0.0
     if status != 0:
         return status
     call(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)

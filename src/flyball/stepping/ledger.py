@@ -39,7 +39,7 @@ def weighed(A, column):
 def reactions_work(A, lam, v):
     """Work of joints' impulses of impacts at velocities v, beyond that of what is prescribed."""
     for r in range(A.S.rows.law.shape[0]):
-        A.real[ASTRAY] -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.row[NU, r])
+        A.real[ASTRAY] -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.rows.nu[r])
 
 
 @formula

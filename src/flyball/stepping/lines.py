@@ -197,7 +197,7 @@ def press(A):
     if A.S.load_terms.load.shape[0] == 0:
         return
     for r in range(A.lam.shape[1]):
-        A.W.row[LAM, r] = A.lam[0, r] + (A.lam[1, r] + A.lam[2, r]) / A.real[STEP]
+        A.W.rows.multiplier[r] = A.lam[0, r] + (A.lam[1, r] + A.lam[2, r]) / A.real[STEP]
     reaction_loads(A.S, A.W)
     for k in range(A.line.shape[0]):
         if A.line[k, WHAT] == FRICTION and A.S.forces.load[A.line[k, OF_FORCE]] >= 0:

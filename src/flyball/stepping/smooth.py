@@ -65,9 +65,9 @@ def put_aside(A, h):
     nq = A.S.coordinates[0]
     for d in range(A.wide.shape[1]):
         A.wide[SMOOTH, d] = h * A.clock.K[0, nq + d]
-        A.wide[EFFORTS, d] = A.W.vel[EFFORT, d]
+        A.wide[EFFORTS, d] = A.W.velocities.effort[d]
     for r in range(A.lam.shape[1]):
-        A.lam[0, r] = A.W.row[LAM, r]
+        A.lam[0, r] = A.W.rows.multiplier[r]
 
 
 @formula

@@ -120,18 +120,18 @@ def traced(
         W.sensed[LOAD, 2 * nm + n] = load
     T = np.array([[0.0] * nv] * s.nq, object).reshape(s.nq, nv)
     _rates(S, q, v, T)
-    f = W.vel[F_APPLIED]
+    f = W.velocities.applied
     inertial(S, W)
     forces(S, W, t, work_rates)
     gather(S, W, f)
     efforts(S, W, t, work_rates, f)
     M = mass_matrix(S, W, nv)
     gradients, G = _rows(S, W, nm, nv)
-    W.row[LAM] = lam
+    W.rows.multiplier = lam
     reaction_loads(S, W)
     return Traced(
-        graph, s, S, W, t, q, v, z, lam, loads, T, M, f.copy(), W.row[G_VALUE].copy(), W.row[NU].copy(), G,
-        W.row[GAMMA].copy(), W.sensed[VALUE : VALUE + 3, :nm].T.copy(), gradients, work_rates,
+        graph, s, S, W, t, q, v, z, lam, loads, T, M, f.copy(), W.rows.value.copy(), W.rows.nu.copy(), G,
+        W.rows.gamma.copy(), W.sensed[VALUE : VALUE + 3, :nm].T.copy(), gradients, work_rates,
         W.sensed[RETURNED, 2 * nm :].copy(),
     )  # fmt: skip
 

@@ -88,7 +88,7 @@ def holding(result: Result) -> Table:
             continue
         yes, no = _words(x)
         told = [yes if held[k, i] else no for i in (0, -1)]
-        if result.stretches.all[-1].switch[SPARE, k] != 0.0:
+        if result.stretches.all[-1].modes.released[k] != 0.0:
             told[-1] = "released"
         event = x.element.category == "events"
         name = x.switch.label if event else x.element.name

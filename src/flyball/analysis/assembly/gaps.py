@@ -19,7 +19,7 @@ def disagreement(c: Compiled, best: Any) -> AssemblyError:
     """The error that says which elements cannot be fulfilled together, worst first; ``best`` is the nearest start."""
     t = best.t
     c.at(t, best.q, best.v)
-    g = c.work.row[G_VALUE]
+    g = c.work.rows.value
     name, length = c.structure.model.name, c.values.length
     lawless = [r.element for r, x in zip(c.structure.rows, g, strict=True) if r.law >= 0 and not np.isfinite(x)]
     if lawless:
@@ -54,7 +54,7 @@ def _size(metres: float, radians: float, length: float) -> str:
 
 def no_rate(c: Compiled, t: float) -> AssemblyError | None:
     """The error for a driver's law that has no finite rate at t; rows are those last evaluated."""
-    for r, x in zip(c.structure.rows, c.work.row[NU], strict=True):
+    for r, x in zip(c.structure.rows, c.work.rows.nu, strict=True):
         if not np.isfinite(x):
             return AssemblyError(
                 f"{c.structure.model.name!r} cannot be assembled at t = {t:g} s: the law of {r.element.title} has the "

@@ -27,7 +27,7 @@ def misfit(c: Compiled, t: float, q: np.ndarray, v: np.ndarray, near: float | No
     ``near``: what rounding leaves [m], if that is told.
     """
     c.at(t, q, v)
-    g = np.abs(c.work.row[G_VALUE])
+    g = np.abs(c.work.rows.value)
     if not np.isfinite(g).all():
         return np.inf
     return float(
@@ -128,7 +128,7 @@ def newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
     """Damped Gauss-Newton until closed or no better. Returns (q, iterations)."""
     root, scale = np.sqrt(inverse_weights(c)), row_scales(c)
     size = misfit(c, t, q, v)
-    g = scale * c.work.row[G_VALUE]
+    g = scale * c.work.rows.value
     damping, wider, capped = 0.0, 1.0, 0
     norm = float(g @ g)
     for k in range(ITERATIONS):
@@ -141,7 +141,7 @@ def newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
         d = d / over if over > 1.0 else d
         new = _moved_by(c, q, d)
         new_size = misfit(c, t, new, v)
-        trial = scale * c.work.row[G_VALUE]
+        trial = scale * c.work.rows.value
         new_norm = float(trial @ trial)
         if np.isfinite(new_size) and new_norm < norm:
             gain = 1.0 - new_norm / norm

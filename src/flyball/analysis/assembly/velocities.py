@@ -263,7 +263,7 @@ def consistent(
     c.follow(plain.hints)
     v = described(c.values, q)
     c.at(t, q, v)
-    nu = c.work.row[NU].copy()
+    nu = c.work.rows.nu.copy()
     for i in holds:
         nu[c.structure.slices[i.name]] = rates[i.name]
     w = Wanted.at(c, q, nu)

@@ -42,7 +42,7 @@ def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool, redun
     found = irreducible(lam * size[:, None], groups, most)
     all_found = sum(basis.shape[1] for _, basis in found) == redundancy
     found.sort(key=lambda x: len(x[0]))
-    g, nu = c.work.row[G_VALUE] / size, (c.sparse_jacobian() @ a.v - c.work.row[NU]) / size
+    g, nu = c.work.rows.value / size, (c.sparse_jacobian() @ a.v - c.work.rows.nu) / size
     those = [tuple(names[e] for e in elements) for elements, _ in found]
     tried = cures(there, those, positions)
     out = []

@@ -101,7 +101,7 @@ def _none_added(base: Assembly) -> bool:
 def _wanted(base: Assembly) -> Wanted:
     c = base.compiled
     c.at(base.t, base.q, base.v)
-    return Wanted.at(c, base.q, c.work.row[NU].copy())
+    return Wanted.at(c, base.q, c.work.rows.nu.copy())
 
 
 def _described(d: Direction, base: Assembly, x: State) -> tuple[np.ndarray, np.ndarray]:

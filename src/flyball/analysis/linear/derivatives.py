@@ -63,7 +63,7 @@ class State:
         if c.at(t, q, v, MOTION)[0] != 0:
             raise AnalysisError(f"{c.structure.model.name!r} at t = {t:.6g} s, {no_solution(c, t, abs(t))}")
         W = c.work
-        return cls(c, t, q, v, c.z.copy(), W.vel[X_SOLVED].copy(), W.row[LAM].copy(), W.vel[EFFORT].copy())
+        return cls(c, t, q, v, c.z.copy(), W.velocities.solved.copy(), W.rows.multiplier.copy(), W.velocities.effort.copy())
 
     @classmethod
     def resting(cls, c: Compiled, t: float, q: np.ndarray, lam: np.ndarray | None = None) -> State:

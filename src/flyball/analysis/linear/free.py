@@ -224,7 +224,7 @@ def _nearby(c: Compiled, t: float, q: np.ndarray, step: np.ndarray, scale: np.nd
         for _ in range(PASSES):
             retract(c.values.system, q, step)
             c.at(t, q, still)
-            G, g = c.jacobian()[which], c.work.row[G_VALUE][which]
+            G, g = c.jacobian()[which], c.work.rows.value[which]
             if np.abs(g).max(initial=0.0) < CLOSED * c.values.length:
                 return np.vstack([G, prescribed(c)])
             step = (

@@ -103,7 +103,7 @@ class Engine:
         """The motion begins there."""
         self._first = float(clock.real[ex.T])
         if self.due < math.inf:
-            self._counted = int(self.c.work.info[EVALUATIONS])
+            self._counted = int(self.c.work.counts.evaluations[0])
 
     def choose_again(self, clock: ex.Clock) -> None:
         """Take made code for the rest of the motion, if it is time to decide and that pays."""
@@ -147,7 +147,7 @@ class Engine:
 
     def _spent(self) -> float:
         """What was computed since it began [ns]."""
-        return (int(self.c.work.info[EVALUATIONS]) - self._counted) * self._each
+        return (int(self.c.work.counts.evaluations[0]) - self._counted) * self._each
 
     def _wanted(self, without: str) -> None:
         try:

@@ -28,9 +28,9 @@ def refuse_jump(before: Result, c: Compiled, t: float, q: np.ndarray, v: np.ndar
         return
     now = _moving(c, t, q, v)
     size = c.values.length
-    off = dict(zip(_rows(c), np.abs(c.work.row[G_VALUE]) / size, strict=True))
-    fast = {name: abs(x) for name, x in zip(_rows(c), c.jacobian() @ v - c.work.row[NU], strict=True)}
-    most = max(np.abs(v).max(initial=0.0), np.abs(c.work.row[NU]).max(initial=0.0))
+    off = dict(zip(_rows(c), np.abs(c.work.rows.value) / size, strict=True))
+    fast = {name: abs(x) for name, x in zip(_rows(c), c.jacobian() @ v - c.work.rows.nu, strict=True)}
+    most = max(np.abs(v).max(initial=0.0), np.abs(c.work.rows.nu).max(initial=0.0))
     if c.structure.tree:
         then = _moving(Compiled(before.values, before.final[1][len(q) + len(v) :].copy()), t, q, v)
         off |= {f"body {k!r}": max(_most(x.p - then[k].p) / size, _most(x.R - then[k].R)) for k, x in now.items()}

@@ -50,7 +50,7 @@ def solved(start: Start, rows: np.ndarray, health: Health) -> tuple[np.ndarray, 
     c = start.assembly.compiled
     s, W = c.structure, c.work
     ny = s.nq + s.nv + len(s.states)
-    W.option[LATER] = 0.0
+    W.options.later[0] = 0.0
     for tables in (c.system, c.values.system):  # what made code cannot do the engine's loops may
         out = rows.copy()
         if motion_kernel(tables, W, tableau("rk45"), standing(ny), out, COMPLETE) == 0:

@@ -132,8 +132,8 @@ def no_solution(c: Compiled, t: float, span: float) -> str:
     text = found.message if found else of_drivers(c, t, span) or broken_force(c, t) or _broken_rate(c, t)
     if text:
         return text
-    if c.work.info[STATUS] == motion.JAMMED:
-        return f"{c.structure.forces[int(c.work.info[GUILTY])].title} jams there: it grows with the load that it makes"
+    if c.work.counts.status[0] == motion.JAMMED:
+        return f"{c.structure.forces[int(c.work.counts.guilty[0])].title} jams there: it grows with the load that it makes"
     return "the position is singular: constraints depend on one another, or a freedom moves no inertia"
 
 
@@ -214,7 +214,7 @@ def _jump(before: tuple, after: tuple, step: float, wrapped: bool) -> str:
 
 
 def _not_finite(a: Assembly, clock: ex.Clock, method: str) -> str:
-    if clock.count[ex.STATUS] != ex.NOT_FINITE and a.compiled.work.info[STATUS] != motion.NOT_FINITE:
+    if clock.count[ex.STATUS] != ex.NOT_FINITE and a.compiled.work.counts.status[0] != motion.NOT_FINITE:
         return ""
     t = float(clock.real[ex.T])
     span = float(clock.real[ex.LARGEST])
@@ -253,7 +253,7 @@ def _ended(a: Assembly, clock: ex.Clock) -> str:
 
 def _held_on(a: Assembly) -> list[str]:
     """Laws on whose corners the motion is held."""
-    mode = a.compiled.work.switch[MODE]
+    mode = a.compiled.work.modes.mode
     specs = enumerate(a.compiled.structure.switches)
     return [x.switch.label for k, x in specs if x.switch.kind == BRANCH and mode[k] != OFF]
 
@@ -354,7 +354,7 @@ def _locked(a: Assembly, base: Assembly, clock: ex.Clock) -> str:
     if not gap.max() > LOCKED * asked:
         return ""
     names = list(dict.fromkeys(c.structure.rows[k].element.name for k in np.argsort(-gap) if gap[k] > 1e-3 * gap.max()))
-    why = story(c, t, q, v, c.work.row[GAMMA].copy(), "/s^2") or (
+    why = story(c, t, q, v, c.work.rows.gamma.copy(), "/s^2") or (
         "in this position they leave no way on for these velocities. The mechanism locks (a driver may ask for more "
         "than its links allow), or it is drawn in a singular position with velocities that it cannot have"
     )
@@ -363,18 +363,18 @@ def _locked(a: Assembly, base: Assembly, clock: ex.Clock) -> str:
 
 def _jammed(a: Assembly, clock: ex.Clock) -> str:
     W = a.compiled.work
-    if W.info[STATUS] != motion.JAMMED:
+    if W.counts.status[0] != motion.JAMMED:
         return ""
     loads = int((a.compiled.system.forces.load >= 0).sum())
-    return jam(a.compiled.structure.forces[int(W.info[GUILTY])], float(clock.real[ex.T]), loads == 1)
+    return jam(a.compiled.structure.forces[int(W.counts.guilty[0])], float(clock.real[ex.T]), loads == 1)
 
 
 def _stuck(a: Assembly, clock: ex.Clock) -> str:
     rows, W = a.compiled.structure.rows, a.compiled.work
-    k = int(W.info[GUILTY])
+    k = int(W.counts.guilty[0])
     where = f" near {rows[k].element.title}" if rows else ""
     if rows and isinstance(rows[k].element, Driver):
-        where += f" (whose law there has the rate {W.row[NU, k]:.4g} and the second derivative {W.row[NU_DOT, k]:.4g})"
+        where += f" (whose law there has the rate {W.rows.nu[k]:.4g} and the second derivative {W.rows.nu_dot[k]:.4g})"
     t = f"t = {clock.real[ex.T]:.6g} s"
     begun = clock.count[ex.STARTED] == 1
     if clock.real[ex.STEP] > 0.0 and begun:

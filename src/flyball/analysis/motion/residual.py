@@ -87,9 +87,9 @@ def missed(
     def times(entries: np.ndarray, x: np.ndarray) -> np.ndarray:
         return np.bincount(row, entries * x[column], n)
 
-    gamma = c.work.row[GAMMA].copy()
+    gamma = c.work.rows.gamma.copy()
     if o is not None and o.get("stabilization") == "baumgarte":
-        gamma -= 2 * o["alpha"] * (times(G, v) - c.work.row[NU]) + o["beta"] ** 2 * c.work.row[G_VALUE]
+        gamma -= 2 * o["alpha"] * (times(G, v) - c.work.rows.nu) + o["beta"] ** 2 * c.work.rows.value
     turning = np.zeros(n)
     np.maximum.at(turning, row, (np.abs(v) / sizes)[column])
     asked = times(abs(G), np.abs(_unconstrained(c))) + np.abs(gamma) + times(abs(G), np.abs(v)) * turning
@@ -108,4 +108,4 @@ def _unconstrained(c: Compiled) -> np.ndarray:
     for b, (v0, n) in enumerate(zip(S.tree.v, S.tree.nv, strict=True)):
         k = min(n, 2 if c.structure.model.planar else 3)
         per[v0 : v0 + k], per[v0 + k : v0 + n] = S.bodies.inverse_mass[b], S.bodies.inverse_reference_inertia[b]
-    return per * c.work.vel[F_APPLIED]
+    return per * c.work.velocities.applied

@@ -195,5 +195,5 @@ def on_corner(c: Compiled) -> bool:
     """Whether a law is held on its corner: its side follows from accelerations, which implicit steps do not find."""
     if not len(c.system.switches.row):
         return False
-    kinds, modes = c.system.switches.kind, c.work.switch[MODE]
+    kinds, modes = c.system.switches.kind, c.work.modes.mode
     return bool(((kinds == BRANCH) & (modes != OFF)).any())

@@ -38,7 +38,7 @@ def frozen_modes(
     gone: dict[str, None] = {e.name: None for e in holding_parts(model)}
     parts, slides = list[Element](), list[str]()
     for k, x in enumerate(own.switches):
-        e, off = model[x.element.name], last.switch[MODE, k] == OFF
+        e, off = model[x.element.name], last.modes.mode[k] == OFF
         if x.switch.kind in (ELASTIC, BRANCH):
             continue
         if off and x.switch.kind == FRICTION:

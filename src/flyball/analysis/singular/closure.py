@@ -85,8 +85,8 @@ class Closure:
     def residual(self, x: Place, v: np.ndarray | None = None) -> np.ndarray:
         """F at a point."""
         self.evaluated(x, np.zeros(len(self.scale)) if v is None else v)
-        F = self.c.work.row[G_VALUE][self.used] * self.row_scale[self.used]
-        gap = self.c.work.row[G_VALUE, self.drive] - x.a
+        F = self.c.work.rows.value[self.used] * self.row_scale[self.used]
+        gap = self.c.work.rows.value[self.drive] - x.a
         F[-1] = (np.arctan2(np.sin(gap), np.cos(gap)) if self.turning else gap) / self.unit
         return F
 
@@ -111,7 +111,7 @@ class Closure:
     def second(self, x: Place, d: np.ndarray) -> np.ndarray:
         """F''[d, d], exactly: minus gamma at the velocity d."""
         self.evaluated(x, d[:-1] * self.scale)
-        out = -self.c.work.row[GAMMA][self.used] * self.row_scale[self.used]
+        out = -self.c.work.rows.gamma[self.used] * self.row_scale[self.used]
         out[-1] *= 1.0 / self.unit / self.row_scale[self.drive]
         return out
 

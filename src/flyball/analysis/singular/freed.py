@@ -45,7 +45,7 @@ class Freed:
     def values(self, x: Place, near: np.ndarray | None = None) -> np.ndarray:
         """Values of the coordinates; angles are those next to ``near``."""
         self.closure.residual(x)
-        out = self.closure.c.work.row[G_VALUE][self.row_of].copy()
+        out = self.closure.c.work.rows.value[self.row_of].copy()
         if near is not None:
             turns = 2.0 * np.pi * np.round((near - out) / (2.0 * np.pi))
             out += np.where([u == "rad" for u in self.units[: self.coordinates]], turns, 0.0)
@@ -57,7 +57,7 @@ class Freed:
         v = d[:-1] * k.scale
         k.residual(x, v)
         W, S = k.c.work, k.c.values.system
-        bias = -W.row[GAMMA][self.row_of]
+        bias = -W.rows.gamma[self.row_of]
         v = v if e is None else e[:-1] * k.scale
         out = (k.c.jacobian() @ v)[self.row_of]
         if e is not None:

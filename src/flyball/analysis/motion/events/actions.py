@@ -133,7 +133,7 @@ def act_at_start(here: Here) -> Acts:
     """
     for k, spec in enumerate(here.structure.switches):
         if spec.held:
-            here.c.work.switch[MODE, k] = HELD
+            here.c.work.modes.mode[k] = HELD
     if here.start.before is not None:
         gone_on(here, here.start.before)
         take_up(here, here.start.before.carried)

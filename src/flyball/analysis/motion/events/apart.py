@@ -16,17 +16,17 @@ def put_apart(n: Instant) -> None:
     """Take overlaps up to `SLIGHT` away, of contacts, stops and ropes; velocities stay."""
     over = {}
     for s in np.flatnonzero(n.kind == STOP).tolist():
-        lower, upper = n.W.switch[LOWER, s], n.W.switch[UPPER, s]
+        lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
         for side, beyond in ((lower, lower - n.x[s]), (upper, n.x[s] - upper)):
             if n.near[s] < beyond <= SLIGHT * n.unit[s]:
                 over[s] = side, beyond
     if not over:
         return
-    y, modes, hold = n.here.y.copy(), n.W.switch[MODE].copy(), n.W.switch[HOLD].copy()
+    y, modes, hold = n.here.y.copy(), n.W.modes.mode.copy(), n.W.modes.hold.copy()
     for s, (side, _) in over.items():
-        n.W.switch[MODE, s], n.W.switch[HOLD, s] = HELD, side
+        n.W.modes.mode[s], n.W.modes.hold[s] = HELD, side
     n.arrive()
-    n.W.switch[MODE], n.W.switch[HOLD] = modes, hold
+    n.W.modes.mode, n.W.modes.hold = modes, hold
     n.here.v[:] = y[n.here.structure.nq : n.here.structure.nq + n.here.structure.nv]
     n.arrive()  # velocities on the rows of joints, where they are now
     n.look()

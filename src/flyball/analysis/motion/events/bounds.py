@@ -59,17 +59,17 @@ def beyond(here: Here, near: np.ndarray) -> dict[int, float]:
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :]
     for s, spec in enumerate(here.structure.switches):
         x, kind = W.sensed[VALUE, spec.measured], S.switches.kind[s]
-        if kind == RATCHET and W.switch[MODE, s] == HELD:
+        if kind == RATCHET and W.modes.mode[s] == HELD:
             tooth, pitch = S.switch_numbers.tooth[s], S.switch_numbers.pitch[s]
-            off = (W.switch[HOLD, s] - tooth) / pitch
+            off = (W.modes.hold[s] - tooth) / pitch
             past = abs(off - round(off)) * pitch
         elif kind == STOP:
-            past = max(W.switch[LOWER, s] - x, x - W.switch[UPPER, s])
-            if W.switch[MODE, s] == HELD and past <= near[s]:
+            past = max(W.modes.lower[s] - x, x - W.modes.upper[s])
+            if W.modes.mode[s] == HELD and past <= near[s]:
                 side = W.switch[LOWER if ways[s] > 0.0 else UPPER, s]
-                W.switch[HOLD, s] = side
+                W.modes.hold[s] = side
                 if abs(x - side) > near[s]:
-                    W.switch[MODE, s], ways[s] = OFF, 0.0
+                    W.modes.mode[s], ways[s] = OFF, 0.0
         else:
             continue
         if past > near[s]:

@@ -76,7 +76,7 @@ class Corners:
         self.n = n
         self.all = np.array(n.of(BRANCH), np.int64)
         self.at: set[int] = set()
-        self.old = n.W.switch[MODE].copy()
+        self.old = n.W.modes.mode.copy()
         self.sides = n.ways().copy()
         self.over = np.nan
         self.fell = n.here.v.copy()
@@ -86,7 +86,7 @@ class Corners:
         self.n.ask(MOTION)
         for s in self.all.tolist():
             u, least = self.value(s)
-            if self.n.W.switch[MODE, s] != OFF and abs(u) <= KEPT * max(least, seen(self.n, s).grain):
+            if self.n.W.modes.mode[s] != OFF and abs(u) <= KEPT * max(least, seen(self.n, s).grain):
                 self.at.add(s)  # it goes on
                 continue
             self.n.ways()[s] = 1.0 if u >= 0.0 else -1.0
@@ -127,25 +127,25 @@ class Corners:
         if not len(self.all):
             return False
         n, ways = self.n, self.n.ways()
-        before, modes = ways[self.all].copy(), n.W.switch[MODE, self.all].copy()
+        before, modes = ways[self.all].copy(), n.W.modes.mode[self.all].copy()
         self.at -= self._thrown()
         n.ask(MOTION)
         for s in self.all.tolist():
             if s in self.at:
                 continue
             u, least = self.value(s)
-            if n.W.switch[MODE, s] != OFF:
+            if n.W.modes.mode[s] != OFF:
                 if abs(u) <= KEPT * max(least, seen(n, s).grain):
                     self.at.add(s)
                     continue
-                n.W.switch[MODE, s] = OFF
+                n.W.modes.mode[s] = OFF
             if abs(u) > self._nothing(s, u, least):
                 ways[s] = np.sign(u)
             else:  # as of a rate that something has held: its side is rounding, where it goes now is not
                 self.at.add(s)
         jumps = self.decide() if self.at else False
         moved = bool((np.abs(ways[self.all] - before) > 1e-6).any())
-        jumps = (moved and (jumps or self._not_at(before))) or (jumps and (n.W.switch[MODE, self.all] != modes).any())
+        jumps = (moved and (jumps or self._not_at(before))) or (jumps and (n.W.modes.mode[self.all] != modes).any())
         n.here.fresh = n.here.fresh or jumps
         self._tell()
         return jumps
@@ -186,10 +186,10 @@ class Corners:
         n = self.n
         n.ways()[which] = sides
         n.ask(MOTION)
-        n.W.switch[MODE, second] = STEADY
+        n.W.modes.mode[second] = STEADY
         drifts(n.S, n.W, n.here.t)
-        n.W.switch[MODE, second] = OFF
-        return n.W.switch[DRIFT_OFF, which].copy()
+        n.W.modes.mode[second] = OFF
+        return n.W.modes.drift[which].copy()
 
     def pushed(self, which: list[int], second: list[int]) -> Pushed:
         """What sides do to these corners."""
@@ -233,7 +233,7 @@ class Corners:
         n, W = self.n, self.n.W
         which = sorted(self.at)
         self.sides = n.ways().copy()
-        W.switch[MODE, which] = OFF
+        W.modes.mode[which] = OFF
         found = self.ended(self.pushed(which, []))
         which, sides, held = found.which, found.sides, found.held
         n.ways()[which] = sides
@@ -294,7 +294,7 @@ class Corners:
         rows = np.array([seen(n, s).row for s in which])
         misses = np.array([jet(n, s, BY_MOTION)[1] if s in found.second else self.value(s)[0] for s in which])
         for i, s in enumerate(which):
-            W.switch[MODE, s] = STEADY if s in found.second else HELD
+            W.modes.mode[s] = STEADY if s in found.second else HELD
             W.switch[INVERSE_SLOPES + np.array(which), s] = inverse[:, i]
         n.ask(MOTION)
         halt(n, rows, misses)
@@ -341,7 +341,7 @@ class Corners:
     def _tell(self) -> None:
         n = self.n
         for s in self.all.tolist():
-            now = n.W.switch[MODE, s]
+            now = n.W.modes.mode[s]
             if now != self.old[s]:
                 said = "stays on the corner of its law" if now != OFF else "leaves the corner of its law"
                 y = n.here.y.copy()

@@ -39,7 +39,7 @@ def doubt(n: Instant, found: Decided) -> None:
 
 def shared(n: Instant, guards: Sequence[int]) -> None:
     """Say whose shares of what holds a body no guard watches: it holds by others than those that are computed."""
-    group = np.flatnonzero(n.W.switch[SHARED]).tolist()
+    group = np.flatnonzero(n.W.modes.shared).tolist()
     own = [x for g in guards for x in (group if n.guarded[g][0] == G_SHARED else [n.guarded[g][1]])]
     which = [n.here.structure.switches[s].element for s in dict.fromkeys(own)]
     who = " and ".join(dict.fromkeys(f"{e.title} of {bodies(e)}" if isinstance(e, Touch) else e.title for e in which))

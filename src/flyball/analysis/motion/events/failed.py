@@ -40,7 +40,7 @@ def guard_names(n: Instant, fired: Iterable[int]) -> list[str]:
         if kind == G_LAW:
             out.append(n.here.structure.events[int(g)].title)
             continue
-        for k in np.flatnonzero(n.W.switch[SHARED]).tolist() if kind == G_SHARED else [s]:
+        for k in np.flatnonzero(n.W.modes.shared).tolist() if kind == G_SHARED else [s]:
             e = n.here.structure.switches[k].element
             out.append(n.name(k) if e.category == "events" else e.title)
     return list(dict.fromkeys(out))
@@ -66,11 +66,11 @@ def beyond(n: Instant, s: int) -> ModelError:
     unit, what = "m" if metric else "rad", quantity(n, s)
     if isinstance(e, Touch):
         return Overlap(
-            f"{e.title}: {bodies(e)} overlap at the start by {n.W.switch[LOWER, s] - n.x[s]:.3g} m; move one of them, "
+            f"{e.title}: {bodies(e)} overlap at the start by {n.W.modes.lower[s] - n.x[s]:.3g} m; move one of them, "
             f"or give method='impulse', which puts them side by side"
         )
     if n.kind[s] == STOP:
-        lower, upper = n.W.switch[LOWER, s], n.W.switch[UPPER, s]
+        lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
         if not np.isfinite(upper):
             rule = f"at least {told(lower, unit)}"
         elif not np.isfinite(lower):

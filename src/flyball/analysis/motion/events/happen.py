@@ -123,7 +123,7 @@ def settled(n: Instant, corners: Corners, fired: np.ndarray, told: bool = True) 
 def refuse_violated(n: Instant) -> None:
     """Refuse a start beyond a limit."""
     for s, kind in enumerate(n.kinds):
-        lower, upper = n.W.switch[LOWER, s], n.W.switch[UPPER, s]
+        lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
         back = -n.rate[s] / n.tempo if kind == ONE_WAY else 0.0
         past = max(lower - n.x[s], n.x[s] - upper) if kind == STOP else back
         if past > VIOLATED * n.unit[s]:
@@ -133,15 +133,15 @@ def refuse_violated(n: Instant) -> None:
 def refuse_sunk(n: Instant) -> None:
     """Refuse to go on from where what is open is past its bound, by more than what is closed may be."""
     for s in n.of(STOP):
-        past = max(n.W.switch[LOWER, s] - n.x[s], n.x[s] - n.W.switch[UPPER, s])
-        if n.mode[s] == OFF and past > SUNK * n.unit[s] + n.W.option[TOL_G]:
+        past = max(n.W.modes.lower[s] - n.x[s], n.x[s] - n.W.modes.upper[s])
+        if n.mode[s] == OFF and past > SUNK * n.unit[s] + n.W.options.tol_g[0]:
             raise sunk(n, s, past)
 
 
 def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
     """Jumps and modes at the instant, until nothing is against its rule; those that a motion begins in are no news."""
     here = n.here
-    before, modes, ways = here.y.copy(), n.W.switch[MODE].copy(), n.ways().copy()
+    before, modes, ways = here.y.copy(), n.W.modes.mode.copy(), n.ways().copy()
     since = before  # the last jump that was recorded
     hits: dict[int, bool] = {}
     calm: list[int] = []

@@ -38,8 +38,8 @@ def hold(here: Here, e: Event, a: Lock) -> str:
     held = held_by(here.structure.model, e, a)
     for k in switches(here, held.coordinates, held.joint, held.element):
         if held.element:
-            W.switch[SPARE, k] = 0.0
-            W.switch[LOWER, k], W.switch[UPPER, k] = S.switch_numbers.lower[k], S.switch_numbers.upper[k]
+            W.modes.released[k] = 0.0
+            W.modes.lower[k], W.modes.upper[k] = S.switch_numbers.lower[k], S.switch_numbers.upper[k]
             here.given += stored(here, k)
             continue
         x = W.sensed[VALUE, S.switches.measured[k]]
@@ -49,9 +49,9 @@ def hold(here: Here, e: Event, a: Lock) -> str:
                 f"its bodies meet; let the event be where they do",
                 t=here.t,
             )
-        if W.switch[MODE, k] == OFF:
-            W.switch[HOLD, k] = 0.0 if held.joint else x
-        W.switch[MODE, k] = HELD
+        if W.modes.mode[k] == OFF:
+            W.modes.hold[k] = 0.0 if held.joint else x
+        W.modes.mode[k] = HELD
     return f"{a.what} is in force" if held.element else f"locked {a.what}"
 
 
@@ -61,14 +61,14 @@ def let_go(here: Here, e: Event, a: Release) -> str:
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :]
     held, kinds = held_by(here.structure.model, e, a), here.c.system.switches.kind
     every = switches(here, held.coordinates, held.joint, held.element)
-    if not any(W.switch[SPARE, k] == 0.0 if held.element else W.switch[MODE, k] != OFF for k in every):
+    if not any(W.modes.released[k] == 0.0 if held.element else W.modes.mode[k] != OFF for k in every):
         return f"{a.what} was {'released already' if held.element else 'not locked'}"
     for k in every:
         if held.element:
             here.given -= stored(here, k)
-        W.switch[MODE, k], ways[k] = OFF, FROZEN if kinds[k] == ELASTIC else 0.0
+        W.modes.mode[k], ways[k] = OFF, FROZEN if kinds[k] == ELASTIC else 0.0
         if held.element:
-            W.switch[SPARE, k], W.switch[LOWER, k], W.switch[UPPER, k] = GONE, -np.inf, np.inf
+            W.modes.released[k], W.modes.lower[k], W.modes.upper[k] = GONE, -np.inf, np.inf
     return f"released {a.what}"
 
 
@@ -78,7 +78,7 @@ def stored(here: Here, k: int) -> float:
     if S.switches.kind[k] != ELASTIC:
         return 0.0
     x = W.sensed[VALUE, S.switches.measured[k]]
-    depth = max(W.switch[LOWER, k] - x, x - W.switch[UPPER, k], 0.0)
+    depth = max(W.modes.lower[k] - x, x - W.modes.upper[k], 0.0)
     return float(0.5 * S.switch_numbers.stiffness[k] * depth**2)
 
 
@@ -108,6 +108,6 @@ def gone_on(here: Here, before: Result) -> None:
             continue
         if spec.switch.kind == LOCK:
             W.switch[[MODE, HOLD], k] = last.switch[[MODE, HOLD], j]
-        elif last.switch[SPARE, j] == GONE:
-            W.switch[SPARE, k], W.switch[LOWER, k], W.switch[UPPER, k] = GONE, -np.inf, np.inf
+        elif last.modes.released[j] == GONE:
+            W.modes.released[k], W.modes.lower[k], W.modes.upper[k] = GONE, -np.inf, np.inf
             W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] + k] = FROZEN if spec.switch.kind == ELASTIC else 0.0

@@ -124,7 +124,7 @@ class Instant:
     def begin(self) -> None:
         """At another instant, where other elements may have been released."""
         self.over = np.nan
-        self.kind = np.where(self.W.switch[SPARE] == GONE, NO_KIND, self.S.switches.kind)
+        self.kind = np.where(self.W.modes.released == GONE, NO_KIND, self.S.switches.kind)
         self.kinds = self.kind.tolist()
         self.decided = [s for s in self.of(*DECIDED) if self.m[s] >= 0]
 
@@ -160,7 +160,7 @@ class Instant:
 
     def look(self) -> None:
         """Quantities and rates of all switches, where none of those that are decided acts."""
-        self.mode, self.hold, self.way = self.W.switch[MODE].copy(), self.W.switch[HOLD].copy(), self.ways().copy()
+        self.mode, self.hold, self.way = self.W.modes.mode.copy(), self.W.modes.hold.copy(), self.ways().copy()
         self.look_again()
 
     def look_again(self) -> None:
@@ -173,7 +173,7 @@ class Instant:
 
     def bared(self) -> None:
         """Switch off what is decided."""
-        self.W.switch[MODE, self.decided] = OFF
+        self.W.modes.mode[self.decided] = OFF
 
     def slide(self, parts: list[Part]) -> None:
         """Let friction that is no row of the problem slide as it does; that of its rows acts by them alone."""
@@ -188,7 +188,7 @@ class Instant:
         out[:2] = 0.0
         out[0, :nv] = force
         self.ask(SOLVE)
-        return out[2, :nv].copy(), out[3, :nr].copy(), self.W.vel[EFFORT].copy()
+        return out[2, :nv].copy(), out[3, :nr].copy(), self.W.velocities.effort.copy()
 
     def gradients(self, which: np.ndarray) -> np.ndarray:
         """Gradients of the quantities of these switches, (n, nv)."""
@@ -201,7 +201,7 @@ class Instant:
 
     def restored(self) -> None:
         """Modes and ways as they were when it was looked at."""
-        self.W.switch[MODE] = self.mode
+        self.W.modes.mode = self.mode
         self.ways()[:] = self.way
 
     def problem(self, parts: list[Part]) -> tuple[Bench, Dense, int]:

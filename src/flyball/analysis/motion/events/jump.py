@@ -174,7 +174,7 @@ def driven(n: Instant, out: Jump, drive: np.ndarray) -> None:
         rows[S.switches.row[s]] = x
     z = y[n.here.structure.nq + n.here.structure.nv :]
     for k in np.flatnonzero(S.rows.work >= 0).tolist():
-        z[S.rows.work[k]] += rows[k] * W.row[NU, k]
+        z[S.rows.work[k]] += rows[k] * W.rows.nu[k]
     efforts: list[float] = []
     for b in np.flatnonzero(S.tree.law >= 0).tolist():
         d = S.tree.v[b]

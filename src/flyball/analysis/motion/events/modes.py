@@ -162,22 +162,22 @@ def write(n: Instant, found: Decided, still: np.ndarray) -> None:
     W, ways, taking = n.W, n.ways(), {p.switch for p in found.parts}
     for s, kind in enumerate(n.kinds):
         if kind in DECIDED and n.m[s] >= 0:
-            W.switch[MODE, s] = OFF
+            W.modes.mode[s] = OFF
             ways[s] = np.sign(n.rate[s]) if kind == FRICTION and not still[s] else 0.0
             if kind == FRICTION and still[s] and s not in taking:
                 ways[s] = BY_RATE
     for i, p in enumerate(found.parts):
         s, kind = p.switch, n.kind[p.switch]
         if found.state[i] == EVEN:
-            W.switch[MODE, s] = HELD
-            W.switch[HOLD, s] = n.hold[s] if n.mode[s] == HELD else n.x[s]
+            W.modes.mode[s] = HELD
+            W.modes.hold[s] = n.hold[s] if n.mode[s] == HELD else n.x[s]
             if kind in STOPS:
-                W.switch[HOLD, s] = W.switch[LOWER if p.sign > 0.0 else UPPER, s]
+                W.modes.hold[s] = W.switch[LOWER if p.sign > 0.0 else UPPER, s]
             ways[s] = p.sign if p.rule == PUSHES else 0.0
         elif kind == FRICTION:
             ways[s] = found.lean[i]
     write_slips(n, found.parts, (found.state, found.x, found.u, found.lean))
     write_group(n, found.parts, (found.state, found.A, found.gain, found.x, found.reach))
     if len(n.S.load_terms.load):
-        W.info[LEARNT] = FORGOTTEN
+        W.counts.learnt[0] = FORGOTTEN
         W.sensed[LOAD, 2 * len(n.here.structure.measured) : n.first] = 0.0  # of two solutions the one from no load

@@ -30,7 +30,7 @@ def sides(n: Instant, fired: np.ndarray) -> dict[int, tuple[float, ...]]:
     for s in n.of(*STOPS):
         if s in gone:
             continue
-        gaps = {1.0: n.x[s] - n.W.switch[LOWER, s], -1.0: n.W.switch[UPPER, s] - n.x[s]}
+        gaps = {1.0: n.x[s] - n.W.modes.lower[s], -1.0: n.W.modes.upper[s] - n.x[s]}
         held = n.way[s] if n.mode[s] != OFF else 0.0
         at = tuple(w for w, gap in gaps.items() if gap < np.inf and (gap <= n.near[s] or (s, w) in hit or w == held))
         if at:

@@ -33,6 +33,6 @@ def share(here: Here, rows: np.ndarray) -> None:
         again.z = row[1 + s.nq + s.nv : 1 + ny].copy()
         again.at(row[0], row[1 : 1 + s.nq], row[1 + s.nq : 1 + s.nq + s.nv], MOTION)
         renewed_kernel(address, S, W, R, own, sheet, G)
-        W.row[LAM] = row[lam]
+        W.rows.multiplier = row[lam]
         shared_kernel(S, W, row[0], G)
-        row[lam] = W.row[LAM]
+        row[lam] = W.rows.multiplier

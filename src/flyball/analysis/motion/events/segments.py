@@ -27,7 +27,7 @@ class Segments:
         c, W = here.c, here.c.work
         n = len(here.structure.switches)
         ways = W.sensed[VALUE, W.sensed.shape[1] - n :].copy()
-        if any(x.switch.kind == BRANCH and W.switch[MODE, k] != OFF for k, x in enumerate(here.structure.switches)):
+        if any(x.switch.kind == BRANCH and W.modes.mode[k] != OFF for k, x in enumerate(here.structure.switches)):
             ways = _ways(here, rows)
         _quiet(here, rows)
         share(here, rows)
@@ -56,7 +56,7 @@ def _quiet(here: Here, rows: np.ndarray) -> None:
     """Take the rounding from the rates of coordinates that are held by a row alone, at rows of output."""
     S, W, s = here.c.system, here.c.work, here.structure
     first, ny = 1 + s.nq, 1 + len(here.y)
-    for k in np.flatnonzero(W.switch[MODE] == HELD).tolist():
+    for k in np.flatnonzero(W.modes.mode == HELD).tolist():
         row = S.switches.row[k]
         if row >= 0 and S.row_start[row + 1] - S.row_start[row] == 1:
             column = S.column[S.row_start[row]]

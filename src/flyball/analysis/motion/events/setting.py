@@ -74,9 +74,9 @@ def _move_bounds(here: Here, old: Values) -> None:
     S, W = here.c.system, here.c.work
     now, then = S.switch_numbers, old.system.switch_numbers
     moved = (now.lower != then.lower) | (now.upper != then.upper)
-    for s in np.flatnonzero((W.switch[SPARE] == 0.0) & moved).tolist():
+    for s in np.flatnonzero((W.modes.released == 0.0) & moved).tolist():
         if S.switches.kind[s] in (STOP, ELASTIC, RATCHET):
-            W.switch[LOWER, s], W.switch[UPPER, s] = now.lower[s], now.upper[s]
+            W.modes.lower[s], W.modes.upper[s] = now.lower[s], now.upper[s]
 
 
 def _refuse_other_places(here: Here, new: Values, who: str) -> None:
@@ -150,7 +150,7 @@ def _places(here: Here, x: Values) -> Places:
             R = K[b, 3:12].reshape(3, 3)
             out[name] = np.r_[K[b, :3] - R @ x.bodies[name].com, R.ravel(), K[b, :3]]
             moving[name] = K[b, 12:18].copy()
-    return Places(out, moving, c.work.row[G_VALUE].copy(), c.work.row[NU].copy())
+    return Places(out, moving, c.work.rows.value.copy(), c.work.rows.nu.copy())
 
 
 def _refuse_moved(here: Here, who: str, before: Places, after: Places) -> None:

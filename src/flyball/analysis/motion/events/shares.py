@@ -244,8 +244,8 @@ def write_group(n: Instant, parts: list[Part], found: tuple[np.ndarray, ...]) ->
     if not n.shares:
         return
     (state, A, gain, x, reach), G, B = found, n.here.group, n.rooms[len(parts)].B
-    n.W.switch[SHARED], G.Q.count[OPEN] = 0.0, 0
-    on = n.W.switch[MODE, [p.switch for p in parts]] != OFF  # slips of a gap that is let go are no rows
+    n.W.modes.shared, G.Q.count[OPEN] = 0.0, 0
+    on = n.W.modes.mode[[p.switch for p in parts]] != OFF  # slips of a gap that is let go are no rows
     rows = np.flatnonzero((state == EVEN) & on)
     rules = np.array([p.rule for p in parts])
     if not np.isin(rules[rows], (GRIPS, TURNS)).any():
@@ -266,7 +266,7 @@ def write_group(n: Instant, parts: list[Part], found: tuple[np.ndarray, ...]) ->
             if moved or part_of[own].any():
                 part_of[[*own, *([p.of] if p.of >= 0 else [])]] = True
     for i in np.flatnonzero(part_of).tolist():
-        n.W.switch[SHARED, parts[i].switch] = d[i]
+        n.W.modes.shared[parts[i].switch] = d[i]
     for j, z in enumerate(every.T):
         G.null[j] = z @ B.L
         for i in rows.tolist():

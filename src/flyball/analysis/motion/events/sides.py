@@ -32,14 +32,14 @@ BY_ITSELF = 0.0  # way of an elastic switch whose force looks where it is
 def teeth(n: Instant, still: np.ndarray) -> None:
     """Ratchets that do not hold: going on, or back to the last tooth that was passed; ``still``: those at rest."""
     for s in n.of(RATCHET):
-        first, n.W.switch[UPPER, s] = n.W.switch[UPPER, s] < np.inf, np.inf
+        first, n.W.modes.upper[s] = n.W.modes.upper[s] < np.inf, np.inf
         if n.mode[s] != OFF:
-            n.W.switch[LOWER, s] = n.hold[s]  # of a motion that goes on, too
+            n.W.modes.lower[s] = n.hold[s]  # of a motion that goes on, too
         elif n.rate[s] > 0.0 and not still[s]:
             _goes_on(n, s)
         elif first or n.way[s] >= 0.0:
             tooth, pitch = n.S.switch_numbers.tooth[s], n.S.switch_numbers.pitch[s]
-            n.W.switch[LOWER, s] = tooth + pitch * np.floor((n.x[s] - tooth) / pitch + TOOTH)
+            n.W.modes.lower[s] = tooth + pitch * np.floor((n.x[s] - tooth) / pitch + TOOTH)
             n.ways()[s] = n.way[s] = -1.0
 
 
@@ -48,7 +48,7 @@ def turned(n: Instant, hit: Collection[int]) -> None:
     decided.
     """
     for s in n.of(RATCHET):
-        if n.W.switch[MODE, s] != OFF:
+        if n.W.modes.mode[s] != OFF:
             continue
         slow = abs(n.rate[s]) <= 2.0 * TURN * n.unit[s] * n.tempo
         if n.mode[s] != OFF or s in hit or (slow and _acceleration(n, s) > SLOW * n.unit[s] * n.tempo**2):
@@ -60,7 +60,7 @@ def turned(n: Instant, hit: Collection[int]) -> None:
 def _goes_on(n: Instant, s: int) -> None:
     """No tooth is in the way until it turns round."""
     n.ways()[s] = n.way[s] = 1.0
-    n.W.switch[LOWER, s] = -np.inf
+    n.W.modes.lower[s] = -np.inf
 
 
 def _acceleration(n: Instant, s: int) -> float:

@@ -146,14 +146,14 @@ def write_slips(n: Instant, parts: Sequence[Part], found: tuple[np.ndarray, ...]
     state, x, u, lean = found
     W, ways = n.W, n.ways()
     slips = n.of(SLIP)
-    W.switch[MODE, slips], W.switch[HOLD, slips] = OFF, 0.0
+    W.modes.mode[slips], W.modes.hold[slips] = OFF, 0.0
     for i, p in enumerate(parts):
         own = slips_of(n, int(n.S.switches.other[p.switch])) if n.kind[p.switch] == SLIP else [-1]
         if p.switch != own[0] or state[p.of] != EVEN:
             continue
         rows = np.arange(i, i + len(own))
         if (state[rows] == EVEN).all():
-            W.switch[MODE, own], ways[own] = HELD, 0.0
+            W.modes.mode[own], ways[own] = HELD, 0.0
             continue
         d = lean[rows]
         if state[i] == SLIPS:  # the way it accelerates; against its friction, where that is none

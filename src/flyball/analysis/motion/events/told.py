@@ -83,7 +83,7 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
     modes, ways = old
     told: dict[str, list[tuple[int, str]]] = {}
     for s in range(len(n.kind)):
-        was, now = modes[s] != OFF, n.W.switch[MODE, s] != OFF
+        was, now = modes[s] != OFF, n.W.modes.mode[s] != OFF
         over = n.here.bounces[s].over if s in n.here.bounces else np.nan
         if now and not np.isnan(over):
             count = n.here.bounces.pop(s).count
@@ -105,7 +105,7 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
 
 def _is_open(n: Instant, s: int) -> bool:
     """Whether the place of a slip parted: it does not slide either."""
-    return bool(n.W.switch[MODE, n.S.switches.other[s]] == OFF)
+    return bool(n.W.modes.mode[n.S.switches.other[s]] == OFF)
 
 
 def _goes_both_ways(n: Instant, s: int) -> bool:

@@ -47,8 +47,8 @@ class Held:
         self.lam.append(A.lam[0] + (A.lam[1] + A.lam[2]) / h)
         s = self.start.assembly.compiled.structure
         W = self.start.assembly.compiled.work
-        lost = self.start.assembly.compiled.jacobian() @ A.clock.y[0, s.nq : s.nq + s.nv] - W.row[NU]
-        self.gaps.append(float(np.abs(W.row[G_VALUE]).max(initial=0.0)))
+        lost = self.start.assembly.compiled.jacobian() @ A.clock.y[0, s.nq : s.nq + s.nv] - W.rows.nu
+        self.gaps.append(float(np.abs(W.rows.value).max(initial=0.0)))
         self.slips.append(float(np.abs(lost).max(initial=0.0)))
 
     def into(self, whole: Values, q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -65,7 +65,7 @@ def tables(
     slopes = np.zeros((len(s.forces), SLOPE_WIDTH))
     slopes[:, DIRECTIONS] = [directions(f) for f in s.forces]
     springs = int(slopes[:, DIRECTIONS].sum())
-    c.work.option[STABILIZE], c.work.option[LATER] = STEPS, 0.0
+    c.work.options.stabilize[0], c.work.options.later[0] = STEPS, 0.0
     S = S._replace(force_parameters=S.force_parameters.copy())
     line, line_x = lines(s, S, stops or {})
     A = Joined(
