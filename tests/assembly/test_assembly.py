@@ -10,7 +10,6 @@ import flyball as fb
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
 from flyball.equations.records import load
-from flyball.tables.system import G_VALUE, NU
 from tests.assembly.rough import framed, rough_four_bar
 from tests.mechanisms import bricard, door, example, four_bar, spatial_four_bar
 from tests.verification.test_reactions import actuated

@@ -7,7 +7,6 @@ import pytest
 
 import flyball as fb
 from flyball.analysis.assemble import assemble
-from flyball.tables.system import G_VALUE
 from tests.assembly.rough import framed, rough_four_bar
 from tests.mechanisms import four_bar
 

@@ -8,7 +8,6 @@ import flyball as fb
 from flyball.equations.engine import MOTION
 from flyball.equations.motion import derivative
 from flyball.model.io import dumps, loads
-from flyball.tables.system import GAMMA
 from tests.contract.zoo import (
     CASES,
     GRAVITY,

@@ -10,7 +10,7 @@ from flyball.analysis.motion.choice import SimulateOptions
 from flyball.analysis.motion.events.here import Here
 from flyball.analysis.motion.start import begin
 from flyball.analysis.simulate import clock_for
-from flyball.tables.system import MODE, VALUE
+from flyball.tables.system import VALUE
 
 ASKED = {
     "method": "dop853", "t_end": 1.0, "t_start": None, "outputs": 2, "parameters": None, "start": None,

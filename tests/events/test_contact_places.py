@@ -12,7 +12,7 @@ from flyball.analysis.motion.touches import impossible, with_places
 from flyball.equations.engine import MOTION
 from flyball.equations.friction import FORGOTTEN
 from flyball.model.touch import Touch
-from flyball.tables.system import HELD, LAM, LEARNT, MODE, OFF, VALUE
+from flyball.tables.system import HELD, OFF, VALUE
 
 G, MU = 9.81, 0.3
 BALL = fb.Sphere(radius=0.1)
@@ -39,7 +39,7 @@ def moving(m, modes, ways, coordinates="absolute"):
     W, n = c.work, len(c.structure.switches)
     W.modes.mode[: len(modes)] = modes
     W.sensed[VALUE, W.sensed.shape[1] - n : W.sensed.shape[1] - n + len(ways)] = ways
-    W.counts.learnt[0] = FORGOTTEN
+    W.counts.load_updates[0] = FORGOTTEN
     status, dy = c.at(a.t, a.q, a.v, MOTION)
     assert status == 0
     nq, nv = c.structure.nq, c.structure.nv

@@ -12,7 +12,7 @@ from flyball.equations.engine import MOTION
 from flyball.equations.guards import watch
 from flyball.tables.events import own_row, parting
 from flyball.tables.spanning import spanning
-from flyball.tables.system import EITHER, FALLING, G_LAW, G_VALUE, HELD, MODE, RISING, VALUE
+from flyball.tables.system import EITHER, FALLING, G_LAW, HELD, RISING, VALUE
 
 
 def model(planar: bool = True) -> fb.Mechanism:

@@ -8,7 +8,7 @@ import pytest
 import flyball as fb
 from flyball.analysis.motion.events.happen import begin
 from flyball.constraints.modes import STOP
-from flyball.tables.system import HELD, MODE
+from flyball.tables.system import HELD
 from tests.events.one_row import BOTH, Row, forgotten, rows
 from tests.events.standing import kicked, modes, moving, standing
 

@@ -9,7 +9,7 @@ import flyball as fb
 from flyball.analysis.motion.events.happen import begin
 from flyball.constraints.modes import ONE_WAY, STOP
 from flyball.equations.engine import MOTION
-from flyball.tables.system import HELD, LAM, OFF
+from flyball.tables.system import HELD, OFF
 from tests.events.one_row import BOTH, Row, forgotten, rows
 from tests.events.standing import modes, standing
 

@@ -19,7 +19,7 @@ from flyball.model.element import Element, element
 from flyball.model.switch import Switch
 from flyball.results.health import Health
 from flyball.results.result import Result
-from flyball.tables.system import HELD, HOLD, LAM, MODE
+from flyball.tables.system import HELD
 
 
 @element
@@ -69,7 +69,7 @@ def two_stretches(damping=0.0):
     seen, lost = Segments(), 0.0
     rows = []
     here = SimpleNamespace(c=a.compiled, structure=a.compiled.structure, lost=lost, given=0.0, y=None)
-    here.c.work.switch[[MODE, HOLD], 0] = HELD, 0.1
+    here.c.work.modes.mode[0], here.c.work.modes.hold[0] = HELD, 0.1
     for told, state in (({}, (0.1, 0.0)), ({"k": 400.0}, (0.1, 0.0)), ({"k": 400.0}, (0.0, 0.3))):
         if told:
             from flyball.tables.values import values

@@ -15,7 +15,7 @@ from flyball.constraints.modes import LOCK, STOP
 from flyball.equations.engine import MOTION
 from flyball.model.element import Element, element
 from flyball.model.switch import Switch
-from flyball.tables.system import HELD, HOLD, LAM, MODE, OFF, STEADY, VALUE
+from flyball.tables.system import HELD, OFF, STEADY, VALUE
 from tests.mechanisms import four_bar
 
 

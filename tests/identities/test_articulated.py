@@ -18,7 +18,6 @@ from flyball.equations.tree import column
 from flyball.math.vec import quaternion_matrix
 from flyball.results.records import Records
 from flyball.tables.system import (
-    F_APPLIED,
     FREE,
     PLANAR,
     PRISMATIC,

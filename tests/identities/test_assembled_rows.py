@@ -9,7 +9,6 @@ import pytest
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
 from flyball.equations.tree import retract
-from flyball.tables.system import G_VALUE, GAMMA, NU
 from tests.contract.zoo import CASES
 from tests.identities.test_joint_layer import HINGES, PARTS, coupled, with_joint
 

@@ -15,7 +15,6 @@ from flyball.equations.records import load
 from flyball.results.records import Records
 from flyball.tables import coordinates
 from flyball.tables.cost import cost, least
-from flyball.tables.system import EFFORT, F_APPLIED, GAMMA, LAM, X_SOLVED
 from tests.mechanisms import bricard, example, four_bar, planar_rod, spatial_four_bar
 from tests.verification.test_reactions import actuated
 

@@ -15,7 +15,7 @@ from flyball.equations.tree import retract
 from flyball.equations.within import ROWS
 from flyball.numerics.integrators.clock import COUNTS, REALS, STATES, Clock
 from flyball.numerics.integrators.tableaux import tableau
-from flyball.tables.system import ALPHA, BETA, G_VALUE, NU, PASS, STABILIZE
+from flyball.tables.system import ALPHA, BETA, PASS, STABILIZE
 from tests.mechanisms import four_bar
 
 LAYERS = pytest.mark.parametrize("tree", [(), ("A", "B")], ids=["absolute", "joint"])
@@ -55,7 +55,7 @@ def test_baumgarte_restores_violated_rows(tree):
     c.work.option[[ALPHA, BETA, PASS]] = 5.0, 7.0, 1e-13
     found = []
     for choice in (NONE, BAUMGARTE):
-        c.work.options.stabilize[0] = choice
+        c.work.options.stabilization[0] = choice
         status, dy = evaluate(c.system, c.work, 0.3, np.r_[q, v, c.z], MOTION)
         assert status == 0
         found.append(c.jacobian() @ dy[len(q) : len(q) + len(v)])

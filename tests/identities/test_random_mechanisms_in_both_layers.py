@@ -12,7 +12,6 @@ import flyball as fb
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
 from flyball.equations.engine import MOTION
-from flyball.tables.system import F_APPLIED, GAMMA
 from tests.contract.zoo import JOINTS
 from tests.identities.test_results_in_both_layers import agree, spanning_tree
 from tests.results.at_states import assembled, in_other_coordinates

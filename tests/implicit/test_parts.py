@@ -12,7 +12,7 @@ from flyball.analysis.motion.start import begin
 from flyball.analysis.motion.touches import with_places
 from flyball.equations.residual import stepped
 from flyball.equations.tasks import PARTS, PUSHES, Bench
-from flyball.tables.system import HELD, MODE, OFF, SLIDING
+from flyball.tables.system import HELD, OFF, SLIDING
 from tests.contract.test_everything import everything
 from tests.contract.zoo import joined
 from tests.mechanisms import example

@@ -12,7 +12,7 @@ from flyball.equations.engine import ARRIVE, MOTION, REPORT, RESIDUAL, engine, m
 from flyball.equations.tasks import Sheet
 from flyball.numerics.integrators.clock import Clock, T
 from flyball.numerics.integrators.tableaux import Tableau, tableau
-from flyball.tables.system import LAM, Bodies, System, Work
+from flyball.tables.system import Bodies, System, Work
 from tests.layers import LAYERS
 
 

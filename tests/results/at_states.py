@@ -12,7 +12,6 @@ from flyball.analysis.compiled import Compiled
 from flyball.analysis.mobility import mobility
 from flyball.equations.engine import MOTION
 from flyball.results.result import Result
-from flyball.tables.system import EFFORT, LAM, X_SOLVED
 from tests.results.made_up import healthy
 
 
@@ -26,7 +25,9 @@ def result_at(c: Compiled, times: Sequence[float], states: Sequence[tuple[np.nda
         c.at(t, q, v)
         status, _ = c.at(t, q, v, MOTION)
         assert status == 0
-        rows.append((q, v, c.z.copy(), W.velocities.solved.copy(), np.r_[W.rows.multiplier, W.velocities.effort[driven]]))
+        rows.append(
+            (q, v, c.z.copy(), W.velocities.solved.copy(), np.r_[W.rows.multiplier, W.velocities.effort[driven]])
+        )
     q, v, z, vdot, lam = (np.array(x) for x in zip(*rows, strict=True))
     return Result(s.model, c.values, np.array(times), q, v, z, vdot, lam, healthy())
 

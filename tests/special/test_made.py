@@ -24,19 +24,12 @@ from flyball.numerics.integrators.tableaux import tableau
 from flyball.special import keeping
 from flyball.special.recorder import TERMS, Recorder
 from flyball.tables.system import (
-    EFFORT,
-    F_APPLIED,
-    G_VALUE,
-    GAMMA,
-    LAM,
-    NU,
     PASS,
     RATE,
     STABILIZE,
     TOL_G,
     TOL_V,
     VALUE,
-    X_SOLVED,
 )
 from tests.contract.zoo import PLANAR, SPATIAL, joined
 

@@ -13,7 +13,7 @@ from flyball.graph.values import evaluated
 from flyball.model.touching import has_contact
 from flyball.tables.names import velocity_names
 from flyball.tables.spanning import spanning
-from flyball.tables.system import F_APPLIED, G_VALUE, GAMMA, LOAD, NU
+from flyball.tables.system import G_VALUE, GAMMA, LOAD, NU
 from flyball.tracing.trace import plain, traced
 from tests import mechanisms
 from tests.contract import zoo

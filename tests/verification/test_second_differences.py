@@ -10,7 +10,6 @@ import pytest
 import flyball as fb
 from flyball.analysis.compiled import compiled
 from flyball.equations.tree import rates, retract
-from flyball.tables.system import G_VALUE, GAMMA, NU
 from tests.mechanisms import bricard, example, four_bar, spatial_four_bar
 from tests.verification.test_linkages import hooke
 from tests.verification.test_moving_bases import gyroscope, shaken_pendulum, turntable

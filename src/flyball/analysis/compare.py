@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from ..numerics.integrators.tableaux import tableau
 from ..results.comparison import Comparison, Formulation
 from ..results.result import Result
 from ..tables.branches import bent_laws
-from ..tables.system import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU, WORST_G, WORST_V
 from .compiled import Compiled, compiled
 from .motion import partition
 from .motion.ahead import refuse_missing
@@ -256,8 +255,9 @@ def _run(
 ) -> tuple[ex.Clock, np.ndarray, float, Exception | None]:
     """Run the compiled loop from the start. Returns (clock, rows, time of the processor [s], why it failed)."""
     W = start.assembly.compiled.work
-    W.info[:] = 0
-    W.option[[WORST_G, WORST_V]] = 0.0
+    for x in W.counts:
+        x[0] = 0
+    W.options.position_violation[0] = W.options.velocity_violation[0] = 0.0
     if o.stabilization == "partitioning":
         partition.choose(job.model, start)
     start.since = time.perf_counter()
@@ -356,8 +356,8 @@ def _costs(job: _Task, rows: list[Formulation], starts: Mapping[str, Start], tel
             start = starts[f.name]
             clock, _, seconds, _ = _run(job, start, _choice(job, f.name), end)
             spent[f.name].append(seconds)
-            info: Any = start.assembly.compiled.work.info
+            counts = start.assembly.compiled.work.counts
             f.steps, f.rejected = int(clock.count[ex.ACCEPTED]), int(clock.count[ex.REJECTED])
-            f.evaluations, f.factorisations = int(info[EVALUATIONS]), int(info[FACTORISATIONS])
-            f.exchanges = int(info[EXCHANGES])
+            f.evaluations, f.factorisations = int(counts.evaluations[0]), int(counts.factorisations[0])
+            f.exchanges = int(counts.exchanges[0])
             f.cpu = float(np.median(spent[f.name]))

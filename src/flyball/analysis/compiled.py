@@ -27,7 +27,7 @@ from ..tables.forest import steps
 from ..tables.names import velocity_names
 from ..tables.specs import Structure
 from ..tables.structure import Choices, structure
-from ..tables.system import PASS, STABILIZE, System, Work
+from ..tables.system import System, Work, assign
 from ..tables.values import Values, values
 from .uncollected import uncollected
 
@@ -58,9 +58,8 @@ class Compiled:
         vars(self).pop("work", None)
         self.made, self.system = made, x.kept.get("made", id(made), 1, lambda: (made, made.system(x.system)))[1]
         if before is not None:
-            for mine, old in zip(self.work, before.fields, strict=True):
-                if mine.shape == old.shape:  # that of the code itself is longer now
-                    mine[...] = old
+            kept = self.work._replace(flat=before.fields.flat)  # that of the code itself is longer now
+            assign(kept, before.fields)
 
     def run_on_tables(self) -> None:
         """From now on the engine's own loops do all."""
@@ -72,15 +71,14 @@ class Compiled:
         if self.system.const.dtype.kind in "fc":
             return self.scratch.fields  # type: ignore[no-any-return]
         w = work(self.structure, self.system)
-        w.options.stabilize[0], w.options.pass[0] = NONE, 1e-13
+        w.options.stabilization[0], w.options.solve_tolerance[0] = NONE, 1e-13
         return w
 
     @cached_property
     def scratch(self) -> PooledBuffer:
         """The same as compiled code has it."""
         made = scratch(self.structure, self.system, self.system.const.dtype)
-        option = made.array("option")
-        option[STABILIZE], option[PASS] = NONE, 1e-13
+        made.array("options.stabilization")[0], made.array("options.solve_tolerance")[0] = NONE, 1e-13
         return made
 
     def array(self, name: str) -> np.ndarray:

@@ -24,7 +24,6 @@ from ..results.records import TURN
 from ..results.result import Result
 from ..tables.names import velocity_names
 from ..tables.points import points
-from ..tables.system import EFFORT, F_APPLIED, G_VALUE, LAM, NU, X_SOLVED
 from .assembly.start import Assembly
 from .compiled import Compiled, compiled
 from .motion.start import Start

@@ -19,7 +19,7 @@ from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.departure import changed_velocities, not_allowed
 from ..results.result import Result
-from ..tables.system import ALPHA, BETA, LATER, PASS, STABILIZE, TOL_G, TOL_V, System
+from ..tables.system import System
 from .assembly.start import Assembly
 from .compiled import Compiled
 from .motion import partition
@@ -163,7 +163,7 @@ def moved(
     sampled = sampled_laws(c, known)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o, sampled)
     later = not watched(begun) and open_until_asked(begun, o, task)
-    c.array("option")[LATER] = float(later)
+    c.array("options.deferred")[0] = float(later)
     here = Here(begun, clock)
     if task == INTEGRATE and (o.method in IMPLICIT or watched(begun) or len(known.times) or c.structure.sampled):
         rows, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
@@ -228,7 +228,7 @@ def clock_for(
     """
     a, y = start.assembly, start.y
     refuse_unheld(len(times), width(a))
-    s, option = a.compiled.structure, a.compiled.array("option")
+    s, array = a.compiled.structure, a.compiled.array
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[ex.T], real[ex.T_END], real[ex.RTOL] = t, t_end, o.rtol
     first = t if start.part.first is None else start.part.first
@@ -242,9 +242,9 @@ def clock_for(
     count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv + len(s.controls) - len(s.sampled), s.nq
     Y = np.zeros((ex.STATES, len(y)))
     Y[0] = y
-    option[STABILIZE] = STABILIZATION[o.stabilization]
-    option[ALPHA], option[BETA] = o.alpha or 0.0, o.beta or 0.0
-    option[PASS] = 1e-13
+    array("options.stabilization")[0] = STABILIZATION[o.stabilization]
+    array("options.alpha")[0], array("options.beta")[0] = o.alpha or 0.0, o.beta or 0.0
+    array("options.solve_tolerance")[0] = 1e-13
     nothing = sampled is not None and not sampled and not breaking(a.compiled.values.system)
     seen = np.zeros((ROWS, 0)) if nothing else kept(a.compiled.values.system, sampled)
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
@@ -256,10 +256,11 @@ def clock_for(
 
 def size(clock: ex.Clock, base: Assembly, c: Compiled, atol: float) -> None:
     """Write what follows from a mechanism's length and weight: tolerances, and what they are compared with."""
-    real, option = clock.real, c.array("option")
+    real = clock.real
     energy = energy_size(base, float(real[ex.SPAN]))
     found = sizes(c.values.length, atol, real[ex.RTOL], energy)
-    (real[ex.ATOL], real[ex.SCALE], real[ex.LEDGER]), (option[TOL_G], option[TOL_V]) = found
+    (real[ex.ATOL], real[ex.SCALE], real[ex.LEDGER]), (near, slow) = found
+    c.array("options.position_tolerance")[0], c.array("options.velocity_tolerance")[0] = near, slow
 
 
 def sizes(length: float, atol: float, rtol: float, energy: float) -> tuple[tuple[float, ...], tuple[float, ...]]:

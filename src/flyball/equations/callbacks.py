@@ -9,7 +9,7 @@ from ..compiler.layout import Int1
 from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watching import Watch
-from ..tables.system import G_SHARED, LAM
+from ..tables.system import G_SHARED
 from .asking import GROUP, OWN, S_, SHEET, W_
 from .sharing import Sharing, guard_of_group
 from .tasks import Sheet

@@ -16,13 +16,6 @@ import numpy as np
 from ..compiler.formulas import call, formula
 from ..compiler.layout import Float1, Float2, Int1
 from ..math.scalar import absolute
-from ..tables.system import (
-    EFFORT,
-    GIVEN,
-    LAM,
-    NU,
-    X_SOLVED,
-)
 from .asking import ENGINE, OWN, R_, S_, SHEET, W_
 from .tasks import ALONG, GAPS, SOLVE, STEPS
 from .tree import quaternion_at

@@ -15,7 +15,7 @@ from ..numerics.integrators.clock import COUNTS, REALS, Clock, T
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.ldl import ldl_factor
 from ..numerics.weakest import strongest, weakest
-from ..tables.system import DIAGONAL, V1, System, Work
+from ..tables.system import System, Work
 from .engine import POSITION, engine
 from .tasks import Sheet
 
@@ -65,9 +65,11 @@ def each(address, S, W, R, clock, sheet, states, scale, block, kept, out):
             for i in range(3):
                 out[n, i] = np.nan
             continue
-        out[n, 0] = strongest(S.row_start, S.column, W.H, block[last + 1], W.velocities.v1)
+        out[n, 0] = strongest(S.row_start, S.column, W.H, block[last + 1], W.velocities.scratch_1)
         X = block[: last + 1]
-        out[n, 1], out[n, 2] = weakest(S.ldl, W.L, W.D[0], S.row_start, S.column, W.H, X, W.velocities.v1, W.D[2])
+        out[n, 1], out[n, 2] = weakest(
+            S.ldl, W.L, W.D[0], S.row_start, S.column, W.H, X, W.velocities.scratch_1, W.D[2]
+        )
         for i in range(last):
             for k in range(S.rows.law.shape[0]):
                 kept[n, k, i] = X[i, k] / W.rows.diagonal[k]

@@ -50,9 +50,9 @@ def perform(S, W, R, clock, out, task):
     choose_code(S, W, task)
     if task == POSITION:
         nq = S.coordinates[0]
-        z = y[nq + W.vel.shape[1] :]
+        z = y[nq + W.velocities.solved.shape[0] :]
         place(S, W, t, y[:nq], z)
-        move(S, W, t, y[nq : nq + W.vel.shape[1]], z)
+        move(S, W, t, y[nq : nq + W.velocities.solved.shape[0]], z)
         remember(S, W, z)
         return 0
     if task == MOTION:
@@ -86,7 +86,7 @@ def perform(S, W, R, clock, out, task):
         residual(S, W, t, W.y[0], out[1], out[2], out[0])
         return 0
     if task == SOLVE:
-        nv = W.vel.shape[1]
+        nv = W.velocities.solved.shape[0]
         nr = S.rows.law.shape[0]
         respond(S, W, out[0, :nv], out[1, :nr], out[2, :nv], out[3, :nr])
         return 0

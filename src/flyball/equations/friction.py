@@ -14,14 +14,8 @@ from ..forces.joint_friction import load as pressed
 from ..math.scalar import sign
 from ..math.vec import add
 from ..tables.system import (
-    DIAGONAL,
-    F_APPLIED,
-    GAMMA,
     GAP_BEFORE,
-    GUILTY,
     INVERSE_JACOBIAN,
-    LAM,
-    LEARNT,
     LOAD,
     LOAD_BEFORE,
     MOVED,
@@ -118,7 +112,7 @@ def returned(S, W):
         change = abs(new - W.sensed[LOAD, n]) / (small + abs(new) + abs(W.sensed[LOAD, n]))
         if not change <= worst:
             worst = change
-            W.counts.guilty[0] = k
+            W.counts.guilty_row[0] = k
     return worst
 
 
@@ -126,7 +120,7 @@ def returned(S, W):
 def force_scale(S, W):
     """The largest force that moves anything, or that would keep a constraint: loads far below it are rounding."""
     size = 1e-300
-    for d in range(W.vel.shape[1]):
+    for d in range(W.velocities.solved.shape[0]):
         size = max(size, abs(W.velocities.applied[d]))
     for k in range(S.rows.law.shape[0]):
         if W.rows.diagonal[k] > 0.0:
@@ -149,12 +143,12 @@ def improve(S, W, attempt):
     """
     first, last = 2 * measured(S), loads_end(S, W)
     if attempt == tries(W):
-        W.counts.learnt[0] = FORGOTTEN
+        W.counts.load_updates[0] = FORGOTTEN
         for n in range(first, last):
             W.sensed[LOAD, n] = 0.0
         return
-    if W.counts.learnt[0] == FORGOTTEN or (attempt == 0 and W.counts.learnt[0] == 0):
-        W.counts.learnt[0] = 0
+    if W.counts.load_updates[0] == FORGOTTEN or (attempt == 0 and W.counts.load_updates[0] == 0):
+        W.counts.load_updates[0] = 0
         for n in range(first, last):
             for k in range(first, last):
                 W.sensed[INVERSE_JACOBIAN + n - first, k] = 1.0 if n == k else 0.0
@@ -163,10 +157,10 @@ def improve(S, W, attempt):
     for n in range(first, last):
         W.sensed[LOAD_BEFORE, n] = W.sensed[LOAD, n]
         W.sensed[GAP_BEFORE, n] = W.sensed[LOAD, n] - W.sensed[RETURNED, n]
-    if W.counts.learnt[0] < last - first:
-        n = first + W.counts.learnt[0]
+    if W.counts.load_updates[0] < last - first:
+        n = first + W.counts.load_updates[0]
         W.sensed[LOAD, n] -= TRIAL * W.sensed[GAP_BEFORE, n]
-        W.counts.learnt[0] += 1
+        W.counts.load_updates[0] += 1
         return
     for n in range(first, last):
         new = W.sensed[LOAD, n]
@@ -178,7 +172,7 @@ def improve(S, W, attempt):
 @formula
 def learnt(S, W):
     """Whether the slopes of all loads are known: until then the steps are small and tell nothing of convergence."""
-    return W.counts.learnt[0] >= W.sensed.shape[0] - INVERSE_JACOBIAN
+    return W.counts.load_updates[0] >= W.sensed.shape[0] - INVERSE_JACOBIAN
 
 
 @formula

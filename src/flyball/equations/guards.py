@@ -36,14 +36,9 @@ from ..tables.system import (
     G_SLIDES,
     G_TURNS,
     G_UPPER,
-    LAM,
-    LOWER,
-    MODE,
     OFF,
     RATE,
     RETURNED,
-    SHARED,
-    UPPER,
     VALUE,
 )
 from .control import column_of

@@ -22,10 +22,6 @@ from ..numerics.integrators.implicit.radau import enter as enter_radau
 from ..numerics.integrators.implicit.step import between as between_radau
 from ..numerics.integrators.loop import BEGIN
 from ..tables.system import (
-    DIAGONAL,
-    LAM,
-    MODE,
-    NU,
     STEADY,
     VALUE,
     ComplexSystem,
@@ -316,8 +312,7 @@ def as_modes_are(A):
     """Tell the residuals the present modes and ways, and which rows restrain positions: between steps they stay."""
     S, W, WC, P = A[S_], A[W_], A[WC_], A[PLAN]
     for s in range(S.switches.row.shape[0]):
-        for m in range(W.switch.shape[0]):
-            WC.switch[m, s] = complex(W.switch[m, s], 0.0)
+        WC.modes.mode[s], WC.modes.hold[s] = complex(W.modes.mode[s], 0.0), complex(W.modes.hold[s], 0.0)
         m = way_of(S, W, s)
         WC.sensed[VALUE, m] = complex(W.sensed[VALUE, m], 0.0)
         r = S.switches.row[s]

@@ -22,12 +22,9 @@ from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.tableaux import Tableau
 from ..tables.system import (
     BIAS,
-    EFFORT,
-    LAM,
     RATE,
     RETURNED,
     VALUE,
-    X_SOLVED,
     System,
     Work,
 )
@@ -91,7 +88,7 @@ def bench(n: int, nv: int, nr: int) -> Bench:
 def bare(address, S, W, R, clock, sheet, B, P):
     """The motion with everything off, and what every row does: A, b of the problem. Returns a status."""
     status = call(address, S, W, R, clock, sheet, MOTION)
-    for d in range(W.vel.shape[1]):
+    for d in range(W.velocities.solved.shape[0]):
         B.free[d] = W.velocities.solved[d]
     for k in range(S.rows.law.shape[0]):
         B.loaded[k] = W.rows.multiplier[k]
@@ -128,7 +125,7 @@ def along(S, W, m, a):
 @formula
 def respond(address, S, W, R, clock, sheet, B, i):
     """Response of row i."""
-    nv, nr = W.vel.shape[1], S.rows.law.shape[0]
+    nv, nr = W.velocities.solved.shape[0], S.rows.law.shape[0]
     out = sheet.rows
     for d in range(out.shape[1]):
         out[0, d] = out[1, d] = 0.0
@@ -284,7 +281,7 @@ def relaxed(S, W, t, B, P):
 def look(S, W, y, B):
     """Value, rate, and rounding of the rate, of the quantities of B's switches, into ``now``, ``rate``, ``seen``."""
     nq, most = S.coordinates[0], 0.0
-    for d in range(W.vel.shape[1]):
+    for d in range(W.velocities.solved.shape[0]):
         most = max(most, magnitude(y[nq + d]))
     for i in range(B.which.shape[0]):
         m = S.switches.measured[B.which[i]]

@@ -8,7 +8,7 @@ d), four arrays among them, and returns a float:
     PREPARE        a: q, b: v                   `prescribed.prepare`
     PLACE          a: q, b: z                   `projection.place`
     MOVE           a: v, b: z                   `projection.move`
-    LOADS          a: state, b: rates of works  forces into W.vel[F_APPLIED]
+    LOADS          a: state, b: rates of works  forces into `W.velocities.applied`
     FACTOR, REUSE                               `solve.factor`, 0 or 1 + a guilty unknown; `solve.reuse`
     STEP           a: f, b: gamma, c: x, d: lam  begin of a solve; without rows all of it
     STEP_UNLOADED  the same with f = 0
@@ -23,7 +23,7 @@ d), four arrays among them, and returns a float:
 from __future__ import annotations
 
 from ..compiler.formulas import formula, when_compiling
-from ..tables.system import FLAT, MADE, SCRATCH, STABILIZE
+from ..tables.system import FLAT, SCRATCH
 from .tasks import COMPLETE, FOLLOW, INTEGRATE
 
 PARTITIONING = 6
@@ -38,11 +38,11 @@ def run(address, S, W, t, a, b, c, d):  # type: ignore[no-untyped-def]
 def choose_code(S, W, task):
     """Say whether code made for the mechanism is in use for this task."""
     wanted = task == INTEGRATE or task == COMPLETE or task == FOLLOW
-    if W.options.stabilize[0] == PARTITIONING:
+    if W.options.stabilization[0] == PARTITIONING:
         wanted = False
-    W.info[MADE + SCRATCH] = 0
+    W.made[SCRATCH] = 0
     for k in range(SCRATCH + 1, FLAT):
-        W.info[MADE + k] = S.flat[k] if wanted else 0
+        W.made[k] = S.flat[k] if wanted else 0
 
 
 @when_compiling

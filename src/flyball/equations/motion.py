@@ -11,32 +11,10 @@ from ..laws.call import STACK_RESERVE
 from ..laws.evaluation import evaluate_jet
 from ..math.scalar import atan2, cos, magnitude, sin
 from ..tables.system import (
-    ALPHA,
-    BETA,
-    EFFORT,
-    F_APPLIED,
     FINISH,
-    G_VALUE,
-    GAMMA,
-    GIVEN,
-    LAM,
-    LATER,
     LOADS,
-    MADE,
-    NU,
-    PARTED,
-    PASS,
-    PLACED,
-    R2,
     REVOLUTE,
     SCHUR,
-    STABILIZE,
-    STATUS,
-    TOL_G,
-    TOL_V,
-    WORST_G,
-    WORST_V,
-    X_SOLVED,
 )
 from .control import control
 from .dispatch import progress, remember
@@ -97,16 +75,16 @@ def astray(S, W, t, q, v):
 def accelerate(S, W, t, p, dy, factored):
     """Dy at the settled state p, whose kinematics and rows are in W; vdot and lam are left in W. Returns a status."""
     nq = S.coordinates[0]
-    nv = W.vel.shape[1]
+    nv = W.velocities.solved.shape[0]
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
-    if W.options.stabilize[0] == BAUMGARTE:
+    if W.options.stabilization[0] == BAUMGARTE:
         a = 2.0 * W.options.alpha[0]
         b = W.options.beta[0] * W.options.beta[0]
         for k in range(S.rows.law.shape[0]):
             W.rows.gamma[k] -= a * (row_times(S, W, k, v) - W.rows.nu[k]) + b * W.rows.value[k]
-    if W.options.parted[0] > 0.0:  # from here on with the masses
-        W.options.parted[0] = 0.0
+    if W.options.partitioned[0] > 0.0:  # from here on with the masses
+        W.options.partitioned[0] = 0.0
         factored = OLD
     if factored == NEAR:
         if S.solver[0] == SCHUR:
@@ -131,11 +109,12 @@ def balance(S, W, t, p, work, factored):
     # joints with friction need the solution to know their loads: again until these return themselves
     most = 2 * tries(W)
     for attempt in range(most):
-        control(S, W, t, p[S.coordinates[0] + W.vel.shape[1] :], work)
+        control(S, W, t, p[S.coordinates[0] + W.velocities.solved.shape[0] :], work)
         loaded(S, W, t, p, work)
         if (
             factored == OLD
-            or solve(S, W, W.velocities.applied, W.rows.gamma, x, W.rows.multiplier, True, REFINEMENTS) > STALE * W.options.pass[0]
+            or solve(S, W, W.velocities.applied, W.rows.gamma, x, W.rows.multiplier, True, REFINEMENTS)
+            > STALE * W.options.solve_tolerance[0]
         ):
             if factor(S, W) != 0:
                 W.counts.status[0] = SINGULAR
@@ -157,9 +136,9 @@ def balance(S, W, t, p, work, factored):
 
 @formula
 def loaded(S, W, t, p, work):
-    """Generalised forces into W.vel[F_APPLIED], and what accounted ones do."""
-    if W.info[MADE + LOADS] != 0:
-        run(W.info[MADE + LOADS], S, W, t, p, work, p, work)
+    """Generalised forces into `W.velocities.applied`, and what accounted ones do."""
+    if W.made[LOADS] != 0:
+        run(W.made[LOADS], S, W, t, p, work, p, work)
         return
     inertial(S, W)
     forces(S, W, t, work)
@@ -171,12 +150,12 @@ def loaded(S, W, t, p, work):
 def finish(S, W, t, p, dy):
     """Dy at the state p from the solution in W. Returns a status."""
     nq = S.coordinates[0]
-    nv = W.vel.shape[1]
+    nv = W.velocities.solved.shape[0]
     x = W.velocities.solved
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
-    if W.info[MADE + FINISH] != 0:
-        W.counts.status[0] = 0 if run(W.info[MADE + FINISH], S, W, t, p, dy, x, W.rows.multiplier) == 0.0 else NOT_FINITE
+    if W.made[FINISH] != 0:
+        W.counts.status[0] = 0 if run(W.made[FINISH], S, W, t, p, dy, x, W.rows.multiplier) == 0.0 else NOT_FINITE
         return W.counts.status[0]
     rates(S, p, v, dy)
     for d in range(nv):
@@ -198,11 +177,11 @@ def finish(S, W, t, p, dy):
 def respond(S, W, f, gamma, x, lam):
     """Accelerations x and multipliers that other forces and right-hand sides of the rows make at the state in W.
 
-    Prescribed velocities do not change; what that takes is left in W.vel[EFFORT].
+    Prescribed velocities do not change; what that takes is left in `W.velocities.effort`.
     """
     for d in range(x.shape[0]):
         W.velocities.prescribed[d] = 0.0
-    if solve(S, W, f, gamma, x, lam, True, REFINEMENTS) > STALE * W.options.pass[0] and factor(S, W) == 0:
+    if solve(S, W, f, gamma, x, lam, True, REFINEMENTS) > STALE * W.options.solve_tolerance[0] and factor(S, W) == 0:
         solve(S, W, f, gamma, x, lam, True, REFINEMENTS)
 
 
@@ -223,12 +202,12 @@ def derivative(t, y, dy, S, W):
     for i in range(y.shape[0]):
         p[i] = y[i]
     q = p[:nq]
-    v = p[nq : nq + W.vel.shape[1]]
-    z = p[nq + W.vel.shape[1] :]
+    v = p[nq : nq + W.velocities.solved.shape[0]]
+    z = p[nq + W.velocities.solved.shape[0] :]
     prepare(S, W, t, q, v)
     factored = OLD
-    if W.options.stabilize[0] >= STAGES:
-        status, _, factored = settle(S, W, t, q, v, z, W.options.tol_g[0], W.options.tol_v[0])
+    if W.options.stabilization[0] >= STAGES:
+        status, _, factored = settle(S, W, t, q, v, z, W.options.position_tolerance[0], W.options.velocity_tolerance[0])
         if status != 0:
             W.counts.status[0] = status
             return status
@@ -243,8 +222,8 @@ def arrive(t, y, dy, S, W):
     """Project the state y in place, to rounding, and evaluate there. Returns (0 or status, relative violation)."""
     nq = S.coordinates[0]
     q = y[:nq]
-    v = y[nq : nq + W.vel.shape[1]]
-    z = y[nq + W.vel.shape[1] :]
+    v = y[nq : nq + W.velocities.solved.shape[0]]
+    z = y[nq + W.velocities.solved.shape[0] :]
     astray_by = astray(S, W, t, q, v)
     found = 0.0
     factored = OLD
@@ -252,13 +231,13 @@ def arrive(t, y, dy, S, W):
     if W.stack[fault, 0].real > 0.0:  # overcome: the step that met it was taken again, shorter
         W.stack[fault, 0] = -W.stack[fault, 0]
     prepare(S, W, t, q, v)
-    if W.options.stabilize[0] >= STEPS:
+    if W.options.stabilization[0] >= STEPS:
         status, found, factored = settle(S, W, t, q, v, z, TIGHT_G * S.length[0], TIGHT_V)
         if status != 0:
             W.counts.status[0] = status
             return status, found
         found = max(0.0, found - rounding(S, W, q) / S.length[0])
-        if W.options.parted[0] > 0.0:
+        if W.options.partitioned[0] > 0.0:
             exchange(S, W)
     else:
         place(S, W, t, q, z)
@@ -272,8 +251,11 @@ def arrive(t, y, dy, S, W):
 
 @formula
 def report(t, y, out, S, W):
-    """Write t, the state (projected first), vdot and lam to a row of the output; with LATER these two stay open."""
-    W.options.placed[0] = W.options.later[0]
+    """Write t, the state (projected first), vdot and lam to a row of the output.
+
+    Where accelerations are deferred vdot and lam stay open.
+    """
+    W.options.placed[0] = W.options.deferred[0]
     status, _ = arrive(t, y, W.y[1], S, W)
     W.options.placed[0] = 0.0
     write_row(t, y, out, S, W)
@@ -284,11 +266,13 @@ def report(t, y, out, S, W):
 def write_row(t, y, out, S, W):
     """Write t, the state y that W was last evaluated at, vdot, lam and the efforts of prescribed coordinates."""
     nq = S.coordinates[0]
-    nv = W.vel.shape[1]
+    nv = W.velocities.solved.shape[0]
     ny = y.shape[0]
     if S.rows.law.shape[0] > 0:
-        W.options.worst_g[0] = max(W.options.worst_g[0], violation(W, W.rows.r2))
-        W.options.worst_v[0] = max(W.options.worst_v[0], drift(S, W, y[nq : nq + nv], W.rows.r2)[0])
+        W.options.position_violation[0] = max(W.options.position_violation[0], violation(W, W.rows.scratch_2))
+        W.options.velocity_violation[0] = max(
+            W.options.velocity_violation[0], drift(S, W, y[nq : nq + nv], W.rows.scratch_2)[0]
+        )
     out[0] = t
     for i in range(ny):
         out[1 + i] = y[i]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..math.scalar import magnitude
-from ..tables.system import EXCHANGES, F_APPLIED, PARTITION, R2, RESIDUAL, V3
 from .solve import REFINEMENTS, factor, solve
 
 MOST = 4.0  # a dependent coordinate that moves by more than this times an independent one takes its place
@@ -22,8 +21,8 @@ def exchange(S, W):
     Each exchange multiplies the volume |det G_d| by that entry, so this comes to an end, and the pivots stay away from
     zero (the exchange is that of Goreinov, Tyrtyshnikov and Zamarashkin 1997, for submatrices of large volume).
     """
-    way = W.velocities.v3
-    r = W.rows.r2
+    way = W.velocities.scratch_3
+    r = W.rows.scratch_2
     n = way.shape[0]
     for _ in range(n):
         if r.shape[0] == 0 or factor(S, W) != 0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..laws.evaluation import evaluate_jet
-from ..tables.system import GIVEN, MADE, PREPARE
+from ..tables.system import PREPARE
 from .made import run
 from .rows import BY_TIME
 from .tree import normalise
@@ -12,9 +12,9 @@ from .tree import normalise
 
 @formula
 def prepare(S, W, t, q, v):
-    """Unit quaternions; prescribed coordinates, velocities and accelerations (W.vel[GIVEN]) as their laws say."""
-    if W.info[MADE + PREPARE] != 0:
-        run(W.info[MADE + PREPARE], S, W, t, q, v, q, v)
+    """Unit quaternions; prescribed coordinates, velocities and accelerations as their laws say."""
+    if W.made[PREPARE] != 0:
+        run(W.made[PREPARE], S, W, t, q, v, q, v)
         return
     normalise(S, q)
     for b in range(S.tree.parent.shape[0]):

@@ -6,23 +6,9 @@ from ..compiler.formulas import formula
 from ..math.scalar import larger, magnitude
 from ..tables.system import (
     DRIFT,
-    EVALUATIONS,
-    F_APPLIED,
-    G_VALUE,
-    GUILTY,
-    MADE,
     MOVE,
-    NU,
-    PARTED,
-    PASS,
     PLACE,
-    PLACED,
-    PROJECTIONS,
-    R2,
-    RESIDUAL,
     SHOW,
-    STABILIZE,
-    V3,
 )
 from .dispatch import row_biases, row_values
 from .kinematics import motions, poses
@@ -49,8 +35,8 @@ FAR = 1e3  # a state this far off is given up at once
 def place(S, W, t, q, z):
     """Poses, and the constraint rows as far as they follow from them: g, G, nu. ``z`` tells angles their turns."""
     W.counts.evaluations[0] += 1
-    if W.info[MADE + PLACE] != 0:
-        run(W.info[MADE + PLACE], S, W, t, q, z, q, z)
+    if W.made[PLACE] != 0:
+        run(W.made[PLACE], S, W, t, q, z, q, z)
     else:
         poses(S, W, q)
         row_values(S, W, t, z)
@@ -59,8 +45,8 @@ def place(S, W, t, q, z):
 @formula
 def move(S, W, t, v, z):
     """Velocities and bias accelerations at the poses in W, and what follows from them: gamma, measured rates."""
-    if W.info[MADE + MOVE] != 0:
-        run(W.info[MADE + MOVE], S, W, t, v, z, v, z)
+    if W.made[MOVE] != 0:
+        run(W.made[MOVE], S, W, t, v, z, v, z)
     else:
         motions(S, W, v)
         row_biases(S, W, t, v, z)
@@ -68,7 +54,7 @@ def move(S, W, t, v, z):
 
 @formula
 def violation(W, out):
-    """Largest |g| (its row goes to W.info[GUILTY]) and -g into ``out``."""
+    """Largest |g| (its row goes to `W.counts.guilty_row`) and -g into ``out``."""
     worst = 0.0
     for k in range(out.shape[0]):
         g = W.rows.value[k]
@@ -76,15 +62,15 @@ def violation(W, out):
         size = magnitude(g)
         if not size <= worst:
             worst = size
-            W.counts.guilty[0] = k
+            W.counts.guilty_row[0] = k
     return worst
 
 
 @formula
 def show_frames(S, W, q):
     """Poses of frames as far as others look at them, where code made for the mechanism has not needed them."""
-    if W.info[MADE + SHOW] != 0:
-        run(W.info[MADE + SHOW], S, W, 0.0, q, q, q, q)
+    if W.made[SHOW] != 0:
+        run(W.made[SHOW], S, W, 0.0, q, q, q, q)
 
 
 @formula
@@ -101,8 +87,8 @@ def rounding(S, W, q):
 @formula
 def drift(S, W, v, out):
     """Largest |G v - nu|, the size of its largest term, and nu - G v into ``out``."""
-    if W.info[MADE + DRIFT] != 0:
-        worst = run(W.info[MADE + DRIFT], S, W, 0.0, v, out, v, out)
+    if W.made[DRIFT] != 0:
+        worst = run(W.made[DRIFT], S, W, 0.0, v, out, v, out)
         return worst, W.flat[0]
     worst = 0.0
     size = 0.0
@@ -128,7 +114,7 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, what the factor in W is:
     OLD, of poses NEARby or of those HERE).
     """
-    W.options.parted[0] = 1.0 if W.options.stabilize[0] == PARTITIONING else 0.0
+    W.options.partitioned[0] = 1.0 if W.options.stabilization[0] == PARTITIONING else 0.0
     still = W.options.placed[0] > 0.0  # nobody asks for accelerations there
     if S.rows.law.shape[0] == 0 and still and S.angles.F.shape[0] == 0:
         return 0, 0.0, OLD
@@ -141,11 +127,11 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     found = 0.0
     lost = 0.0
     factored = OLD
-    if W.options.stabilize[0] != VELOCITIES:
+    if W.options.stabilization[0] != VELOCITIES:
         status, found, factored = close(S, W, t, q, z, tol_g)
         if status != 0:
             return status, found, OLD
-    if W.options.stabilize[0] != POSITIONS:
+    if W.options.stabilization[0] != POSITIONS:
         status, lost, factored = steer(S, W, v, tol_v, factored)
         if status != 0:
             return status, found, OLD
@@ -163,8 +149,8 @@ def close(S, W, t, q, z, tol_g):
     Kinematics and rows are those of q, before and after. Returns (status, the violation found, what the factor is).
     """
     none = W.velocities.applied
-    step = W.velocities.v3
-    r = W.rows.r2
+    step = W.velocities.scratch_3
+    r = W.rows.scratch_2
     worst = violation(W, r)
     found = worst
     last = 1e300
@@ -202,13 +188,16 @@ def close(S, W, t, q, z, tol_g):
 def steer(S, W, v, tol_v, factored):
     """Put v on G v = nu. Returns (status, the violation found relative to size and speed, what the factor is)."""
     none = W.velocities.applied
-    step = W.velocities.v3
-    r = W.rows.r2
+    step = W.velocities.scratch_3
+    r = W.rows.scratch_2
     worst, size = drift(S, W, v, r)
     if worst > tol_v * (min(METRE, S.length[0]) * S.rate[0] + size):
         if factored == NEAR:
             reuse(S, W)
-        if factored == OLD or solve(S, W, none, r, step, W.rows.residual, False, REFINEMENTS) > STALE * W.options.pass[0]:
+        if (
+            factored == OLD
+            or solve(S, W, none, r, step, W.rows.residual, False, REFINEMENTS) > STALE * W.options.solve_tolerance[0]
+        ):
             if factor(S, W) != 0:
                 return NOT_CLOSED, worst, OLD
             factored = HERE
@@ -224,7 +213,7 @@ def tangent(y, e, S, W):
 
     Near a singular position rounding is large along what the constraints forbid, and small along what they allow.
     """
-    choice = W.options.stabilize[0]
+    choice = W.options.stabilization[0]
     if S.rows.law.shape[0] == 0 or choice < STEPS or choice == PARTITIONING:
         return
     nq = S.coordinates[0]
@@ -240,13 +229,13 @@ def tangent(y, e, S, W):
 @formula
 def stay(S, W, v):
     """Take from v what changes the constraints, with the factor in W."""
-    r = W.rows.r2
+    r = W.rows.scratch_2
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:
             v[S.tree.v[b]] = 0.0
     for k in range(r.shape[0]):
         r[k] = -row_times(S, W, k, v)
-    step = W.velocities.v3
+    step = W.velocities.scratch_3
     solve(S, W, W.velocities.applied, r, step, W.rows.residual, False, REFINEMENTS)
     for d in range(step.shape[0]):
         v[d] += step[d]

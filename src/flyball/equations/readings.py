@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ..compiler.formulas import formula
 from ..math.scalar import sqrt
-from ..tables.system import EFFORT, LAM, VALUE
+from ..tables.system import VALUE
 from .control import column_of
 from .friction import loads_end
 from .loads import effort_of

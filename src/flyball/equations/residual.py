@@ -19,18 +19,11 @@ from ..compiler.kernels import first_order_kernel
 from ..math.vec import add, cross, load3, load9, mv, put3, scale, sub
 from ..tables.system import (
     BIAS,
-    F_APPLIED,
     FREE,
-    G_VALUE,
-    GAMMA,
-    GIVEN,
-    LAM,
     LOAD,
-    NU,
     PLANAR,
     RATE,
     RETURNED,
-    V2,
     VALUE,
     ComplexSystem,
     ComplexWork,
@@ -57,11 +50,11 @@ def residuals(S, W, bench, task):
     behind all others in place of r (`parts`), with PUSHES those of the bodies alone.
     """
     nq = S.coordinates[0]
-    nv = W.vel.shape[1]
+    nv = W.velocities.solved.shape[0]
     nr = S.rows.law.shape[0]
     known = nv + 3 * nr + 3 * measured(S)
     behind = known + bench.steps.shape[1] - (3 * nv + 1)
-    a = W.velocities.v2
+    a = W.velocities.scratch_2
     p = W.y[0]
     for n in range(bench.steps.shape[0]):
         t = bench.t[0] + bench.steps[n, 3 * nv]
@@ -104,8 +97,8 @@ def residuals(S, W, bench, task):
 def residual(S, W, t, p, vdot, lam, out):
     """The residual at one state, by the engine's own loops: no more of its code."""
     nq = S.coordinates[0]
-    v = p[nq : nq + W.vel.shape[1]]
-    z = p[nq + W.vel.shape[1] :]
+    v = p[nq : nq + W.velocities.solved.shape[0]]
+    z = p[nq + W.velocities.solved.shape[0] :]
     poses(S, W, p[:nq])
     row_values(S, W, t, z)
     for b in range(S.tree.parent.shape[0]):
@@ -119,19 +112,19 @@ def residual(S, W, t, p, vdot, lam, out):
 def at_once(S, W, t, p, vdot, whole):
     """The same kinematics and rows in one pass; without accelerations of what is measured unless ``whole``."""
     nq = S.coordinates[0]
-    v = p[nq : nq + W.vel.shape[1]]
+    v = p[nq : nq + W.velocities.solved.shape[0]]
     for b in range(S.tree.parent.shape[0]):
         pose(S, W, b, p[:nq])
         accelerated(S, W, b, v, vdot)
     frames(S, W)
-    whole_rows(S, W, t, v, p[nq + W.vel.shape[1] :], whole)
+    whole_rows(S, W, t, v, p[nq + W.velocities.solved.shape[0] :], whole)
 
 
 @formula
 def missed(S, W, t, p, lam, out):
     """What the equations miss with these multipliers, kinematics and rows being known."""
     nq = S.coordinates[0]
-    nv = W.vel.shape[1]
+    nv = W.velocities.solved.shape[0]
     nr = S.rows.law.shape[0]
     v = p[nq : nq + nv]
     for k in range(nr):
@@ -159,7 +152,7 @@ def missed(S, W, t, p, lam, out):
 @formula
 def missed_by_parts(S, W, t, p, lam, out, first):
     """G v - nu, and from ``first`` on the terms of r."""
-    nv, nr = W.vel.shape[1], S.rows.law.shape[0]
+    nv, nr = W.velocities.solved.shape[0], S.rows.law.shape[0]
     v = p[S.coordinates[0] : S.coordinates[0] + nv]
     for k in range(nr):
         out[nv + nr + k] = row_times(S, W, k, v) - W.rows.nu[k]
@@ -175,7 +168,7 @@ def told(S, W, t, p, lam):
     reaction_loads(S, W)
     for n in range(2 * measured(S), loads_end(S, W)):
         W.sensed[LOAD, n] = W.sensed[RETURNED, n]
-    control(S, W, t, p[S.coordinates[0] + W.vel.shape[1] :], W.y[1])
+    control(S, W, t, p[S.coordinates[0] + W.velocities.solved.shape[0] :], W.y[1])
 
 
 @formula

@@ -15,14 +15,6 @@ from ..math.scalar import atan2, cos, sin
 from ..math.vec import add, cross, load3, neg, put3, scale, sub
 from ..tables.system import (
     BIAS,
-    DIAGONAL,
-    G_VALUE,
-    GAMMA,
-    HOLD,
-    LAM,
-    MODE,
-    NU,
-    NU_DOT,
     OFF,
     RATE,
     STEADY,
@@ -69,7 +61,7 @@ def on_second(S, W, what):
 @formula
 def begin(S, W):
     """Start every row and measured quantity from nothing."""
-    for k in range(W.row.shape[1]):
+    for k in range(W.rows.value.shape[0]):
         W.rows.value[k] = 0.0
     for m in range(measured(S)):
         W.sensed[VALUE, m] = 0.0

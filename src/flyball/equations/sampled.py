@@ -127,7 +127,7 @@ def sample(A):
     status = call(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[SHEET], MOTION)
     if status != 0:
         return status
-    z = S.coordinates[0] + W.vel.shape[1]
+    z = S.coordinates[0] + W.velocities.solved.shape[0]
     for late in range(2):
         for u in range(P.row.shape[0]):
             if P.row[u, LATER] == late and due(P, P.row[u, SAMPLED], t):

@@ -14,12 +14,13 @@ from ..tables.specs import Structure
 from ..tables.system import (
     FLAT,
     INVERSE_JACOBIAN,
-    INVERSE_SLOPES,
-    LOWER,
-    MADE,
     SCRATCH,
-    UPPER,
+    Counts,
+    Modes,
+    Options,
+    RowScratch,
     System,
+    VelocityScratch,
     Work,
 )
 from .kinematics import ground_frames
@@ -33,7 +34,7 @@ def work(s: Structure, system: System, dtype: Any = None) -> Work:
     if dtype.kind in "fc":
         return scratch(s, system, dtype).fields  # type: ignore[no-any-return]
     W = blank(s, system, dtype)
-    W.modes.lower, W.modes.upper = system.switch_numbers.lower, system.switch_numbers.upper
+    W.modes.lower[:], W.modes.upper[:] = system.switch_numbers.lower, system.switch_numbers.upper
     ground_frames(system, W)
     return W
 
@@ -49,8 +50,7 @@ def scratch(s: Structure, system: System, dtype: Any) -> PooledBuffer:
 def fill(s: Structure, system: System, array: Callable[[str], np.ndarray]) -> None:
     """Put into blank scratch, whose arrays are found by name, what the tables say of it."""
     if len(system.switch_numbers.lower):
-        switch = array("switch")
-        switch[LOWER], switch[UPPER] = system.switch_numbers.lower, system.switch_numbers.upper
+        array("modes.lower")[:], array("modes.upper")[:] = system.switch_numbers.lower, system.switch_numbers.upper
     if n := system.ground_frames[0]:
         _, at_rest = s.kept.get("ground", id(system), MOST, lambda: (system, on_ground(system)))  # told by its address
         array("FK")[:n] = at_rest
@@ -85,9 +85,11 @@ def blank(s: Structure, system: System, dtype: Any) -> Work:
 
     return Work(
         z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_entries.row)),
-        z(len(system.column)), z(len(system.column)), z(len(s.terms) if s.loads or s.reads else 0, 6), z(9, nr),
-        z(8, nv),
-        z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl + ne + nc + nw), z(INVERSE_SLOPES + nw, nw),
+        z(len(system.column)), z(len(system.column)), z(len(s.terms) if s.loads or s.reads else 0, 6),
+        RowScratch(*(z(nr) for _ in RowScratch._fields)), VelocityScratch(*(z(nv) for _ in VelocityScratch._fields)),
+        z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl + ne + nc + nw),
+        Modes(*(z(nw) for _ in Modes._fields[:-1]), z(nw, nw)),  # type: ignore[call-arg]
         z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n), z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny),
-        np.zeros(11), np.zeros(MADE + FLAT, np.int64), z(system.flat[SCRATCH]),
+        Options(*(np.zeros(1) for _ in Options._fields)), Counts(*(np.zeros(1, np.int64) for _ in Counts._fields)),
+        np.zeros(FLAT, np.int64), z(system.flat[SCRATCH]),
     )  # fmt: skip

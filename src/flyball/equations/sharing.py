@@ -26,8 +26,6 @@ from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watching import TERMS, Watch
 from ..tables.system import (
-    LAM,
-    SHARED,
     VALUE,
     System,
     Work,
@@ -178,7 +176,7 @@ def renewed(address, S, W, R, own, sheet, G):
                     p = G.null[j, k] * W.G[e]
                     out[0, S.column[e]] += p
                     out[2, S.column[e]] += magnitude(p)
-        for d in range(W.vel.shape[1]):
+        for d in range(W.velocities.solved.shape[0]):
             left, terms = max(left, magnitude(out[0, d])), max(terms, out[2, d])
         if left > BALANCED * terms:
             call(address, S, W, R, own, sheet, SOLVE)

@@ -12,7 +12,6 @@ from ..tables.system import (
     G_ASTRAY,
     G_CONE,
     LOAD,
-    MODE,
     OFF,
     RATE,
     VALUE,

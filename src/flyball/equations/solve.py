@@ -18,24 +18,12 @@ from ..math.vec import load9, mv
 from ..numerics.ldl import ldl_factor, ldl_solve
 from ..tables.system import (
     COUPLED,
-    DIAGONAL,
-    EFFORT,
     FACTOR,
-    FACTORISATIONS,
-    GIVEN,
-    MADE,
-    PARTED,
-    PARTITION,
-    PASS,
-    R1,
     REFINE,
     REUSE,
     SCHUR,
-    SOLVES,
     STEP,
     STEP_UNLOADED,
-    V1,
-    V2,
 )
 from .articulated import articulate, articulated_solve
 from .made import run
@@ -68,8 +56,8 @@ def inverse_mass(S, b, x, at, out, to):
 def factor(S, W):
     """Factor the matrix of the solve at the kinematics and rows now in W. Returns 0 or 1 + a guilty unknown."""
     W.counts.factorisations[0] += 1
-    if W.info[MADE + FACTOR] != 0:
-        return int(run(W.info[MADE + FACTOR], S, W, 0.0, W.A, W.A, W.A, W.A))
+    if W.made[FACTOR] != 0:
+        return int(run(W.made[FACTOR], S, W, 0.0, W.A, W.A, W.A, W.A))
     if S.solver[0] == SCHUR:
         return factor_schur(S, W)
     if S.solver[0] == COUPLED:
@@ -82,7 +70,7 @@ def turn_rows(S, W):
     """H = M^-1 G^T for the rows now in W."""
     for e in range(S.blocks.body.shape[0]):
         at = S.blocks.entry[e]
-        if W.options.parted[0] > 0.0:
+        if W.options.partitioned[0] > 0.0:
             turn_dependent(S, W, S.blocks.body[e], at)
         else:
             inverse_mass(S, S.blocks.body[e], W.G, at, W.H, at)
@@ -123,8 +111,8 @@ def natural_size(S, W):
 def reuse(S, W):
     """Keep the last factor for rows that have moved a little: as a preconditioner of the refinement."""
     if S.solver[0] == SCHUR:
-        if W.info[MADE + REUSE] != 0:
-            run(W.info[MADE + REUSE], S, W, 0.0, W.A, W.A, W.A, W.A)
+        if W.made[REUSE] != 0:
+            run(W.made[REUSE], S, W, 0.0, W.A, W.A, W.A, W.A)
         else:
             turn_rows(S, W)
 
@@ -155,8 +143,8 @@ def factor_coupled(S, W):
     To the entries of G a lever is added, 1 or the mechanism's length: the size of a row along which the forest cannot
     move just now, or never, must not vanish with them.
     """
-    nv = W.vel.shape[1]
-    per = W.velocities.v1
+    nv = W.velocities.solved.shape[0]
+    per = W.velocities.scratch_1
     lever = minimum(1.0, S.length[0]) ** 2
     mass_entries(S, W)
     for e in range(S.mass_entries.row.shape[0]):
@@ -164,7 +152,7 @@ def factor_coupled(S, W):
         own = d == S.mass_entries.column[e]
         if own:
             per[d] = 1.0 / W.M[e]
-        if W.options.parted[0] > 0.0:  # masses of the dependent coordinates alone
+        if W.options.partitioned[0] > 0.0:  # masses of the dependent coordinates alone
             W.M[e] *= (RIGID if W.velocities.partition[d].real < 0.0 else 1.0) if own else 0.0
         W.A[S.mass_entries.place[e]] = W.M[e]
     for k in range(S.rows.law.shape[0]):
@@ -183,18 +171,18 @@ def factor_coupled(S, W):
 def solve(S, W, f, gamma, x, lam, loaded, refinements):
     """Solve for x and lam with the factor in W; ``f`` (taken as zero unless ``loaded``) and ``gamma`` are kept.
 
-    Prescribed velocities have the accelerations in W.vel[GIVEN] if loaded, else they stay. Where M is semidefinite,
-    M + E is factored in its place and the refinement takes E out again. Returns the residual left, relative to the size
+    Prescribed velocities have the accelerations in `W.velocities.prescribed` if loaded, else they stay. Where M is
+    semidefinite, M + E is factored in its place and the refinement takes E out again. Returns the residual left, relative to the size
     of its terms.
     """
     W.counts.solves[0] += 1
-    if W.info[MADE + STEP] != 0:
+    if W.made[STEP] != 0:
         return solve_made(S, W, f, gamma, x, lam, loaded, refinements)
     for d in range(x.shape[0]):
         x[d] = W.velocities.prescribed[d] if loaded else 0.0
     for k in range(lam.shape[0]):
         lam[k] = 0.0
-        W.rows.r1[k] = gamma[k]
+        W.rows.scratch_1[k] = gamma[k]
     if S.solver[0] == SCHUR:
         return solve_schur(S, W, f, gamma, x, lam, loaded, refinements)
     if S.solver[0] == COUPLED:
@@ -206,11 +194,11 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
 @formula
 def solve_made(S, W, f, gamma, x, lam, loaded, refinements):
     """By code made for the mechanism: passes for what is left, until that passes or stops falling."""
-    worst = run(W.info[MADE + (STEP if loaded else STEP_UNLOADED)], S, W, 0.0, f, gamma, x, lam)
+    worst = run(W.made[(STEP if loaded else STEP_UNLOADED)], S, W, 0.0, f, gamma, x, lam)
     last = 1e300
-    for _ in range(refinements + 1 if W.info[MADE + REFINE] != 0 else 0):
-        worst = run(W.info[MADE + REFINE], S, W, 0.0, f, gamma, x, lam)
-        if not worst > W.options.pass[0] or worst > STALLED * last:
+    for _ in range(refinements + 1 if W.made[REFINE] != 0 else 0):
+        worst = run(W.made[REFINE], S, W, 0.0, f, gamma, x, lam)
+        if not worst > W.options.solve_tolerance[0] or worst > STALLED * last:
             break
         last = worst
     return worst
@@ -219,15 +207,15 @@ def solve_made(S, W, f, gamma, x, lam, loaded, refinements):
 @formula
 def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
     """Through S = G M^-1 G^T: one pass, then as many for what is left as it takes."""
-    rhs = W.velocities.v2
-    semidefinite = S.semidefinite[0] > 0.0 and not W.options.parted[0] > 0.0
+    rhs = W.velocities.scratch_2
+    semidefinite = S.semidefinite[0] > 0.0 and not W.options.partitioned[0] > 0.0
     for d in range(x.shape[0]):
         rhs[d] = f[d] if loaded else 0.0
     if loaded and not semidefinite:
         for b in range(S.tree.parent.shape[0]):
             inverse_mass(S, b, f, S.tree.v[b], x, S.tree.v[b])
         for k in range(lam.shape[0]):
-            W.rows.r1[k] = gamma[k] - row_times(S, W, k, x)
+            W.rows.scratch_1[k] = gamma[k] - row_times(S, W, k, x)
     pass_schur(S, W, rhs, x, lam, semidefinite)
     worst = 0.0
     last = 1e300
@@ -235,8 +223,8 @@ def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
         if lam.shape[0] > 0:
             worst = residual(S, W, gamma, x)
         if semidefinite:
-            worst = larger(worst, excess(S, W.velocities.v1, rhs, x))
-        if not worst > W.options.pass[0] or worst > STALLED * last:
+            worst = larger(worst, excess(S, W.velocities.scratch_1, rhs, x))
+        if not worst > W.options.solve_tolerance[0] or worst > STALLED * last:
             break
         last = worst
         pass_schur(S, W, rhs, x, lam, semidefinite)
@@ -245,12 +233,12 @@ def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
 
 @formula
 def pass_schur(S, W, rhs, x, lam, loaded):
-    """Add to x and lam one solve for the residual in W.row[R1] and, if ``loaded``, for rhs, which is cleared.
+    """Add to x and lam one solve for the residual in `W.rows.scratch_1` and, if ``loaded``, for rhs, which is cleared.
 
-    The step is left in W.vel[V1].
+    The step is left in `W.velocities.scratch_1`.
     """
-    dx = W.velocities.v1
-    r = W.rows.r1
+    dx = W.velocities.scratch_1
+    r = W.rows.scratch_1
     z = W.D[2]
     for d in range(x.shape[0]):
         dx[d] = 0.0
@@ -273,7 +261,7 @@ def pass_schur(S, W, rhs, x, lam, loaded):
 @formula
 def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
     """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving."""
-    rhs = W.velocities.v2
+    rhs = W.velocities.scratch_2
     worst, last = 1.0, 1e300
     for d in range(x.shape[0]):
         rhs[d] = 0.0
@@ -281,7 +269,7 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
         remainder(S, W, f, gamma, x, lam, rhs, loaded)
     for attempt in range(refinements):
         worst = pass_coupled(S, W, f, gamma, x, lam, rhs, loaded)
-        if not worst > W.options.pass[0] or (attempt > 0 and worst > STALLED * last):
+        if not worst > W.options.solve_tolerance[0] or (attempt > 0 and worst > STALLED * last):
             break
         last = worst
     return worst
@@ -295,7 +283,7 @@ def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
     for d in range(nv):
         z[S.ldl.perm[d]] = rhs[d]
     for k in range(lam.shape[0]):
-        z[S.ldl.perm[nv + k]] = W.rows.r1[k]
+        z[S.ldl.perm[nv + k]] = W.rows.scratch_1[k]
     ldl_solve(S.ldl, W.L, W.D[0], z)
     for d in range(nv):
         x[d] += z[S.ldl.perm[d]]
@@ -306,7 +294,7 @@ def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
 
 @formula
 def residual(S, W, gamma, x):
-    """R = gamma - G x into W.row[R1]; returns its largest entry relative to what was subtracted."""
+    """R = gamma - G x into `W.rows.scratch_1`; returns its largest entry relative to what was subtracted."""
     worst = 0.0
     size = 1e-300
     for k in range(gamma.shape[0]):
@@ -316,7 +304,7 @@ def residual(S, W, gamma, x):
             p = W.G[e] * x[S.column[e]]
             s -= p
             a += magnitude(p)
-        W.rows.r1[k] = s
+        W.rows.scratch_1[k] = s
         worst = larger(worst, magnitude(s))
         size = larger(size, a)
     return worst / size
@@ -324,10 +312,10 @@ def residual(S, W, gamma, x):
 
 @formula
 def remainder(S, W, f, gamma, x, lam, rhs, loaded):
-    """Both lines of the coupled equations: gamma - G x into W.row[R1], f - M x + G^T lam into rhs.
+    """Both lines of the coupled equations: gamma - G x into `W.rows.scratch_1`, f - M x + G^T lam into rhs.
 
     Returns the largest entry of either relative to its terms. What is left in the lines of prescribed velocities is
-    what their drivers have to do: it goes to W.vel[EFFORT].
+    what their drivers have to do: it goes to `W.velocities.effort`.
     """
     size = 1e-300
     for d in range(x.shape[0]):
@@ -353,7 +341,7 @@ def remainder(S, W, f, gamma, x, lam, rhs, loaded):
             p = W.G[e] * x[d]
             s -= p
             a += magnitude(p)
-        W.rows.r1[k] = s
+        W.rows.scratch_1[k] = s
         off = larger(off, magnitude(s))
         wide = larger(wide, a)
     for b in range(S.tree.parent.shape[0]):

@@ -16,18 +16,10 @@ from ..constraints.modes import BRANCH
 from ..laws.evaluation import evaluate_jet
 from ..tables.system import (
     BIAS,
-    DRIFT_BEFORE,
-    DRIFT_OFF,
-    INVERSE_SLOPES,
-    MODE,
     OFF,
     RATE,
-    SIDE_BEFORE,
-    SIDE_MOVED,
-    SIDE_TOLD,
     STEADY,
     VALUE,
-    X_SOLVED,
 )
 from .control import column_of
 from .rows import measured, way_of
@@ -93,7 +85,7 @@ def settled(S, W, t, n):
             change = 0.0
             for k in range(ns):
                 if along(S, W, k):
-                    change += W.switch[INVERSE_SLOPES + s, k] * W.modes.drift[k]
+                    change += W.modes.inverse_slopes[s, k] * W.modes.drift[k]
             W.modes.moved_side[s] = change
             if not abs(change) <= worst:
                 worst = abs(change)
@@ -122,7 +114,7 @@ def learn(S, W):
             dx = W.sensed[VALUE, way_of(S, W, s)] - W.modes.previous_side[s]
             for k in range(ns):
                 if along(S, W, k):
-                    b = W.switch[INVERSE_SLOPES + s, k]
+                    b = W.modes.inverse_slopes[s, k]
                     W.modes.moved_side[s] += b * (W.modes.drift[k] - W.modes.previous_drift[k])
                     W.modes.given_side[k] += dx * b
             moved += dx * dx
@@ -134,4 +126,4 @@ def learn(S, W):
             dx = W.sensed[VALUE, way_of(S, W, s)] - W.modes.previous_side[s]
             for k in range(ns):
                 if along(S, W, k):
-                    W.switch[INVERSE_SLOPES + s, k] += (dx - W.modes.moved_side[s]) * W.modes.given_side[k] / share
+                    W.modes.inverse_slopes[s, k] += (dx - W.modes.moved_side[s]) * W.modes.given_side[k] / share

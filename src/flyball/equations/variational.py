@@ -14,7 +14,7 @@ from ..numerics.integrators.clock import T
 from ..numerics.integrators.implicit.desk import VariationalDesk
 from ..numerics.integrators.implicit.hermite import between
 from ..numerics.integrators.implicit.variational import answer
-from ..tables.system import G_VALUE, System, Work
+from ..tables.system import System, Work
 from .asking import OWN, S_, SHEET, W_, inspect, through
 from .callbacks import Going, Own
 from .implicit import compose, land

@@ -29,11 +29,9 @@ from ..tables.system import (
     G_BACK,
     G_SHARED,
     G_TURNS,
-    LAM,
     RATE,
     RETURNED,
     VALUE,
-    X_SOLVED,
     System,
     Work,
 )
@@ -268,7 +266,9 @@ class Loop:
         W = scratch.fields
         self._known = [idle_tableau()]
         if len(S.guards.kind):
-            self.expected = W._replace(sensed=W.sensed.copy(), row=W.row.copy())
+            self.expected = W._replace(
+                sensed=W.sensed.copy(), rows=W.rows._replace(multiplier=W.rows.multiplier.copy())
+            )
             self.desk = _desk(S, self.expected, steps.c, steps.stages)
         else:  # nobody looks at it, or writes to it
             self.expected = W
@@ -280,7 +280,7 @@ class Loop:
             clock.real.copy(), clock.count.copy(), clock.times, np.zeros((3, ny)), np.zeros((1, ny)), clock.accounts,
             clock.seen,
         )  # fmt: skip
-        self.group, nv = group, W.vel.shape[1]
+        self.group, nv = group, W.velocities.solved.shape[0]
         sheet = Sheet(np.zeros((4, max(width, len(S.guards.kind), nv, len(S.rows.law), 1))))
         self.own = Own(own, sheet, self._known[0].fields, np.zeros(2, np.int64))
         self._bound: BoundKernel | None = None

@@ -21,7 +21,6 @@ from ..numerics.integrators.clock import AT_END, AT_START, FROM, FROM_RATE, TO, 
 from ..tables.system import (
     ALONG,
     BETWEEN,
-    MADE,
     RATE,
     SAMPLED,
     SLIDING,
@@ -240,7 +239,7 @@ def sample(S, W, k, law, t, h, x, seen):
     s = t + x * h
     for m in range(nm):
         seen[WITHIN, m], seen[WITHIN, nm + m] = between(seen, m, x, h)
-    made = W.info[MADE + SAMPLED]
+    made = W.made[SAMPLED]
     if k >= LAWS * S.forces.F.shape[0]:
         if made != 0:
             return run(S.flat[made + k], S, W, s, seen[WITHIN], seen[WITHIN], seen[WITHIN], seen[WITHIN])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..tables.system import SPARE
+from .stretches import RecordedModes
 
 GIVEN = "event_work"
 """Energy that events gave: by kicks, and by changes of parameters that energy depends on."""
@@ -139,6 +139,7 @@ def _stored(result: Any, by: tuple[Any, Any], y: np.ndarray) -> dict[str, float]
     q, v, z = np.split(y[None, :], [s.nq, s.nq + s.nv], axis=1)
     still, none = np.zeros((1, s.nv)), np.zeros((1, len(s.rows) + len(s.prescribed)))
     one = type(result)(result.model, values, np.zeros(1), q, v, z, still, none, result.health)
-    gone = {x.element.name for k, x in enumerate(s.switches) if switch is not None and switch[SPARE, k] != 0.0}
+    released = np.zeros(len(s.switches)) if switch is None else RecordedModes(*switch).released
+    gone = {x.element.name for k, x in enumerate(s.switches) if released[k] != 0.0}
     out = {f.name: 0.0 if f.energy is None or f.name in gone else float(one[f.name].energy[0]) for f in s.forces}
     return out | {ALL: float(one.energy.kinetic[0] + one.energy.gravity[0]) + sum(out.values())}

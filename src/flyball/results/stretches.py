@@ -10,11 +10,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..tables.values import Values
+
+
+class RecordedModes(NamedTuple):
+    """What is recorded of every switch, (ns,) each: see `tables.system.Modes`."""
+
+    mode: np.ndarray
+    hold: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    released: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -26,7 +36,7 @@ class Stretch:
     rows : int
         How many output times; none is possible.
     switch : ndarray (5, ns)
-        Mode, what is held, lower and upper bounds of every switch, whether it was released (`Work.switch`).
+        Mode, what is held, lower and upper bounds of every switch, whether it was released (`RecordedModes`).
     sigma : ndarray (ns,) or (ns, rows)
         The direction in which each acts.
     values : Values
@@ -46,6 +56,11 @@ class Stretch:
     lost: float
     given: float
     end: np.ndarray
+
+    @property
+    def modes(self) -> RecordedModes:
+        """The rows of ``switch`` by name."""
+        return RecordedModes(*self.switch)
 
     @property
     def ways(self) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -68,7 +69,6 @@ class Recorder:
         self.t = self.graph.symbol("t")
         self.q, self.v = self.numbered("q", s.nq), self.numbered("v", s.nv)
         self.z = self.numbered("z", len(s.states))
-        self.widths = {k: x.shape[1] for k, x in self.W._asdict().items() if np.ndim(x) == 2}
 
     def numbered(self, name: str, n: int) -> np.ndarray:
         """Symbols that are called by their numbers."""
@@ -76,23 +76,30 @@ class Recorder:
         out[:] = [self.graph.symbol(f"{name}[{k}]") for k in range(n)]
         return out
 
-    def at(self, name: str, row: int, column: int = 0) -> Place:
-        """Where an entry of an array of `Work` stands."""
-        return f"W_{name}", row * self.widths.get(name, 1) + column
+    def array(self, name: str) -> np.ndarray:
+        """An array of `Work`, by its name: ``"rows.gamma"``."""
+        found: Any = reduce(getattr, name.split("."), self.W)
+        return found  # type: ignore[no-any-return]
 
-    def fresh(self, name: str, row: int, columns: Sequence[int]) -> dict[int, Place]:
-        """Put symbols into a row of an array of `Work` in place of what is there; where they are read."""
+    def at(self, name: str, *index: int) -> Place:
+        """Where an entry of an array of `Work` stands."""
+        array = self.array(name)
+        return f"W_{name.replace('.', '_')}", index[0] if array.ndim == 1 else index[0] * array.shape[1] + index[1]
+
+    def fresh(self, name: str, row: int | None, columns: Sequence[int]) -> dict[int, Place]:
+        """Put symbols into an array of `Work`, or a row of it, in place of what is there; where they are read."""
         reads = {}
-        array = getattr(self.W, name)
+        array = self.array(name)
         for c in columns:
-            node = self.graph.symbol(f"W.{name}[{row}, {c}]")
-            array[row, c] = node
-            reads[node.index] = self.at(name, row, c)
+            index = (c,) if row is None else (row, c)
+            node = self.graph.symbol(f"W.{name}[{', '.join(map(str, index))}]")
+            array[index] = node
+            reads[node.index] = self.at(name, *index)
         return reads
 
     def again(self, name: str) -> dict[int, Place]:
         """Symbols in place of what is no number in an array of one dimension: it is read from there."""
-        array = getattr(self.W, name)
+        array = self.array(name)
         reads = {}
         for e, x in enumerate(array):
             if isinstance(x, Node) and not x.known:
@@ -100,14 +107,14 @@ class Recorder:
                 reads[array[e].index] = self.at(name, e)
         return reads
 
-    def stored(self, name: str, row: int, columns: Sequence[int]) -> list[tuple[Place, Any]]:
-        """What stands in a row of an array of `Work`, to be written there."""
-        array = getattr(self.W, name)
-        return [(self.at(name, row, c), array[row, c]) for c in columns]
+    def stored(self, name: str, row: int | None, columns: Sequence[int]) -> list[tuple[Place, Any]]:
+        """What stands in an array of `Work`, or in a row of it, to be written there."""
+        array = self.array(name)
+        return [(self.at(name, *i), array[i]) for i in ((c,) if row is None else (row, c) for c in columns)]
 
     def kept(self, name: str) -> list[tuple[Place, Any]]:
         """A whole array of one dimension, to be written."""
-        return [(self.at(name, e), x) for e, x in enumerate(getattr(self.W, name))]
+        return [(self.at(name, e), x) for e, x in enumerate(self.array(name))]
 
     def given(self, base: str, nodes: np.ndarray, first: int = 0) -> dict[int, Place]:
         """Symbols that stand one after the other from an argument on."""

@@ -15,13 +15,7 @@ from ..math.scalar import choose, larger
 from ..tables.system import (
     ARTICULATED,
     COUPLED,
-    DIAGONAL,
-    EFFORT,
-    GIVEN,
-    R1,
     SCHUR,
-    V1,
-    V2,
 )
 from .recorder import LOADED, TERMS, Recorder
 
@@ -41,7 +35,7 @@ class Solves(Recorder):
         if solver != ARTICULATED:
             stores += self.kept("L") + self.stored("D", 0, range(len(W.D[0])))
         if len(S.load_terms.load):
-            stores += self.stored("row", DIAGONAL, range(self.nr))
+            stores += self.stored("rows.diagonal", None, range(self.nr))
         self.add("FACTOR", {}, stores)
         reads: dict[int, Place] = {}
         if solver != ARTICULATED:
@@ -58,19 +52,19 @@ class Solves(Recorder):
         f, gamma = self.numbered("f", self.nv), self.numbered("gamma", self.nr)
         reads = {**reads, **self.given("a", f), **self.given("b", gamma)}
         x, lam = np.array([0.0] * self.nv, object), np.array([0.0] * self.nr, object)
-        W.rows.r1 = gamma
-        W.velocities.v2 = W.velocities.effort = 0.0
+        W.rows.scratch_1[:] = gamma
+        W.velocities.scratch_2[:] = W.velocities.effort[:] = 0.0
         if is_loaded:
-            reads |= self.fresh("vel", GIVEN, self.driven)
+            reads |= self.fresh("velocities.prescribed", None, self.driven)
             x[self.driven] = W.velocities.prescribed[self.driven]
         if S.solver[0] == SCHUR and self.semidefinite:  # what a pass gives back of E is of all that it has moved
-            W.velocities.v2 = f if is_loaded else 0.0
+            W.velocities.scratch_2[:] = f if is_loaded else 0.0
         elif S.solver[0] == SCHUR:
             for b in range(len(S.tree.parent)) if is_loaded else ():
                 inverse_mass(S, b, f, S.tree.v[b], x, S.tree.v[b])
-            W.rows.r1 = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]
+            W.rows.scratch_1[:] = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]
         elif S.solver[0] == COUPLED and is_loaded:
-            remainder(S, W, f, gamma, x, lam, W.velocities.v2, True)
+            remainder(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
         elif S.solver[0] == ARTICULATED:
             articulated_solve(S, W, f, x, W.velocities.effort)
         stores = [*self.solution(x, lam), (("W_flat", LOADED), 1.0 if is_loaded else 0.0)]
@@ -82,10 +76,12 @@ class Solves(Recorder):
             (("d", k), y) for k, y in enumerate(lam)
         ]
         if self.S.solver[0] == SCHUR:
-            left = self.stored("vel", V2, range(self.nv)) if self.semidefinite else []
+            left = self.stored("velocities.scratch_2", None, range(self.nv)) if self.semidefinite else []
         else:
-            left = self.stored("vel", V2, range(self.nv)) + self.stored("vel", EFFORT, self.driven)
-        return out + left + self.stored("row", R1, range(self.nr))
+            left = self.stored("velocities.scratch_2", None, range(self.nv)) + self.stored(
+                "velocities.effort", None, self.driven
+            )
+        return out + left + self.stored("rows.scratch_1", None, range(self.nr))
 
     @property
     def semidefinite(self) -> bool:
@@ -96,7 +92,9 @@ class Solves(Recorder):
         """What is left after a pass, and its size."""
         S, W = self.S, self.W
         worst = residual(S, W, gamma, x) if self.nr else 0.0
-        return larger(worst, excess(S, W.velocities.v1, W.velocities.v2, x)) if self.semidefinite else worst
+        return (
+            larger(worst, excess(S, W.velocities.scratch_1, W.velocities.scratch_2, x)) if self.semidefinite else worst
+        )
 
     def refined(self, reads: dict[int, Place]) -> None:
         """A pass for what is left."""
@@ -104,16 +102,18 @@ class Solves(Recorder):
         f, gamma = self.numbered("f", self.nv), self.numbered("gamma", self.nr)
         x, lam = self.numbered("x", self.nv), self.numbered("lam", self.nr)
         reads = {**reads, **self.given("a", f), **self.given("b", gamma), **self.given("c", x), **self.given("d", lam)}
-        reads |= self.fresh("row", R1, range(self.nr)) | self.fresh("vel", V2, range(self.nv))
+        reads |= self.fresh("rows.scratch_1", None, range(self.nr)) | self.fresh(
+            "velocities.scratch_2", None, range(self.nv)
+        )
         x, lam = x.copy(), lam.copy()
         if S.solver[0] == SCHUR:
-            pass_schur(S, W, W.velocities.v2, x, lam, self.semidefinite)
+            pass_schur(S, W, W.velocities.scratch_2, x, lam, self.semidefinite)
             worst = self.schur_left(gamma, x)
         else:
             is_loaded = self.graph.symbol("loaded")
             reads[is_loaded.index] = ("W_flat", LOADED)
             f = np.array([choose(is_loaded, y, 0.0) for y in f] or [0.0], object)[: self.nv]
-            worst = pass_coupled(S, W, f, gamma, x, lam, W.velocities.v2, True)
+            worst = pass_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
         self.add("REFINE", reads, self.solution(x, lam), worst)
 
     def drifted(self) -> None:

@@ -25,18 +25,9 @@ from ..laws.manner import brief
 from ..tables.specs import Structure
 from ..tables.system import (
     BIAS,
-    EFFORT,
-    F_APPLIED,
-    G_VALUE,
-    GAMMA,
-    GIVEN,
-    LAM,
     LOAD,
-    NU,
-    NU_DOT,
     RATE,
     VALUE,
-    X_SOLVED,
     System,
     Work,
 )
@@ -70,7 +61,7 @@ class Stages(Solves):
         prepare(self.S, self.W, self.t, q, v)
         stores = [(("a", k), x) for k, x in enumerate(q) if x is not self.q[k]]
         stores += [(("b", k), x) for k, x in enumerate(v) if x is not self.v[k]]
-        stores += [(self.at("vel", GIVEN, d), self.W.velocities.prescribed[d]) for d in self.driven]
+        stores += [(self.at("velocities.prescribed", d), self.W.velocities.prescribed[d]) for d in self.driven]
         self.add("PREPARE", {**self.given("a", self.q), **self.given("b", self.v), **self.time}, stores)
 
     def placed(self) -> None:
@@ -79,7 +70,7 @@ class Stages(Solves):
         reads = self.fresh("sensed", VALUE, range(nm, 2 * nm))  # rates, as last measured
         place(self.S, self.W, self.t, self.q, self.z)
         rows = range(nr)
-        stores = [x for r in (G_VALUE, NU, NU_DOT) for x in self.stored("row", r, rows)]
+        stores = [x for name in ("value", "nu", "nu_dot") for x in self.stored(f"rows.{name}", None, rows)]
         stores += [(self.at("G", e), x) for e, x in enumerate(self.W.G)]
         stores += self.stored("sensed", VALUE, range(nm))
         stores += [(self.at("T", k, c), x) for (k, c), x in np.ndenumerate(self.W.T)]
@@ -141,16 +132,16 @@ class Stages(Solves):
     def _weighed(self, W: Work) -> list[Any]:
         if not len(self.S.load_terms.load):
             return []
-        T, row, sensed = (np.array([self.graph.symbol(f"{n}?{k}") for k in range(x.size)], object).reshape(x.shape)
-                          for n, x in (("T", W.T), ("row", W.row), ("sensed", W.sensed)))  # fmt: skip
-        reaction_loads(self.S, W._replace(T=T, row=row, sensed=sensed))
+        T, lam, sensed = (np.array([self.graph.symbol(f"{n}?{k}") for k in range(x.size)], object).reshape(x.shape)
+                          for n, x in (("T", W.T), ("lam", W.rows.multiplier), ("sensed", W.sensed)))  # fmt: skip
+        reaction_loads(self.S, W._replace(T=T, rows=W.rows._replace(multiplier=lam), sensed=sensed))
         return list(sensed.ravel())
 
     def moved(self) -> None:
         """Velocities, bias accelerations, and what follows."""
         nm = self.nm
         move(self.S, self.W, self.t, self.v, self.z)
-        stores = self.stored("row", GAMMA, range(self.nr))
+        stores = self.stored("rows.gamma", None, range(self.nr))
         stores += self.stored("sensed", RATE, range(nm)) + self.stored("sensed", BIAS, range(nm))
         stores += self.stored("sensed", VALUE, range(nm, 2 * nm))
         stores += [(self.at("FK", *e), self.W.FK[e]) for e in (*self.read_by_others, *self.read_at_ends) if e[1] >= 12]
@@ -162,7 +153,7 @@ class Stages(Solves):
         reads = self.fresh("sensed", LOAD, range(2 * nm, loads_end(self.S, self.W)))
         rates = np.full(len(self.z), None, object)
         loaded(self.S, self.W, self.t, None, rates)
-        stores = self.stored("vel", F_APPLIED, range(self.nv))
+        stores = self.stored("velocities.applied", None, range(self.nv))
         stores += [(("b", k), x) for k, x in enumerate(rates) if x is not None]
         self.add("LOADS", {**self.state, **reads}, stores)
 
@@ -173,12 +164,12 @@ class Stages(Solves):
         nq, nv = self.s.nq, self.nv
         given = self.W.velocities.solved, self.W.rows.multiplier
         x, lam = self.numbered("x", nv), self.numbered("lam", self.nr)
-        self.W.velocities.solved, self.W.rows.multiplier = x, lam
-        reads = self.fresh("vel", EFFORT, self.driven)
+        self.W.velocities.solved[:], self.W.rows.multiplier[:] = x, lam
+        reads = self.fresh("velocities.effort", None, self.driven)
         before = self.numbered("dy", nq + nv + len(self.z))  # works stand there already
         dy = before.copy()
         finish(self.S, self.W, self.t, np.concatenate([self.q, self.v, self.z]), dy)
-        self.W.velocities.solved, self.W.rows.multiplier = given
+        self.W.velocities.solved[:], self.W.rows.multiplier[:] = given
         stores = [(("b", k), y) for k, y in enumerate(dy) if y is not before[k]]
         reads |= {**self.state, **self.given("b", before), **self.given("c", x), **self.given("d", lam)}
         made = self.add("FINISH", reads, stores)

@@ -12,9 +12,6 @@ from ..math.vec import load3, load9, put3, put9
 from ..numerics.cone.problem import Problem, State
 from ..numerics.integrators.clock import T
 from ..tables.system import (
-    EFFORT,
-    NU,
-    PLACED,
     SCHUR,
 )
 from .contact_rows import contact_rows

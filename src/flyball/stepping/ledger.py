@@ -11,7 +11,6 @@ from __future__ import annotations
 from ..compiler.formulas import formula
 from ..equations.rows import row_times
 from ..math.vec import dot, load3, load9, mtv, mv
-from ..tables.system import NU
 from .joined import ASTRAY, KINETIC, POTENTIAL, WEIGHED
 
 

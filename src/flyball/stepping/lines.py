@@ -11,7 +11,7 @@ from ..compiler.formulas import formula
 from ..equations.friction import dry, held_at_rest, reaction_loads
 from ..numerics.cone.problem import BIAS, HIGH, LOW, SOFT
 from ..tables.system import BIAS as BEND_OF
-from ..tables.system import LAM, RETURNED, VALUE
+from ..tables.system import RETURNED, VALUE
 from .joined import (
     CHANGE,
     FRICTION,

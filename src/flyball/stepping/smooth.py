@@ -13,7 +13,6 @@ from ..equations.tasks import MOTION
 from ..equations.tree import retract
 from ..math.scalar import sqrt
 from ..numerics.integrators.clock import T
-from ..tables.system import EFFORT, LAM
 from .gauges import note_bends, note_lengths
 from .implicit import implied, stiffened, take_springs
 from .joined import ANYHOW, CHANGE, EFFORTS, EVALUATED, NOT_SETTLED, SMOOTH, SPRINGS, STEP, TIME, UNSETTLED, V_BEFORE

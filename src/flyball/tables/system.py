@@ -21,34 +21,18 @@ FREE, PLANAR, POINT, REVOLUTE, PRISMATIC, SPHERICAL, WELD = range(7)
 TREE_NQ, TREE_NV = (7, 3, 3, 1, 1, 4, 0), (6, 3, 3, 1, 1, 3, 0)
 BETWEEN, ALONG, SLIDING = range(3)  # families of forces: `Forces.family`
 OWN = 1000  # the kind of forces that have a code table: no built-in element's number
-# rows of Work.switch; and modes: the row counts for nothing, holds its quantity where it is, or at rest
-MODE, HOLD, LOWER, UPPER, SPARE = range(5)
-# (weight of a row of a group that shares what it holds, 0 of others: `equations/sharing.py`)
-SHARED = 5
-# (of corners of laws that hold the motion: du/dt; side and du/dt of the pass before; scratch; sides by du/dt)
-DRIFT_OFF, SIDE_BEFORE, DRIFT_BEFORE, SIDE_MOVED, SIDE_TOLD, INVERSE_SLOPES = range(6, 12)
+# modes of switches: the row counts for nothing, holds its quantity where it is, or at rest
 OFF, HELD, STEADY = 0.0, 1.0, 2.0
 # kinds of guards; what a guard's zero is watched for
 G_LAW, G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CORNER, G_PRESS_LOWER, G_PRESS_UPPER = range(10)
 G_CONE, G_TURNS, G_ASTRAY, G_SHARED = range(10, 14)
 FALLING, EITHER, RISING = -1, 0, 1
-# rows of Work.row, each (nr,)
-G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
-# rows of Work.vel, each (nv,)
-# (in the last: of each coordinate the size, > 0 if it depends on the others, < 0 if not, 0 if it is prescribed)
-F_APPLIED, X_SOLVED, V1, V2, V3, GIVEN, EFFORT, PARTITION = range(8)
 # rows of Work.sensed: of each measured quantity; then, columns of their own, of its rate as a value
 VALUE, RATE, BIAS = range(3)
 # in the columns after those, of each load of a joint: the load now, the one returned; load and gap of the pass before;
 # scratch; and the inverse Jacobian of the gaps. Then forces that events name (`readings`). Then value, rate and its
 # rate of each controller's state (`control.column_of`). Then, in row VALUE, the way of each switch (`rows.way_of`)
 LOAD, RETURNED, LOAD_BEFORE, GAP_BEFORE, MOVED, TOLD, INVERSE_JACOBIAN = range(7)
-# entries of Work.option
-STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS, PARTED, LATER, PLACED = range(11)
-# entries of Work.info
-STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS, LEARNT, EXCHANGES = range(8)
-# from there on, while code made for the mechanism is in use, its addresses; 0: the loops over the tables do it
-MADE = 8
 # entries of System.flat: the length of Work.flat, then addresses; what each does is said in `equations/made.py`
 SCRATCH, PREPARE, PLACE, MOVE, LOADS, FACTOR, REUSE, STEP, STEP_UNLOADED, REFINE, FINISH, DRIFT, SHOW, SAMPLED, FLAT = (
     range(15)
@@ -309,9 +293,88 @@ def changed(function: Callable[[str, np.ndarray], Any], table: Any, name: str = 
     return type(table)(*(changed(function, x, f"{name}.{field}" if name else field) for field, x in fields))
 
 
+def assign(to: Any, table: Any) -> None:
+    """Write all arrays of a table into those of another."""
+    for (_, x), (_, y) in zip(arrays(to), arrays(table), strict=True):
+        x[...] = y
+
+
 def with_numbers(S: System, function: Callable[[str, np.ndarray], Any], names: Sequence[str] = NUMBERS) -> System:
     """The same with what a function makes of every array of numbers, and of its name."""
     return S._replace(**{name: changed(function, getattr(S, name), name) for name in names})
+
+
+class RowScratch(NamedTuple):
+    """Of the constraint rows [(nr,)]."""
+
+    value: Number1  # g
+    nu: Number1  # right-hand side of G v = nu
+    gamma: Number1  # right-hand side of G vdot = gamma
+    diagonal: Number1  # of the matrix that is factored, before regularization
+    multiplier: Number1
+    scratch_1: Number1
+    scratch_2: Number1
+    residual: Number1
+    nu_dot: Number1
+
+
+class VelocityScratch(NamedTuple):
+    """Of the velocities [(nv,)]."""
+
+    applied: Number1  # forces along them
+    solved: Number1  # accelerations, or what else was solved for
+    scratch_1: Number1
+    scratch_2: Number1
+    scratch_3: Number1
+    prescribed: Number1  # accelerations that drivers prescribe
+    effort: Number1  # of these drivers
+    partition: Number1  # size of the coordinate: > 0 if it depends on others, < 0 if not, 0 if it is prescribed
+
+
+class Modes(NamedTuple):
+    """Of the switches [(nw, ...)]."""
+
+    mode: Number1  # OFF, HELD, STEADY
+    hold: Number1  # where the quantity is held
+    lower: Number1  # how far it may go
+    upper: Number1
+    released: Number1  # whether an event has released the element
+    shared: Number1  # weight of a row of a group with indeterminate forces, 0 of others (`equations/sharing.py`)
+    drift: Number1  # of corners of laws that hold the motion: du/dt
+    previous_side: Number1  # side and du/dt of the pass before
+    previous_drift: Number1
+    moved_side: Number1  # scratch
+    given_side: Number1
+    inverse_slopes: Number2  # (nw, nw): sides by du/dt
+
+
+class Options(NamedTuple):
+    """Choices of the analysis, and what it reports [(1,)]."""
+
+    stabilization: Float1
+    position_tolerance: Float1
+    velocity_tolerance: Float1
+    alpha: Float1  # of Baumgarte's stabilization
+    beta: Float1
+    position_violation: Float1  # largest met
+    velocity_violation: Float1
+    solve_tolerance: Float1  # relative residual of a solve that passes
+    partitioned: Float1  # whether solves are for the dependent coordinates alone
+    deferred: Float1  # whether accelerations at output times are found when they are asked for
+    placed: Float1  # whether only positions and velocities are wanted
+
+
+class Counts(NamedTuple):
+    """Counters of a run [(1,)]."""
+
+    status: Int1
+    guilty_row: Int1  # the row that a failure is due to
+    evaluations: Int1
+    factorisations: Int1
+    solves: Int1
+    projections: Int1
+    load_updates: Int1  # how many loads' slopes are known
+    exchanges: Int1  # of dependent coordinates
 
 
 class Work(NamedTuple):
@@ -327,17 +390,18 @@ class Work(NamedTuple):
     G: Number1  # (nG,): constraint Jacobian, then gradients of the measured quantities
     H: Number1  # (nG,): M^-1 G^T
     T: Number2  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
-    row: Number2  # (9, nr)
-    vel: Number2  # (8, nv)
+    rows: RowScratch
+    velocities: VelocityScratch
     sensed: Number2  # (6 + nl, 2 nm + nl + ne + nc + nw): value, rate, bias measured; loads; forces; controls; ways
-    switch: Number2  # (12 + nw, nw): of each row with modes: its mode, where it is held, how far it may go; slopes
+    modes: Modes
     A: Number1  # matrix to be factored
     L: Number1  # its factor
     D: Number2  # (3, n): inverse diagonal, scratch, right-hand side
     stack: Number2  # law evaluation
     y: Number2  # (3, ny): states in the making
-    option: Float1  # (11,): choices of the analysis, largest violations reported, what is solved for
-    info: Int1  # (23,): status, guilty row, counters, how many loads' slopes are known, one more; addresses
+    options: Options
+    counts: Counts
+    made: Int1  # (15,): while code made for the mechanism is in use, its addresses as in `System.flat`; else 0
     flat: Number1  # scratch of code made for the mechanism
 
 

@@ -26,12 +26,7 @@ from ..equations.tree import rates
 from ..graph.node import Graph, Node, Symbol
 from ..tables.specs import Structure
 from ..tables.system import (
-    F_APPLIED,
-    G_VALUE,
-    GAMMA,
-    LAM,
     LOAD,
-    NU,
     NUMBERS,
     PLANAR,
     RETURNED,
@@ -127,7 +122,7 @@ def traced(
     efforts(S, W, t, work_rates, f)
     M = mass_matrix(S, W, nv)
     gradients, G = _rows(S, W, nm, nv)
-    W.rows.multiplier = lam
+    W.rows.multiplier[:] = lam
     reaction_loads(S, W)
     return Traced(
         graph, s, S, W, t, q, v, z, lam, loads, T, M, f.copy(), W.rows.value.copy(), W.rows.nu.copy(), G,

@@ -11,7 +11,7 @@ import numpy as np
 from ..constraints.modes import BRANCH, EDGE, ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ..model.touch import Touch
 from ..results.events import Happening
-from ..tables.system import OFF, SPARE
+from ..tables.system import OFF
 from .tabled import Table
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ...errors import AssemblyError
-from ...tables.system import G_VALUE, NU
 from ..compiled import Compiled
 
 SHOWN = 8  # elements that a message names

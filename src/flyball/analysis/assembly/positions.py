@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics.rank import svd
-from ...tables.system import G_VALUE
 from ..compiled import Compiled
 from .described import rotation
 

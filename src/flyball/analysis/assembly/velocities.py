@@ -16,7 +16,6 @@ import numpy as np
 
 from ...model.model import Model
 from ...numerics.rank import svd
-from ...tables.system import NU
 from ..compiled import Compiled, compiled
 from .described import Given, described, deviation, given, gradient
 from .positions import DENSE, ITERATIONS, NO_PART, NO_PIVOT, row_scales

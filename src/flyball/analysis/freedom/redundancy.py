@@ -8,7 +8,6 @@ from ...model.body import Driver
 from ...numerics.rank import rank
 from ...numerics.sparse_rank import DENSE
 from ...results.freedoms import RedundantSet
-from ...tables.system import G_VALUE, NU
 from ..compiled import Compiled
 from .cures import cures
 from .jacobian import Found, scaled_jacobian

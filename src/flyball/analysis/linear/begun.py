@@ -14,7 +14,6 @@ import numpy as np
 from ...equations.tree import retract
 from ...model.model import Model
 from ...numerics.rank import TOLERANCE
-from ...tables.system import NU
 from ..assemble import assemble
 from ..assembly.described import described, deviation
 from ..assembly.positions import inverse_weights, row_scales

@@ -15,7 +15,6 @@ from ...equations.tree import retract
 from ...results.health import Health
 from ...results.mobility import Mobility
 from ...results.result import Result
-from ...tables.system import G_VALUE, NU
 from ...tables.values import Values
 from ..assembly.start import Assembly
 from ..compiled import compiled
@@ -32,10 +31,10 @@ def snapshot(x: State, values: Values | None = None) -> Result:
     """The state as a result with one time; one can go on from it."""
     result = _result(x, values or x.c.values, *(np.zeros((1, n)) for n in _sizes(x)))
     x.c.at(x.t, x.q, x.v)
-    row = x.c.work.row
+    rows = x.c.work.rows
     health = result.health
-    health.violation = float(np.abs(row[G_VALUE]).max(initial=0.0))
-    health.velocity_violation = float(np.abs(x.c.sparse_jacobian() @ x.v - row[NU]).max(initial=0.0))
+    health.violation = float(np.abs(rows.value).max(initial=0.0))
+    health.velocity_violation = float(np.abs(x.c.sparse_jacobian() @ x.v - rows.nu).max(initial=0.0))
     health.late = {"mobility": partial(_mobility, x)}
     result.final = (x.t, x.y)
     return result

@@ -23,10 +23,7 @@ from ...laws.opcodes import BY_TIME
 from ...tables.specs import Structure
 from ...tables.system import (
     ALONG,
-    EFFORT,
-    LAM,
     SLIDING,
-    X_SOLVED,
     System,
     Work,
 )
@@ -63,7 +60,9 @@ class State:
         if c.at(t, q, v, MOTION)[0] != 0:
             raise AnalysisError(f"{c.structure.model.name!r} at t = {t:.6g} s, {no_solution(c, t, abs(t))}")
         W = c.work
-        return cls(c, t, q, v, c.z.copy(), W.velocities.solved.copy(), W.rows.multiplier.copy(), W.velocities.effort.copy())
+        return cls(
+            c, t, q, v, c.z.copy(), W.velocities.solved.copy(), W.rows.multiplier.copy(), W.velocities.effort.copy()
+        )
 
     @classmethod
     def resting(cls, c: Compiled, t: float, q: np.ndarray, lam: np.ndarray | None = None) -> State:

@@ -18,7 +18,6 @@ from ...numerics.rank import TOLERANCE, null_space, parts
 from ...numerics.saddle import null_basis, surely_independent
 from ...numerics.sparse_rank import rank as rank_of
 from ...tables.names import Named, velocity_names
-from ...tables.system import G_VALUE
 from ..compiled import Compiled
 from .derivatives import Equations
 

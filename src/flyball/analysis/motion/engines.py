@@ -18,7 +18,6 @@ from ... import special
 from ...errors import ModelError
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.refusal import afresh
-from ...tables.system import EVALUATIONS
 from ...tables.values import Values
 from ..compiled import Compiled
 from .account import SPENT, kind

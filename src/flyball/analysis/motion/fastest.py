@@ -10,7 +10,7 @@ from ...equations.engine import MOTION, evaluate
 from ...numerics.arnoldi import largest
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.step import scaled
-from ...tables.system import VALUE
+from ...tables.system import VALUE, assign
 from ..compiled import Compiled
 
 LAST = 12  # stage of dop853 that is at the end of the step, as is the one before
@@ -66,7 +66,8 @@ def bend(clock: ex.Clock) -> float:
 
 def _rates(c: Compiled, t: float, n: int) -> Callable[[np.ndarray], np.ndarray]:
     other = c.again()
-    other.work.switch[:], other.work.option[:] = c.work.switch, c.work.option
+    assign(other.work.modes, c.work.modes)
+    assign(other.work.options, c.work.options)
     other.work.sensed[VALUE] = c.work.sensed[VALUE]
 
     def rates(x: np.ndarray) -> np.ndarray:

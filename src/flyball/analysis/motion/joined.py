@@ -8,7 +8,6 @@ from ...equations.engine import MOTION
 from ...errors import ModelError
 from ...results.result import Result
 from ...tables.coordinates import BodyState
-from ...tables.system import G_VALUE, NU
 from ..compiled import Compiled
 
 NEAR = 1e-6  # of the mechanism's length, or radians, that a motion may go on from

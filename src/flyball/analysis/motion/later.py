@@ -14,7 +14,6 @@ from ...model.actions import Set
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import tableau
 from ...results.health import Health
-from ...tables.system import LATER
 from ..compiled import Compiled
 from .options import Integration
 from .reasons import no_solution
@@ -50,7 +49,7 @@ def solved(start: Start, rows: np.ndarray, health: Health) -> tuple[np.ndarray, 
     c = start.assembly.compiled
     s, W = c.structure, c.work
     ny = s.nq + s.nv + len(s.states)
-    W.options.later[0] = 0.0
+    W.options.deferred[0] = 0.0
     for tables in (c.system, c.values.system):  # what made code cannot do the engine's loops may
         out = rows.copy()
         if motion_kernel(tables, W, tableau("rk45"), standing(ny), out, COMPLETE) == 0:

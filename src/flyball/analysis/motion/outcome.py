@@ -19,7 +19,6 @@ from ...results.departure import changed_velocities, not_allowed
 from ...results.health import Health
 from ...results.result import Owed, Result
 from ...results.touched import contacts
-from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from ..assembly.start import Assembly
 from ..mobility import mobility
 from .crossed import crossed
@@ -115,16 +114,16 @@ def _for_the_next(here: Here, followed: bool) -> dict[str, Any]:
 
 def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
     """Figures of a run."""
-    option, info = (start.assembly.compiled.array(name) for name in ("option", "info"))
+    array = start.assembly.compiled.array
     return Health(
         success=True,
         message="",
-        violation=float(option[WORST_G]),
-        velocity_violation=float(option[WORST_V]),
+        violation=float(array("options.position_violation")[0]),
+        velocity_violation=float(array("options.velocity_violation")[0]),
         steps=int(clock.count[ex.ACCEPTED]),
         rejected=int(clock.count[ex.REJECTED]),
-        evaluations=int(info[EVALUATIONS]),
-        factorisations=int(info[FACTORISATIONS]),
+        evaluations=int(array("counts.evaluations")[0]),
+        factorisations=int(array("counts.factorisations")[0]),
         seconds=time.perf_counter() - start.since,
         compiling=compiled_since(start.since),
         options=o.choices(),

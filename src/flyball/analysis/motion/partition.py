@@ -6,7 +6,6 @@ import numpy as np
 
 from ...model.model import Model
 from ...tables.names import velocity_names
-from ...tables.system import PARTITION
 from ..mobility import mobility
 from .start import Start
 
@@ -31,11 +30,13 @@ def choose(model: Model, start: Start) -> None:
     G = G[length > 0.0] / length[length > 0.0, None]
     order = qr(G, mode="r", pivoting=True)[1] if len(G) else np.arange(len(size))
     dependent = order[: len(size) - len(given) - mobility(model, start.base).freedoms]
-    c.work.velocities.partition = -size
+    c.work.velocities.partition[:] = -size
     c.work.velocities.partition[dependent] *= -1.0
 
 
 def independent(start: Start) -> tuple[str, ...]:
     """Names of the coordinates that are independent now."""
     c = start.assembly.compiled
-    return tuple(n.name for n, p in zip(velocity_names(c.structure), c.work.velocities.partition, strict=True) if p < 0.0)
+    return tuple(
+        n.name for n, p in zip(velocity_names(c.structure), c.work.velocities.partition, strict=True) if p < 0.0
+    )

@@ -24,15 +24,9 @@ from ...model.touch import Touch
 from ...model.words import brief
 from ...numerics.integrators import clock as ex
 from ...tables.system import (
-    GAMMA,
-    GUILTY,
     LOAD,
-    MODE,
-    NU,
-    NU_DOT,
     OFF,
     REVOLUTE,
-    STATUS,
 )
 from ..assembly.start import Assembly
 from ..compiled import Compiled
@@ -133,7 +127,8 @@ def no_solution(c: Compiled, t: float, span: float) -> str:
     if text:
         return text
     if c.work.counts.status[0] == motion.JAMMED:
-        return f"{c.structure.forces[int(c.work.counts.guilty[0])].title} jams there: it grows with the load that it makes"
+        force = c.structure.forces[int(c.work.counts.guilty_row[0])]
+        return f"{force.title} jams there: it grows with the load that it makes"
     return "the position is singular: constraints depend on one another, or a freedom moves no inertia"
 
 
@@ -366,12 +361,12 @@ def _jammed(a: Assembly, clock: ex.Clock) -> str:
     if W.counts.status[0] != motion.JAMMED:
         return ""
     loads = int((a.compiled.system.forces.load >= 0).sum())
-    return jam(a.compiled.structure.forces[int(W.counts.guilty[0])], float(clock.real[ex.T]), loads == 1)
+    return jam(a.compiled.structure.forces[int(W.counts.guilty_row[0])], float(clock.real[ex.T]), loads == 1)
 
 
 def _stuck(a: Assembly, clock: ex.Clock) -> str:
     rows, W = a.compiled.structure.rows, a.compiled.work
-    k = int(W.counts.guilty[0])
+    k = int(W.counts.guilty_row[0])
     where = f" near {rows[k].element.title}" if rows else ""
     if rows and isinstance(rows[k].element, Driver):
         where += f" (whose law there has the rate {W.rows.nu[k]:.4g} and the second derivative {W.rows.nu_dot[k]:.4g})"

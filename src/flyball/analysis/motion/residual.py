@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...equations.engine import MOTION
-from ...tables.system import F_APPLIED, G_VALUE, GAMMA, NU, VALUE
+from ...tables.system import VALUE
 from ..compiled import Compiled, compiled
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def acceleration_violation(result: Result) -> float:
         if c is not own:
             q, v = c.take(own, result.t[k], q, v)
         if held is not None:
-            c.work.switch[:2] = held[:2, :, k]
+            c.work.modes.mode[:], c.work.modes.hold[:] = held[:2, :, k]
             c.work.sensed[VALUE, c.work.sensed.shape[1] - len(old.switches) :] = result.stretches.sigma[:, k]  # type: ignore[union-attr]
         c.at(result.t[k], q, v, MOTION)
         gap, largest, _ = missed(c, v, accelerations[k], sizes, result.health.options)

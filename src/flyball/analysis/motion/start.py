@@ -20,7 +20,7 @@ from ...tables.numbers import files
 from ...tables.specs import Structure
 from ...tables.structure import outdated
 from ...tables.switches import declared
-from ...tables.system import HOLD, MODE, VALUE
+from ...tables.system import VALUE
 from ..assemble import assemble
 from ..assembly.start import Assembly
 from ..compiled import compiled
@@ -207,7 +207,7 @@ def _holds(before: Result, a: Assembly) -> None:
     if before.stretches is None or [x.element.name for x in s.switches] != [x.element.name for x in old.switches]:
         return
     last = before.stretches.all[-1]
-    W.switch[[MODE, HOLD]] = last.switch[[MODE, HOLD]]
+    W.modes.mode[:], W.modes.hold[:] = last.modes.mode, last.modes.hold
     W.sensed[VALUE, W.sensed.shape[1] - len(s.switches) :] = last.sigma if last.sigma.ndim == 1 else last.sigma[:, -1]
 
 

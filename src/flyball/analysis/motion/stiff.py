@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from ...constraints.modes import BRANCH
 from ...numerics.integrators import clock as ex
-from ...tables.system import MODE, OFF
+from ...tables.system import OFF
 from ..compiled import Compiled
 from .account import kind
 from .fastest import bend, fastest

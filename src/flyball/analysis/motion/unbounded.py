@@ -16,7 +16,7 @@ from ...model.words import brief, shortened
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import TABLEAUX, Tableau, tableau
 from ...tables.branches import laws
-from ...tables.system import RATE, VALUE
+from ...tables.system import RATE, VALUE, assign
 from ..assembly.start import Assembly
 from .undefined import inputs_of
 
@@ -94,7 +94,8 @@ def _unbounded_law(a: Assembly, clock: ex.Clock) -> str:
         return ""
     s, S, begun, now = c.structure, c.values.system, c.again(), c.again()
     for other, at, state in ((begun, a.t, a.y), (now, t, y)):
-        other.work.switch[:], other.z = c.work.switch, state[s.nq + s.nv :].copy()
+        assign(other.work.modes, c.work.modes)
+        other.z = state[s.nq + s.nv :].copy()
         other.at(at, state[: s.nq].copy(), state[s.nq : s.nq + s.nv].copy(), MOTION)
     W, stack, n = now.work, np.zeros_like(c.work.stack), measured(S)
     later = W.sensed.copy()
@@ -174,7 +175,8 @@ def _jacobian(a: Assembly, n: int) -> np.ndarray:
     """Derivatives of the first ``n`` rates by what they are the rates of, by differences; the run's scratch is left."""
     c, y = a.compiled, a.y
     other = c.again()
-    other.work.switch[:], other.work.option[:] = c.work.switch, c.work.option
+    assign(other.work.modes, c.work.modes)
+    assign(other.work.options, c.work.options)
     other.work.sensed[VALUE] = c.work.sensed[VALUE]
 
     def rates(x: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from ...errors import ModelError
 from ...model.element import Element
 from ...model.model import Model
 from ...results.result import Result
-from ...tables.system import MODE, OFF, VALUE
+from ...tables.system import OFF, VALUE
 from ..assembly.start import Assembly
 from ..compiled import compiled
 from ..motion.start import begin

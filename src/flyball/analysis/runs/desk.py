@@ -16,7 +16,7 @@ from ...laws.breaks import NO_BREAKS
 from ...laws.functions import forget
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import tableau
-from ...tables.system import LATER, WORST_G
+from ...tables.system import WORST_G
 from ...tables.values import Values
 from ..compiled import Compiled
 from ..motion.engines import LONGEST
@@ -158,7 +158,7 @@ class Loop:
             c.run_on(code.made)
         self.start = start = replace(of.begun, assembly=replace(a, compiled=c))
         clock = clock_for(start, start.base.t, float(o.t_end), times, o, sampled_laws(c, NO_BREAKS))
-        c.work.options.later[0] = float(later := open_until_asked(start, o, INTEGRATE))
+        c.work.options.deferred[0] = float(later := open_until_asked(start, o, INTEGRATE))
         forget(c.work.stack)
         self._pace = Pace(float(o.t_end), of.asked, partial(unsuited, of.begun))
         clock.count[ex.QUOTA] = self._pace.limited(clock, LONGEST)

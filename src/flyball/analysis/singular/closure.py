@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...equations.tree import retract
-from ...tables.system import G_VALUE, GAMMA, PLANAR
+from ...tables.system import PLANAR
 from ..compiled import Compiled
 from ..steps import tangent_step
 

@@ -17,7 +17,6 @@ from ...model.body import Driver, Initial
 from ...model.element import LawOf
 from ...model.joint import Joint
 from ...model.model import Model, listing, suggest
-from ...tables.system import G_VALUE, GAMMA
 from ..assemble import assemble
 from ..assembly.start import Assembly
 from ..compiled import compiled

@@ -15,9 +15,10 @@ from ...laws.over_time import over_time, takes_arrays
 from ...math.scalar import divide, sign, unless_zero
 from ...math.vec import dot, norm, sub
 from ...model.force import CoordinateForce, JointForce
-from ...tables.system import HELD, SPARE
+from ...tables.system import HELD
 from ..booked import basis
 from ..records import coordinate_frames, turned
+from ..stretches import RecordedModes
 from .base import Curves, View
 
 
@@ -185,7 +186,7 @@ class ForceView(View):
         """Whether it is there: 0 from where an event has released it."""
         stretches = self._result.stretches
         own = [k for k, x in enumerate(self._x.structure.switches) if x.element is self.element]
-        return 1.0 if stretches is None or not own else stretches.over("switch")[SPARE, own[0]] == 0.0
+        return 1.0 if stretches is None or not own else RecordedModes(*stretches.over("switch")).released[own[0]] == 0.0
 
     @property
     def power(self) -> np.ndarray:

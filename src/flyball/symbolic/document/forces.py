@@ -29,7 +29,7 @@ def along(x: Formulated) -> list[tuple[str, np.ndarray]]:
 
 def _gathered(S: System, W: Work, t: Any) -> np.ndarray:
     """Forces along the velocities: of inertia and weight, or of the elements in the tables."""
-    f = np.empty(W.vel.shape[1], object)
+    f = np.empty(W.velocities.solved.shape[0], object)
     f[:] = 0.0
     W.FB[:] = 0.0
     rates = np.zeros(len(S.forces.F) + W.y.size, object)

@@ -25,6 +25,7 @@ from ...graph.derivative import jacobian, replaced
 from ...graph.printers.routine import refuse_long
 from ...graph.values import symbols
 from ...numerics.ldl import Pattern, analyse, ldl_factor, ldl_solve
+from ...tables.system import changed
 from ...tracing.trace import Traced
 
 REFINEMENTS = 2  # what the regularisation leaves of a well determined solution goes below rounding with the first
@@ -82,7 +83,9 @@ def schur(x: Traced) -> Once:
     """Through S = G M^-1 G^T, M being of the bodies themselves: `solve.factor_schur`."""
     S, nr = x.system, len(x.lam)
     rows = np.repeat(np.arange(nr), np.diff(S.row_start[: nr + 1]))
-    W = x.work._replace(G=zeros(len(x.work.G)), H=zeros(len(x.work.H)), row=x.work.row.copy())
+    W = x.work._replace(
+        G=zeros(len(x.work.G)), H=zeros(len(x.work.H)), rows=changed(lambda _, a: a.copy(), x.work.rows)
+    )
     W.G[: len(rows)] = x.G[rows, S.column[: len(rows)]]
     _refuse_long(S.ldl)
     n = len(S.ldl.perm)

@@ -49,8 +49,8 @@ class Counts:
         No mode, no way, nothing to tell.
         """
         W = here.c.work
-        first = W.sensed.shape[1] - W.switch.shape[1]
-        now = np.vstack((W.switch, W.sensed[VALUE, first:])), len(here.records)
+        first = W.sensed.shape[1] - W.modes.mode.shape[0]
+        now = np.vstack((*W.modes, W.sensed[VALUE, first:])), len(here.records)
         old, self._before = self._before, now
         same = old is not None and old[1] == now[1] and np.array_equal(old[0], now[0])
         if not same or self.empty == 0:

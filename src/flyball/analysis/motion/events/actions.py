@@ -21,7 +21,7 @@ from ....results.events import Happening
 from ....results.struck import summed
 from ....tables.reads import read
 from ....tables.specs import Structure
-from ....tables.system import HELD, MODE
+from ....tables.system import HELD
 from ....tables.values import Values
 from .blows import generalised
 from .carried import take_up

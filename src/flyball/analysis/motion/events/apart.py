@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....constraints.modes import STOP
-from ....tables.system import HELD, HOLD, LOWER, MODE, UPPER
+from ....tables.system import HELD
 from .instant import Instant
 
 SLIGHT = 1e-5  # of the mechanism's length, or of a radian: as positions are rounded in a description
@@ -26,7 +26,7 @@ def put_apart(n: Instant) -> None:
     for s, (side, _) in over.items():
         n.W.modes.mode[s], n.W.modes.hold[s] = HELD, side
     n.arrive()
-    n.W.modes.mode, n.W.modes.hold = modes, hold
+    n.W.modes.mode[:], n.W.modes.hold[:] = modes, hold
     n.here.v[:] = y[n.here.structure.nq : n.here.structure.nq + n.here.structure.nv]
     n.arrive()  # velocities on the rows of joints, where they are now
     n.look()

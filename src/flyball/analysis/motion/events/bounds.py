@@ -10,7 +10,7 @@ from ....constraints.modes import RATCHET, STOP
 from ....model.touch import Touch
 from ....tables.specs import Structure
 from ....tables.switches import SwitchSpec
-from ....tables.system import HELD, HOLD, LOWER, MODE, OFF, UPPER, VALUE
+from ....tables.system import HELD, OFF, VALUE
 from .here import Here
 
 NOTHING = 1e-12  # m or rad: printed as 0
@@ -56,7 +56,7 @@ def beyond(here: Here, near: np.ndarray) -> dict[int, float]:
     scratch.
     """
     S, W, out = here.c.system, here.c.work, dict[int, float]()
-    ways = W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :]
+    ways = W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] :]
     for s, spec in enumerate(here.structure.switches):
         x, kind = W.sensed[VALUE, spec.measured], S.switches.kind[s]
         if kind == RATCHET and W.modes.mode[s] == HELD:
@@ -66,7 +66,7 @@ def beyond(here: Here, near: np.ndarray) -> dict[int, float]:
         elif kind == STOP:
             past = max(W.modes.lower[s] - x, x - W.modes.upper[s])
             if W.modes.mode[s] == HELD and past <= near[s]:
-                side = W.switch[LOWER if ways[s] > 0.0 else UPPER, s]
+                side = (W.modes.lower if ways[s] > 0.0 else W.modes.upper)[s]
                 W.modes.hold[s] = side
                 if abs(x - side) > near[s]:
                     W.modes.mode[s], ways[s] = OFF, 0.0

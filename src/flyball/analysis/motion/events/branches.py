@@ -21,11 +21,8 @@ from ....laws.opcodes import BY_MOTION, BY_TIME
 from ....numerics.integrators import clock as ex
 from ....results.events import Happening
 from ....tables.system import (
-    DRIFT_OFF,
     G_CORNER,
     HELD,
-    INVERSE_SLOPES,
-    MODE,
     OFF,
     STEADY,
     VALUE,
@@ -295,7 +292,7 @@ class Corners:
         misses = np.array([jet(n, s, BY_MOTION)[1] if s in found.second else self.value(s)[0] for s in which])
         for i, s in enumerate(which):
             W.modes.mode[s] = STEADY if s in found.second else HELD
-            W.switch[INVERSE_SLOPES + np.array(which), s] = inverse[:, i]
+            W.modes.inverse_slopes[which, s] = inverse[:, i]
         n.ask(MOTION)
         halt(n, rows, misses)
 

@@ -15,7 +15,7 @@ from ....constraints.modes import SLIP
 from ....equations.instant import BLOWS, GRAIN, OF_A_STEP
 from ....model.touch import Touch
 from ....numerics.cone.dense.problem import EVEN, FOUND, FREE, GRIPS
-from ....tables.system import G_SHARED, SHARED
+from ....tables.system import G_SHARED
 from ..jams import bodies
 from .instant import Instant, Part
 from .jump import Jump, finish, nothing

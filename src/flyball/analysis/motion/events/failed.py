@@ -10,7 +10,7 @@ from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....errors import ModelError
 from ....model.touch import Touch
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
-from ....tables.system import G_LAW, G_SHARED, LOWER, SHARED, UPPER
+from ....tables.system import G_LAW, G_SHARED
 from ..jams import Overlap, Unresolved, bodies, jam
 from .bounds import told
 from .instant import Instant, Part

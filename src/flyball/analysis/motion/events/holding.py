@@ -12,12 +12,7 @@ from ....model.held import held_by
 from ....results.result import Result
 from ....tables.system import (
     HELD,
-    HOLD,
-    LOWER,
-    MODE,
     OFF,
-    SPARE,
-    UPPER,
     VALUE,
 )
 from .here import Here
@@ -58,7 +53,7 @@ def hold(here: Here, e: Event, a: Lock) -> str:
 def let_go(here: Here, e: Event, a: Release) -> str:
     """Let coordinates, a joint, a limit or a rope go."""
     W = here.c.work
-    ways = W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :]
+    ways = W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] :]
     held, kinds = held_by(here.structure.model, e, a), here.c.system.switches.kind
     every = switches(here, held.coordinates, held.joint, held.element)
     if not any(W.modes.released[k] == 0.0 if held.element else W.modes.mode[k] != OFF for k in every):
@@ -107,7 +102,9 @@ def gone_on(here: Here, before: Result) -> None:
         if j is None:
             continue
         if spec.switch.kind == LOCK:
-            W.switch[[MODE, HOLD], k] = last.switch[[MODE, HOLD], j]
+            W.modes.mode[k], W.modes.hold[k] = last.modes.mode[j], last.modes.hold[j]
         elif last.modes.released[j] == GONE:
             W.modes.released[k], W.modes.lower[k], W.modes.upper[k] = GONE, -np.inf, np.inf
-            W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] + k] = FROZEN if spec.switch.kind == ELASTIC else 0.0
+            W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] + k] = (
+                FROZEN if spec.switch.kind == ELASTIC else 0.0
+            )

@@ -18,13 +18,9 @@ from ....numerics.cone.dense.problem import FREE, Dense, dense
 from ....numerics.integrators.clock import COUNTS, REALS, SPAN, STATES, Clock, T
 from ....numerics.integrators.tableaux import tableau
 from ....tables.system import (
-    EFFORT,
     G_SHARED,
     HELD,
-    HOLD,
-    MODE,
     OFF,
-    SPARE,
     VALUE,
 )
 from .bounds import sizes, units
@@ -201,7 +197,7 @@ class Instant:
 
     def restored(self) -> None:
         """Modes and ways as they were when it was looked at."""
-        self.W.modes.mode = self.mode
+        self.W.modes.mode[:] = self.mode
         self.ways()[:] = self.way
 
     def problem(self, parts: list[Part]) -> tuple[Bench, Dense, int]:

@@ -15,7 +15,6 @@ import numpy as np
 
 from ....equations.instant import BLOWS, Bench
 from ....numerics.cone.dense.problem import FOUND, HOLDS, PUSHES, Dense
-from ....tables.system import NU
 from .instant import STOPS, Instant, Part
 
 REST = 1e-12  # of the terms of a rate after the jump: none

@@ -14,7 +14,7 @@ from ....constraints.modes import BY_RATE, FRICTION
 from ....equations.friction import FORGOTTEN
 from ....equations.instant import FORCES
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, LOW, OUT, PUSHES
-from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOAD, LOWER, MODE, OFF, UPPER
+from ....tables.system import G_HOLDS, G_PULL, HELD, LOAD, OFF
 from .idle import take_over, tied
 from .instant import DECIDED, STOPS, Instant, Part
 from .parts import of_accelerations
@@ -172,12 +172,12 @@ def write(n: Instant, found: Decided, still: np.ndarray) -> None:
             W.modes.mode[s] = HELD
             W.modes.hold[s] = n.hold[s] if n.mode[s] == HELD else n.x[s]
             if kind in STOPS:
-                W.modes.hold[s] = W.switch[LOWER if p.sign > 0.0 else UPPER, s]
+                W.modes.hold[s] = (W.modes.lower if p.sign > 0.0 else W.modes.upper)[s]
             ways[s] = p.sign if p.rule == PUSHES else 0.0
         elif kind == FRICTION:
             ways[s] = found.lean[i]
     write_slips(n, found.parts, (found.state, found.x, found.u, found.lean))
     write_group(n, found.parts, (found.state, found.A, found.gain, found.x, found.reach))
     if len(n.S.load_terms.load):
-        W.counts.learnt[0] = FORGOTTEN
+        W.counts.load_updates[0] = FORGOTTEN
         W.sensed[LOAD, 2 * len(n.here.structure.measured) : n.first] = 0.0  # of two solutions the one from no load

@@ -11,9 +11,7 @@ from ....tables.system import (
     G_LOWER,
     G_SLIDES,
     G_UPPER,
-    LOWER,
     OFF,
-    UPPER,
 )
 from .instant import STOPS, Instant, Part
 from .slips import astray, ended

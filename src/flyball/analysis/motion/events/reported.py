@@ -11,7 +11,7 @@ from ....equations.within import ROWS
 from ....numerics.cone.shares import OPEN
 from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock
 from ....numerics.integrators.tableaux import tableau
-from ....tables.system import LAM
+from ....tables.system import assign
 from .here import Here
 
 
@@ -22,7 +22,8 @@ def share(here: Here, rows: np.ndarray) -> None:
         return
     s, again, G = here.structure, here.c.again(), group
     W, S, ny = again.work, again.system, len(here.y)
-    W.switch[:], W.sensed[:] = here.c.work.switch, here.c.work.sensed
+    assign(W.modes, here.c.work.modes)
+    W.sensed[:] = here.c.work.sensed
     none, R = np.zeros(0, np.int64), tableau("rk45")
     seen, state = np.zeros((ROWS, 0)), np.zeros((STATES, ny))
     own = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), state, np.zeros((1, ny)), none, seen)
@@ -33,6 +34,6 @@ def share(here: Here, rows: np.ndarray) -> None:
         again.z = row[1 + s.nq + s.nv : 1 + ny].copy()
         again.at(row[0], row[1 : 1 + s.nq], row[1 + s.nq : 1 + s.nq + s.nv], MOTION)
         renewed_kernel(address, S, W, R, own, sheet, G)
-        W.rows.multiplier = row[lam]
+        W.rows.multiplier[:] = row[lam]
         shared_kernel(S, W, row[0], G)
         row[lam] = W.rows.multiplier

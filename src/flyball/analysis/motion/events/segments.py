@@ -10,8 +10,8 @@ from ....constraints.modes import BRANCH
 from ....equations.engine import MOTION
 from ....results.booked import booked
 from ....results.result import Result
-from ....results.stretches import Stretch, stretched
-from ....tables.system import HELD, MODE, OFF, SPARE, VALUE
+from ....results.stretches import RecordedModes, Stretch, stretched
+from ....tables.system import HELD, OFF, VALUE, assign
 from .here import Here
 from .reported import share
 
@@ -34,7 +34,7 @@ class Segments:
         self.all.append(
             Stretch(
                 len(rows),
-                W.switch[: 1 + SPARE].copy(),
+                np.array(W.modes[: len(RecordedModes._fields)]),
                 ways,
                 c.values,
                 here.lost,
@@ -68,7 +68,7 @@ def _ways(here: Here, rows: np.ndarray) -> np.ndarray:
     s, c, n = here.structure, here.c, len(here.structure.switches)
     out = np.zeros((n, len(rows)))
     again = c.again()
-    again.work.switch[:] = c.work.switch
+    assign(again.work.modes, c.work.modes)
     again.work.sensed[:] = c.work.sensed
     for k, row in enumerate(rows):
         again.z = row[1 + s.nq + s.nv : 1 + len(here.y)].copy()

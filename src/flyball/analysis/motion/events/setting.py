@@ -13,7 +13,7 @@ from ....errors import FlyballError, SimulationError
 from ....model.touch import Touch
 from ....tables.contact.places import places
 from ....tables.numbers import words
-from ....tables.system import G_VALUE, LOWER, NU, SPARE, UPPER, VALUE
+from ....tables.system import VALUE, assign, changed
 from ....tables.values import Values, values
 from .bounds import beyond, rule, sizes, units
 from .here import Here
@@ -49,7 +49,7 @@ def set_parameters(here: Here, new: Mapping[str, float], who: str) -> None:
     except FlyballError as error:
         raise SimulationError(f"at t = {here.t:.9g} s {who}: {error}", t=here.t) from None
     _refuse_other_places(here, found, who)
-    before, bounds, kept = _places(here, old), c.work.switch.copy(), c.parameters
+    before, bounds, kept = _places(here, old), changed(lambda _, x: x.copy(), c.work.modes), c.parameters
     _take(here, found, told)
     try:
         _refuse_moved(here, who, before, _places(here, found))
@@ -57,7 +57,7 @@ def set_parameters(here: Here, new: Mapping[str, float], who: str) -> None:
         _refuse_beyond(here, who)
     except SimulationError:
         _take(here, old, kept)
-        c.work.switch[:] = bounds
+        assign(c.work.modes, bounds)
         raise
     here.fresh = True
 
@@ -115,10 +115,8 @@ def _refuse_beyond(here: Here, who: str) -> None:
     if past:
         k = max(past, key=past.__getitem__)
         spec, unit = s.switches[k], units(s)[k]
-        bounds, x = W.switch[[LOWER, UPPER], k], W.sensed[VALUE, spec.measured]
-        said = (
-            "it is held where no tooth is" if spec.switch.kind == RATCHET else rule(spec, float(x), tuple(bounds), unit)
-        )
+        bounds, x = (W.modes.lower[k], W.modes.upper[k]), W.sensed[VALUE, spec.measured]
+        said = "it is held where no tooth is" if spec.switch.kind == RATCHET else rule(spec, float(x), bounds, unit)
         raise SimulationError(
             f"at t = {here.t:.9g} s {who} would put {spec.element.title} elsewhere in no time, by {past[k]:.3g} "
             f"{unit}: {said}. Set it where nothing is beyond it, give it stiffness=..., or let a Driver move what it "

@@ -16,7 +16,7 @@ from ....equations.instant import FORCES, NUDGE
 from ....equations.sharing import GRAIN
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, HOLDS, OUT, PUSHES, TURNS, WITH, Dense
 from ....numerics.cone.shares import CELLS, OPEN, best_kernel, room
-from ....tables.system import G_SHARED, MODE, OFF, SHARED
+from ....tables.system import G_SHARED, OFF
 from .instant import Instant, Part
 from .yielding import accelerations
 
@@ -244,7 +244,7 @@ def write_group(n: Instant, parts: list[Part], found: tuple[np.ndarray, ...]) ->
     if not n.shares:
         return
     (state, A, gain, x, reach), G, B = found, n.here.group, n.rooms[len(parts)].B
-    n.W.modes.shared, G.Q.count[OPEN] = 0.0, 0
+    n.W.modes.shared[:], G.Q.count[OPEN] = 0.0, 0
     on = n.W.modes.mode[[p.switch for p in parts]] != OFF  # slips of a gap that is let go are no rows
     rows = np.flatnonzero((state == EVEN) & on)
     rules = np.array([p.rule for p in parts])

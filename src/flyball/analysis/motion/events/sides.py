@@ -17,10 +17,7 @@ from ....tables.system import (
     BIAS,
     G_PRESS_LOWER,
     G_PRESS_UPPER,
-    LOWER,
-    MODE,
     OFF,
-    UPPER,
 )
 from .instant import Instant
 
@@ -85,8 +82,9 @@ def _side(n: Instant, s: int, old: float, hit: set[int]) -> float:
     """1 if pressed at the lower side, -1 at the upper, 0 if open; `BY_ITSELF` less `FROZEN` where nothing tells."""
     k, c = n.S.switch_numbers.stiffness[s], n.S.switch_numbers.damping[s]
     now = 0.0
-    for side, bound, guard in ((1.0, LOWER, G_PRESS_LOWER), (-1.0, UPPER, G_PRESS_UPPER)):
-        depth, rate = side * (n.W.switch[bound, s] - n.x[s]), -side * n.rate[s]
+    bounds = n.W.modes.lower, n.W.modes.upper
+    for side, bound, guard in zip((1.0, -1.0), bounds, (G_PRESS_LOWER, G_PRESS_UPPER), strict=True):
+        depth, rate = side * (bound[s] - n.x[s]), -side * n.rate[s]
         if not np.isfinite(depth):
             continue
         if guard in hit:

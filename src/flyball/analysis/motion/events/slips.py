@@ -17,8 +17,6 @@ from ....tables.system import (
     G_CONE,
     G_TURNS,
     HELD,
-    HOLD,
-    MODE,
     OFF,
 )
 from .instant import Instant, Part

@@ -10,7 +10,7 @@ from ....model.touch import Touch
 from ....numerics.integrators.clock import LEDGER
 from ....results.events import Happening
 from ....results.struck import Struck
-from ....tables.system import MODE, OFF
+from ....tables.system import OFF
 from .instant import Instant
 from .jump import Jump
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from ....model.model import Model
 from ....stepping.joined import STEP, V_AFTER, V_BEFORE, Joined
-from ....tables.system import G_VALUE, NU
 from ....tables.values import Values
 from ...assembly.start import Assembly
 from ..start import Start, begin

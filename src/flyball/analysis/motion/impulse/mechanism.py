@@ -29,7 +29,7 @@ from ....stepping.joined import (
 )
 from ....stepping.smooth import MIXED, MIXING
 from ....tables.specs import Structure
-from ....tables.system import BETWEEN, LATER, STABILIZE, System
+from ....tables.system import BETWEEN, System
 from ..start import Start
 
 Stop = tuple[float, float, float]
@@ -65,7 +65,7 @@ def tables(
     slopes = np.zeros((len(s.forces), SLOPE_WIDTH))
     slopes[:, DIRECTIONS] = [directions(f) for f in s.forces]
     springs = int(slopes[:, DIRECTIONS].sum())
-    c.work.options.stabilize[0], c.work.options.later[0] = STEPS, 0.0
+    c.work.options.stabilization[0], c.work.options.deferred[0] = STEPS, 0.0
     S = S._replace(force_parameters=S.force_parameters.copy())
     line, line_x = lines(s, S, stops or {})
     A = Joined(
