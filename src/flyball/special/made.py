@@ -10,6 +10,7 @@ import numpy as np
 from ..tables.system import FLAT, SAMPLED, SCRATCH, System
 from .linked import ENTRIES
 from .machine import Loaded, tables_of
+from .trace import Entry
 
 _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_void_p] * 2, ctypes.c_double, *[ctypes.c_void_p] * 4)
 
@@ -30,6 +31,8 @@ class Made:
         Procedures of the laws that may do much within a step, in the order of `within.law_at`; "" for the others.
     seconds : float
         What tracing and compiling took [s of the processor].
+    known : list of Entry
+        Entries of the tables whose very values are in the code.
     """
 
     loaded: Loaded
@@ -38,6 +41,7 @@ class Made:
     operations: int
     laws: list[str]
     seconds: float
+    known: list[Entry]
 
     def system(self, S: System) -> System:
         """The tables with the addresses in them; the code lives as long as the array in which they stand."""

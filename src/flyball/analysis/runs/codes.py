@@ -1,75 +1,66 @@
-"""Code made for the mechanisms of a study: which goes by the numbers that are 0, 1 or -1, and by some others."""
+"""Code made for the mechanism of a study, and the runs that it is for: those with its numbers 0, 1 and -1."""
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ... import special
 from ...special.recorder import PLAIN
-from ...tables.system import System
-from ...tables.values import Values
 from ..compiled import Compiled
 from ..motion.engines import Engine
-
-MOST = 8  # codes of one study; runs that want another are computed by themselves
+from .track import Batch
 
 
 @dataclass(frozen=True)
 class Code:
-    """Made code, and what it takes for granted of the tables that change from run to run."""
+    """Made code, and what it assumes of the tables that change from run to run.
+
+    Attributes
+    ----------
+    made : Made
+    tables : mapping
+        By name the entries of a table in the run that it was made for, and in which of them a run must agree; in the
+        others it must have none of the numbers that are folded.
+    """
 
     made: special.Made
-    plain: tuple[np.ndarray, ...]  # where these are 0, 1 or -1
-    fixed: tuple[tuple[str, int, float], ...]  # entries that it knows, and their values
+    tables: Mapping[str, tuple[np.ndarray, np.ndarray]]
 
-    def knows(self, S: System) -> bool:
-        """Whether tables have the entries that it knows."""
-        return all(getattr(S, name).ravel()[k] == x for name, k, x in self.fixed)
+    @classmethod
+    def of(cls, c: Compiled, tables: Sequence[str]) -> Code:
+        """The code of a mechanism, of which these tables change.
 
-
-class Codes:
-    """Codes of the runs of a study, found as they are wanted; threads share them."""
-
-    def __init__(self, c: Compiled, tables: Sequence[str]) -> None:
-        self.tables = tables
-        self.known: list[Code] = []
-        self._by_pattern: dict[bytes, Code] = {}
-        self._turn = threading.Lock()
-        self._add(c.again())
-
-    def of(self, x: Values, pattern: bytes) -> Code | None:
-        """The code for a run with these tables; of the same ``pattern``, if that is told, all are plain alike."""
-        S = x.system
-        code = self._by_pattern.get(pattern) if pattern else None
-        if code is not None and code.knows(S):
-            return code
-        with self._turn:
-            plain = _plain(S, self.tables)
-            code = next((k for k in self.known if _alike(k.plain, plain) and k.knows(S)), None)
-            if code is None and len(self.known) < MOST:
-                code = self._add(Compiled(x, np.zeros(len(x.structure.states))))
-            if code is not None and pattern:
-                self._by_pattern[pattern] = code
-        return code
-
-    def _add(self, c: Compiled) -> Code | None:
-        """The code that a run by itself would have."""
+        Raises
+        ------
+        ModelError
+            If none can be made.
+        """
         Engine(c, True)
-        S, made = c.values.system, c.made
-        if made is None or (entries := special.entries(made)) is None:
-            return None
-        fixed = tuple((name, k, float(getattr(S, name).ravel()[k])) for name, k in entries if name in self.tables)
-        self.known.append(Code(made, _plain(S, self.tables), fixed))
-        return self.known[-1]
+        found = {}
+        for name in tables:
+            x = getattr(c.values.system, name).ravel()
+            found[name] = x.copy(), np.isin(x, PLAIN)
+        for name, k in c.made.known:
+            if name in found:
+                found[name][1][k] = True
+        return cls(c.made, found)
 
+    def serves(self, batch: Batch) -> np.ndarray:
+        """Which of the runs it is for, (n,)."""
+        out = np.ones(len(batch.runs), bool)
+        for name, x in batch.base.items():
+            changed = [p for p in batch.parts if p.name == name]
+            alike = np.delete(np.arange(x.size), np.concatenate([p.at for p in changed]) if changed else [])
+            out &= self._agree(name, alike, x.ravel()[alike])
+            for p in changed:
+                out &= self._agree(name, p.at, p.x)
+        return out
 
-def _plain(S: System, names: Sequence[str]) -> tuple[np.ndarray, ...]:
-    return tuple(getattr(S, name) == x for name in names for x in PLAIN)
-
-
-def _alike(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> bool:
-    return all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
+    def _agree(self, name: str, at: np.ndarray, x: np.ndarray) -> np.ndarray:
+        if name not in self.tables:
+            return np.True_
+        mine, same = (a[at] for a in self.tables[name])
+        return np.where(same, x == mine, ~np.isin(x, PLAIN)).all(axis=-1)

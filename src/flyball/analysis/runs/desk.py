@@ -29,7 +29,7 @@ from ..motion.stiff import EXPLICIT, Pace
 from ..simulate import clock_for
 from ..simulate import width as wide
 from .codes import Code
-from .spread import TABLES, Place, system_of
+from .spread import Place, system_of
 from .track import Batch, Track
 
 if TYPE_CHECKING:
@@ -77,10 +77,9 @@ class Desk:
 
     def __init__(self, of: Shared) -> None:
         self.of = of
-        self._values = x = replace(of.values, system=system_of(of.values))
-        self._own = {name: getattr(x.system, name) for name in TABLES}
+        x = replace(of.values, system=system_of(of.values))
         self._filler = of.filling.desk(Compiled(x, of.begun.assembly.compiled.z.copy()))
-        self._loops: dict[int, Loop] = {}
+        self._loops: dict[bool, Loop] = {}  # by the tables, and by made code
         self._most = 1  # runs in a call
         self.call = Track.run
 
@@ -88,32 +87,21 @@ class Desk:
         """The runs at some points, as they are done; those that are left out are for themselves."""
         for batch in self._filler.batches(points):
             for code, some in self._by_code(batch):
-                if id(code) not in self._loops:
-                    x = replace(self._values, system=system_of(self.of.values))
-                    self._loops[id(code)] = Loop(self.of, x, code)
-                yield from self._calls(self._loops[id(code)], some, stopped)
+                if (made := code is not None) not in self._loops:
+                    x = replace(self.of.values, system=system_of(self.of.values))
+                    self._loops[made] = Loop(self.of, x, code)
+                yield from self._calls(self._loops[made], some, stopped)
 
     def _by_code(self, batch: Batch) -> Iterator[tuple[Code | None, Batch]]:
-        """The runs of each made code; those for which there is none are left out."""
-        codes = self.of.codes
-        if codes is None:
+        """The runs that made code serves, and those that go through the tables."""
+        code = self.of.code
+        if code is None:
             yield None, batch
             return
-        varied = {(p.name, int(k)) for p in batch.parts for k in p.at}
-        known: dict[bytes, Code | None] = {}
-        runs: dict[int, tuple[Code, list[int]]] = {}
-        for k, pattern in enumerate(batch.pattern):
-            if pattern in known:
-                code = known[pattern]
-            else:
-                batch.write(k, self._own)
-                code = codes.of(self._values, pattern)
-                if pattern and code is not None and not varied.intersection((name, at) for name, at, _ in code.fixed):
-                    known[pattern] = code
-            if code is not None:
-                runs.setdefault(id(code), (code, []))[1].append(k)
-        for code, some in runs.values():
-            yield code, batch.some(some)
+        serves = code.serves(batch)
+        for which, some in ((code, np.flatnonzero(serves)), (None, np.flatnonzero(~serves))):
+            if len(some):
+                yield which, batch.some(some.tolist())
 
     def _calls(self, loop: Loop, batch: Batch, stopped: Callable[[], bool]) -> Iterator[Done]:
         own, n, at = loop.track.begin(batch), len(batch.runs), 0

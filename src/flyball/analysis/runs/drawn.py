@@ -83,7 +83,7 @@ class Desk:
         parts.append(Part("y", np.arange(start.shape[1]), start))
         parts += self._sizes(tables, lanes)
         places: list[Place] = [(some.group, k) for k in lanes.tolist()]
-        return Batch(runs, base, parts, t.length[lanes], places, [t.pattern_of(k) for k in lanes.tolist()])
+        return Batch(runs, base, parts, t.length[lanes], places)
 
     def _followed(self, z: list[np.ndarray]) -> np.ndarray:
         """Turns and places that the motion takes over from absolute coordinates."""

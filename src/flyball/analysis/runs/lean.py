@@ -23,10 +23,13 @@ from ...tables.system import SEMIDEFINITE
 from ...tables.values import Values
 from ..motion.choice import AUTO, SimulateOptions, chosen
 from ..motion.driven import leaves_no_freedom
+from ..motion.engines import AUTO as ANY
+from ..motion.engines import worth_making
 from ..motion.events.legs import laws_of_time
 from ..motion.start import Start, begin, start_time
+from ..simulate import simulate
 from ..simulate import width as wide
-from .codes import Codes
+from .codes import Code
 from .compute import Answers, Question, alone
 from .desk import Desk, Done
 from .drawn import Drawn, rests_as_drawn
@@ -45,7 +48,7 @@ class Shared:
     options: SimulateOptions
     begun: Start
     filling: Filling | Drawn
-    codes: Codes | None  # made for these mechanisms; none: all run through the tables
+    code: Code | None  # made for the first of the mechanisms; none: all run through the tables
     asked: str  # the method
 
     @cached_property
@@ -64,20 +67,20 @@ class Shared:
         return self.begun.assembly.compiled.values
 
 
-def shared(question: Question, point: np.ndarray, points: np.ndarray) -> Shared | None:
-    """What runs have in common, from the run at one point; None if there is more to do for each, or that one fails.
+def shared(question: Question, point: np.ndarray, points: np.ndarray, runs: int) -> Shared | None:
+    """What so many runs have in common, from the one at a point; None if there is more to do for each, or it fails.
 
     ``points`` are those that will be asked for, as far as they are known.
     """
     try:
-        return _shared(question, point, points)
+        return _shared(question, point, points, runs)
     except FlyballError:  # by itself each says why it fails
         return None
 
 
-def _shared(question: Question, point: np.ndarray, points: np.ndarray) -> Shared | None:
+def _shared(question: Question, point: np.ndarray, points: np.ndarray, runs: int) -> Shared | None:
     model, o = question.model, question.options
-    if not isinstance(o.specialize, bool) or o.start is not None or _watched(model):
+    if o.start is not None or _watched(model):
         return None
     if any(r.how == FUNCTION for r in question.asked):
         return None
@@ -94,11 +97,12 @@ def _shared(question: Question, point: np.ndarray, points: np.ndarray) -> Shared
     asked, o = o, o.sized(begun.base.compiled.values.length)
     if (filling := _filling(question, asked, begun, points)) is None:
         return None
-    codes = Codes(c, filling.tables) if o.specialize else None
-    if codes is not None and not codes.known:
-        return None
+    if wanted := o.specialize == ANY:
+        first = simulate(model, question.at(point))
+        wanted = worth_making(first.values, first.health.evaluations, runs)
+    code = Code.of(c.again(), filling.tables) if wanted or o.specialize is True else None
     mixed = question.options.method == AUTO and o.step is None
-    return Shared(question, o, begun, filling, codes, AUTO if mixed else str(o.method))
+    return Shared(question, o, begun, filling, code, AUTO if mixed else str(o.method))
 
 
 def _filling(question: Question, o: SimulateOptions, begun: Start, points: np.ndarray) -> Filling | Drawn | None:

@@ -7,6 +7,8 @@ import pickle
 import threading
 import warnings
 from collections import OrderedDict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -55,11 +57,18 @@ def elsewhere(key: str, data: bytes, points: np.ndarray) -> Answers:
         run = _HELD.get(key)
     if run is None:
         question, runs = pickle.loads(data)
-        run = runner(replace(question, model=question.model.snapshot()), points, runs)
+        with _quiet():
+            run = runner(replace(question, model=question.model.snapshot()), points, runs)
         with _LOCK:
             _HELD[key] = run
             while len(_HELD) > HELD:
                 _HELD.popitem(last=False)
+    with _quiet():
+        return timed(run, points, lambda: False)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StartWarning)  # remarks say it
-        return timed(run, points, lambda: False)
+        yield

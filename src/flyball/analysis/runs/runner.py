@@ -27,8 +27,9 @@ def timed(run: Runner, points: np.ndarray, stopped: Callable[[], bool]) -> Answe
 
 def runner(question: Question, points: np.ndarray, runs: int = 0) -> Runner:
     """What computes the runs of a question, of which some points are given: all, or the first of so many ``runs``."""
-    if max(len(points), runs) > FEW and isinstance(question.single, Motion):
+    runs = max(len(points), runs)
+    if runs > FEW and isinstance(question.single, Motion):
         for k in (0, len(points) // 2, len(points) - 1):  # one may fail
-            if (found := shared(question, points[k], points)) is not None:
+            if (found := shared(question, points[k], points, runs)) is not None:
                 return Lean(found).compute
     return partial(compute, question)

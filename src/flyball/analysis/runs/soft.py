@@ -139,5 +139,4 @@ class Desk:
         return self._batch(own, [], [k], [(None, 0)])
 
     def _batch(self, base: dict[str, np.ndarray], parts: list[Part], runs: list[int], places: list[Place]) -> Batch:
-        pattern = [group.tables[0].pattern_of(k) if group is not None else b"" for group, k in places]
-        return Batch(np.array(runs), base, parts, np.full(len(runs), self._values.length), places, pattern)
+        return Batch(np.array(runs), base, parts, np.full(len(runs), self._values.length), places)

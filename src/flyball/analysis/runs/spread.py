@@ -15,7 +15,6 @@ import numpy as np
 from ...equations.scratch import on_ground
 from ...errors import FlyballError
 from ...math.lanes import Diverged, Lanes, lanes_of
-from ...special.recorder import PLAIN
 from ...tables.numbers import numbers
 from ...tables.specs import Structure
 from ...tables.system import System
@@ -71,22 +70,14 @@ class Tables:
     z: Column
     length: np.ndarray
     values: Values  # with lanes
-    pattern: np.ndarray  # (n, k): which of the numbers that differ are 0, 1 or -1
-    base: bytes  # the same of those of the first run, and which differ
 
     @classmethod
     def of(cls, x: Values, n: int) -> Tables:
         """From values with lanes."""
         length = x.length.x if isinstance(x.length, Lanes) else np.full(n, x.length)
         system = {name: Column.of(getattr(x.system, name), n) for name in TABLES}
-        differ = np.concatenate([c.x for c in system.values()], axis=1)
-        base = b"".join(part.tobytes() for c in system.values() for part in (_plain(c.base), c.at))
         state = Column.of(x.q, n), Column.of(x.v, n), Column.of(places(x), n)
-        return cls(system, Column.of(on_ground(x.system), n), *state, length, x, _plain(differ), base)
-
-    def pattern_of(self, k: int) -> bytes:
-        """What two runs have in common that have the same numbers 0, 1 and -1."""
-        return self.pattern[k].tobytes() + self.base
+        return cls(system, Column.of(on_ground(x.system), n), *state, length, x)
 
     def is_of(self, x: Values, k: int) -> bool:
         """Whether run k has the tables of ``x`` to the bit."""
@@ -214,10 +205,6 @@ class Spread:
         if not all(t.is_of(values(s, one), 0) for s, t in zip(self.structures, group.tables, strict=True)):
             raise TypeError("some operation is another one for floats")
         return group
-
-
-def _plain(x: np.ndarray) -> np.ndarray:
-    return sum(((x == value) * np.int8(k + 1) for k, value in enumerate(PLAIN)), np.zeros(x.shape, np.int8))
 
 
 def system_of(x: Values) -> System:

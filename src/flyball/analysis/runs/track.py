@@ -67,8 +67,6 @@ class Batch:
         Of the mechanism [m].
     places : list
         In which group each is.
-    pattern : list of bytes
-        Alike in runs whose tables are plain alike (`spread.Tables.pattern_of`); empty: not known.
     """
 
     runs: np.ndarray
@@ -76,22 +74,11 @@ class Batch:
     parts: Sequence[Part]
     length: np.ndarray
     places: list[Place]
-    pattern: list[bytes]
 
     def some(self, k: Sequence[int]) -> Batch:
         """Some of them."""
         parts = [replace(p, x=p.x[k]) for p in self.parts]
-        places, pattern = [self.places[i] for i in k], [self.pattern[i] for i in k]
-        return Batch(self.runs[k], self.base, parts, self.length[k], places, pattern)
-
-    def write(self, k: int, arrays: Mapping[str, np.ndarray]) -> None:
-        """What run k has into those arrays that are given."""
-        for name, x in self.base.items():
-            if name in arrays:
-                arrays[name].ravel()[: x.size] = x.ravel()
-        for part in self.parts:
-            if part.name in arrays:
-                arrays[part.name].ravel()[part.at] = part.x[k]
+        return Batch(self.runs[k], self.base, parts, self.length[k], [self.places[i] for i in k])
 
 
 class Track:
