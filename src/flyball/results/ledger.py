@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -32,9 +32,6 @@ class Ledger:
     works : tuple of ndarray (n,)
     foreign : ndarray (n,)
         What impacts, contacts and events exchanged that the balance does not know of: it holds where this is constant.
-    runs : int
-        Of how many motions with the same output times, one after the other, the result is; the arrays are then
-        (runs, n). 0: of one.
     """
 
     result: Result
@@ -44,43 +41,22 @@ class Ledger:
     stored: tuple[np.ndarray, np.ndarray]
     works: tuple[np.ndarray, ...]
     foreign: np.ndarray
-    runs: int = 0
 
     @property
-    def mass(self) -> list[Any]:
-        """Of each of the bodies [kg]; where runs differ (runs,)."""
-        every = self.result.values.system.body_x[self.bodies, MASS].tolist()
-        return [self._rows(m)[..., 0] if isinstance(m, np.ndarray) else m for m in every]
+    def mass(self) -> np.ndarray:
+        """Of each of the bodies [kg]."""
+        return self.result.values.system.body_x[self.bodies, MASS]
 
     @property
-    def weight(self) -> Any:
+    def weight(self) -> float:
         """Of all of the bodies [N]."""
-        g = [
-            self._rows(a)[..., 0] if isinstance(a, np.ndarray) else a
-            for a in self.result.values.system.glob[:3].tolist()
-        ]
-        return sum(self.mass) * sum(a * a for a in g) ** 0.5
+        return float(self.mass.sum() * np.linalg.norm(self.result.values.system.glob[:3]))
 
     @property
-    def went(self) -> list[Any]:
+    def went(self) -> np.ndarray:
         """Square of how far each of the bodies came about [m^2]."""
         r = self.result.records
-        return [sum(np.ptp(self._rows(p), axis=-1) ** 2 for p in r.body(b)[0]) for b in self.bodies.tolist()]
-
-    def of_runs(self, runs: int) -> Ledger:
-        """That of so many motions, one after the other."""
-        x = replace(self, runs=runs)
-        balance = x._rows(self.balance)
-        return replace(
-            x,
-            kinetic=x._rows(self.kinetic),
-            balance=balance - balance[:, :1],
-            stored=(x._rows(self.stored[0]), x._rows(self.stored[1])),
-            works=tuple(map(x._rows, self.works)),
-        )
-
-    def _rows(self, a: np.ndarray) -> np.ndarray:
-        return a.reshape(self.runs, -1) if self.runs else a
+        return np.array([sum(np.ptp(p) ** 2 for p in r.body(b)[0]) for b in self.bodies.tolist()])
 
     def known(self, begin: int, end: int) -> bool:
         """Whether the balance holds between two rows, the last not counted."""
@@ -97,15 +73,15 @@ class Ledger:
         others = f" and the {more} bodies" if more > 1 else " and the body"
         return f" of {name!r}" + (f"{others} connected with it" if more else "")
 
-    def moved(self, begin: int, end: int) -> Any:
-        """How much energy was shifted about between two rows, the last not counted [J]; (runs,) of several.
+    def moved(self, begin: int, end: int) -> float:
+        """How much energy was shifted about between two rows, the last not counted [J].
 
         The largest kinetic energy, and the ranges of gravity's and the springs' energies and of every work.
         """
         if end <= begin:
             return 0.0
-        ranges = sum(np.ptp(x[..., begin:end], axis=-1) for x in (*self.stored, *self.works))
-        return self.kinetic[..., begin:end].max(axis=-1) + ranges
+        ranges = sum(np.ptp(x[begin:end]) for x in (*self.stored, *self.works))
+        return float(self.kinetic[begin:end].max() + ranges)
 
 
 def whole(result: Result) -> Ledger:

@@ -12,7 +12,6 @@ import numpy as np
 from ..equations.records import at_rest, carried, load
 from ..equations.tree import column, motion, pose
 from ..equations.velocities import turned_angles
-from ..math.lanes import over_time
 from ..math.products import product
 from ..math.vec import add, cross, load3, load9, mm, put3, scale, sub
 from ..model.body import Frame
@@ -38,8 +37,8 @@ class Records:
         self.n = len(q)
         S = x.system
         nb, nv = len(S.body_i), v.shape[1]
-        numbers = [x for x in (S.body_x, S.frame_x, S.const) if x.dtype != object]  # objects: arrays over time
-        self.dtype = np.result_type(q, v, *([] if vdot is None else [vdot]), *numbers)  # complex for derivatives
+        own = [] if vdot is None else [vdot]
+        self.dtype = np.result_type(q, v, *own, S.body_x, S.frame_x, S.const)  # complex for derivatives
         self.W = SimpleNamespace(BK=self.zeros(nb, 24), X=self.zeros(nv, 6), O=self.zeros(nb, 3))
         for b in range(nb):
             pose(S, self.W, b, q.T)
@@ -99,7 +98,6 @@ class Records:
 
     def carried(self, b: int, offset: tuple, turn: tuple) -> Record:
         """Record of a point and axes carried by body b (-1: ground)."""
-        offset, turn = tuple(map(over_time, offset)), tuple(map(over_time, turn))
         if b >= 0:
             return carried(self.body(b), offset, turn)
         zero = self.zeros()

@@ -16,7 +16,6 @@ import numpy as np
 
 from ..constraints.registry import KINDS
 from ..errors import ModelError
-from ..math.lanes import has_lanes, over_lanes
 from ..math.scalar import real_parts, sqrt
 from ..model.body import GROUND
 from ..model.coupling import Coupling
@@ -138,8 +137,7 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
         t["switch_i"], switch_x, t["guard_i"], t["control_i"],
          t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl, np.zeros(FLAT, np.int64),
     )  # fmt: skip
-    typical = length if has_lanes([length]) else float(length.real)
-    x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, typical, pose)
+    x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, float(length.real), pose)
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
     x.q[:], x.v[:] = positions(x, drawn, new=new), free_velocities(x, drawn, new=new)
     return x
@@ -176,7 +174,6 @@ def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamesp
     return length if length.real > 0.0 else 1.0
 
 
-@over_lanes
 def _reach(on_bodies: np.ndarray, on_ground: np.ndarray, centres: np.ndarray) -> Any:
     """The same by places alone, (..., k, 3) each; 0 where they are all one."""
     places = np.concatenate([on_ground, centres], axis=-2)

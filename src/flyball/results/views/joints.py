@@ -8,7 +8,6 @@ import numpy as np
 
 from ...constraints.registry import KINDS
 from ...errors import ModelError
-from ...math.lanes import over_time
 from ...math.scalar import atan2, rounded
 from ...math.vec import dot, mtv, sub
 from ...model.body import GROUND
@@ -43,7 +42,7 @@ class JointView(View):
             par, hint = (1.0, *par[1:]), self._turns(what, i, j)
         value, f, tM, tF, second = KINDS[c.row.kind].row(par, F, M, hint, x.system.const)
         rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
-        offset = over_time(self.element.offset(x.numbers[self.element.name], what))
+        offset = self.element.offset(x.numbers[self.element.name], what)
         return c.sign * value + offset, c.sign * rate, c.sign * second
 
     def _turns(self, what: str, i: int, j: int) -> Any:

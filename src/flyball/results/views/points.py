@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ...math.lanes import over_time
 from ...math.scalar import atan2
 from ...model.body import Body, Frame
 from ...model.geometry import matrix_to_quaternion
@@ -74,7 +73,7 @@ class PointView(View):
         """Planar: orientation [rad], whole turns counted."""
         if not self._result.planar:
             raise AttributeError(self._unknown("angle"))
-        return self._result.records.angle(self._body) + over_time(atan2(self._turn[3], self._turn[0]))
+        return self._result.records.angle(self._body) + atan2(self._turn[3], self._turn[0])
 
     @property
     def angular_velocity(self) -> np.ndarray:
