@@ -131,19 +131,20 @@ def _off(x: Ledger) -> tuple[float, str] | tuple[()]:
     What moves together is as accurate as the energy of all of it, and what nothing connects with others as its own.
     """
     rows, t = len(x.result.t), x.result.t
-    for begin, end, lost, there, allowed in _excesses(x, rows):
+    if all(lost <= allowed for _, _, lost, _, allowed in _excesses(x, rows, np.zeros(rows))):
+        return ()  # and so by what stands in no row, which only allows for more
+    for begin, end, lost, there, allowed in _excesses(x, rows, _unseen(x)):
         if lost > allowed and x.known(begin, end):
             when = "" if end - begin == rows else f" between t = {t[begin]:.6g} and {t[end - 1]:.6g} s"
             return _told(x, when, lost, there, allowed)
     return ()
 
 
-def _excesses(x: Ledger, rows: int) -> Iterator[tuple[int, int, float, float, float]]:
-    """First row and last (not counted), what is lost there, moved and to be expected [J].
+def _excesses(x: Ledger, rows: int, unseen: np.ndarray) -> Iterator[tuple[int, int, float, float, float]]:
+    """First row and last (not counted), what is lost there, moved and to be expected [J]; ``unseen``: `_unseen`.
 
     Of all rows, then of the stretches where more may be lost than that.
     """
-    unseen = _unseen(x)
     part, moved, least = balanced(x.result), x.moved(0, rows) + float(unseen.max(initial=0.0)), _rest(x)
     yield 0, rows, float(np.abs(x.balance).max(initial=0.0)), moved, part * moved + least
     for begin, end in _suspects(x, rows, x.kinetic + unseen, (part, moved, least)):

@@ -35,7 +35,7 @@ def late(x: Ledger) -> str:
     for body, b in r.values.structure.place.items():
         if b < 0:
             continue
-        p, _, _, v, _, _ = r.records.body(b)
+        p, _, _, v, _, _ = r.motions.body(b)
         way = max(way, float(np.linalg.norm(np.ptp(p, axis=1))))
         off, name = max((off, name), (float((np.abs(lag) * np.linalg.norm(v, axis=0)).max()), body))
     if not off > LATE * way or r.health.freedoms != 1:

@@ -55,8 +55,8 @@ class Ledger:
     @property
     def went(self) -> np.ndarray:
         """Square of how far each of the bodies came about [m^2]."""
-        r = self.result.records
-        return np.array([sum(np.ptp(p) ** 2 for p in r.body(b)[0]) for b in self.bodies.tolist()])
+        r = self.result.motions
+        return sum(np.ptp(p, axis=1) ** 2 for p in r.bodies(self.bodies)[0])
 
     def known(self, begin: int, end: int) -> bool:
         """Whether the balance holds between two rows, the last not counted."""
@@ -88,7 +88,7 @@ def whole(result: Result) -> Ledger:
     """That of everything."""
     e = result.energy
     every = np.arange(len(result.values.system.body_i))
-    none = result.records.zeros()
+    none = result.motions.zeros()
     return Ledger(result, every, e.kinetic, e.balance, (e.gravity, e.elastic), tuple(e.work.values()), none)
 
 
@@ -103,7 +103,7 @@ def apart(result: Result) -> list[Ledger]:
     if many < 2 or result.bulk or not len(result.t):
         return []
     of = [np.flatnonzero(part == p) for p in range(many)]
-    elastic = [result.records.zeros() for _ in of]
+    elastic = [result.motions.zeros() for _ in of]
     works: list[list[np.ndarray]] = [[] for _ in of]
     for f in result.model.acting():
         at = _part_of(result, f, part)
@@ -116,7 +116,7 @@ def apart(result: Result) -> list[Ledger]:
     out, foreign = [], _exchanged(result)
     for p, bodies in enumerate(of):
         moving, weight = kinetic(result, bodies), gravity(result, bodies)
-        residue = moving + weight + elastic[p] - sum(works[p], result.records.zeros())
+        residue = moving + weight + elastic[p] - sum(works[p], result.motions.zeros())
         out.append(Ledger(result, bodies, moving, residue - residue[0], (weight, elastic[p]), tuple(works[p]), foreign))
     return out
 
@@ -167,4 +167,4 @@ def _part_of(result: Result, e: Any, part: np.ndarray) -> int:
 def _exchanged(result: Result) -> np.ndarray:
     """What impacts, contacts and events took or gave since the start, (n,) [J]."""
     e = result.energy
-    return sum((np.abs(e.exchanged(k)) for k in (*EXCHANGED, GIVEN)), result.records.zeros())
+    return sum((np.abs(e.exchanged(k)) for k in (*EXCHANGED, GIVEN)), result.motions.zeros())

@@ -51,6 +51,7 @@ class Values:
     length: float  # a typical length of the mechanism [m]
     poses: Poses  # where frames are when it is drawn
     kept: Kept = field(default_factory=Kept, init=False)  # where motions of it start; a changed copy has its own
+    alike: Values | None = field(default=None, init=False, repr=False)  # see `unforced`
 
     @property
     def numbers(self) -> Mapping[str, SimpleNamespace]:
@@ -68,10 +69,21 @@ class Values:
         return self.given.env
 
     @property
+    def unforced(self) -> Values:
+        """Values from which these differ in numbers of forces and controllers alone; themselves, if none are known.
+
+        What depends on bodies, joints and the drawn state is worked out once for both.
+        """
+        return self if self.alike is None else self.alike
+
+    @property
     def told(self) -> dict[str, float]:
         """Values of the parameters that it was made with."""
         names = list(self.structure.model.parameters)
         return dict(zip(names, self.system.const[: len(names)].real.tolist(), strict=True))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"alike": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """In another process code has other addresses."""
@@ -107,9 +119,30 @@ def _filled(s: Structure, given: Numbers, holds: Mapping[str, Any]) -> Values:
     if holds:
         return _refilled(s, given, holds, Afresh())
     first = s.kept.known("filled first")
-    x = _refilled(s, given, holds, Afresh.since(first, given, s.model))
+    new = Afresh.since(first, given, s.model)
+    x = (_forced(s, given, new) if new.only_acts else None) or _refilled(s, given, holds, new)
     if first is None and given.dtype is float:
         s.kept.get("filled first", None, 1, lambda: x)
+    return x
+
+
+def _forced(s: Structure, given: Numbers, new: Afresh) -> Values | None:
+    """The values where forces and controllers alone have other numbers; None if bodies or frames are moved by these."""
+    base, pose = new.base, Poses(s, given)
+    assert base is not None
+    S, dtype = base.system, base.system.body_x.dtype
+    frame_x = _frame_x(s, pose, new.table("frame_x", (len(s.frames), 12), dtype), new)
+    const, curve_at = _constants(s, given.of, given.env, dtype)
+    term_x = _term_x(s, pose, {}, curve_at, new.table("term_x", (len(s.terms), 8), dtype), new)
+    gravity = np.array(s.model.gravity_vector(given.env), dtype)
+    same = (frame_x, S.frame_x), (term_x, S.term_x), (gravity, S.glob[: len(gravity)])
+    if any(a.tobytes() != b.tobytes() for a, b in same):
+        return None
+    force_x = _force_x(s, pose, new.table("force_x", (len(s.forces), 16), dtype), new)
+    switch_x = new.table("switch_x", (len(s.switches), 8), dtype)
+    switch_x = switches.numbers(s, given.of, switch_x, new.asks, pose.apart)
+    x = Values(s, S._replace(force_x=force_x, const=const, switch_x=switch_x), base.q, base.v, given, base.length, pose)
+    x.alike = base
     return x
 
 
