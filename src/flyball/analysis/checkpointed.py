@@ -23,7 +23,6 @@ from .checkpoints.heeded import heeded
 from .checkpoints.keeper import Keeper
 from .motion.choice import AUTO as ANY
 from .motion.choice import SimulateOptions, Way, chosen, instead_of, unresolved
-from .motion.engines import AUTO
 from .motion.impulse.ending import INTERRUPTED
 from .motion.options import output_times
 from .motion.part import Part
@@ -145,8 +144,7 @@ class _Motion:
 
         changed: Mapping[str, Any] = {"progress": tell}
         if before is not None:
-            made = o.specialize if o.specialize != AUTO else bool(before.carried.get("made"))
-            changed = {**changed, "start": before, "t_start": None, "specialize": made}
+            changed = {**changed, "start": before, "t_start": None}
             times = times[times >= t] if before.carried.get("open") else times[times > t]
         with heeded(part):
             return told(self.model, o.known(**changed), (t, last, times), why, self.auto, part), part

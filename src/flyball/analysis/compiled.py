@@ -233,7 +233,7 @@ class Compiled:
     def mass_entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows, columns and entries of the mass matrix of absolute coordinates."""
         x, table = self.values, self.values.system.bodies
-        return x.kept.get("mass", None, 1, lambda: self._entries(table.inertia, table.mass))
+        return x.unforced.kept.get("mass", None, 1, lambda: self._entries(table.inertia, table.mass))
 
     def inverse_mass_root(self, movable: np.ndarray, dense: bool = False):
         """R, sparse if not told, with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.

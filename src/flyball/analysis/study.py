@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -24,9 +24,7 @@ from ..results.study import WAITING, Study
 from ..results.study_file import save_study
 from ..results.study_reading import fingerprint, stored
 from ..tables.numbers import unused
-from .motion.choice import IMPULSE, SimulateOptions
-from .motion.engines import AUTO, worth_making
-from .motion.implicit.suited import IMPLICIT
+from .motion.choice import SimulateOptions
 from .motion.impulse.settings import Stepping
 from .motion.options import output_times
 from .motion.start import start_time
@@ -38,7 +36,6 @@ from .runs.instants import Answers, Instant, Rest, Swings
 from .runs.pool import computed, cores
 from .runs.reading import ends_only, readings
 from .runs.single import Kinematics, Motion, Own, Single
-from .simulate import simulate
 
 EVERY = 20.0  # seconds between two states of the file
 USUAL = 501  # output times, where motions are looked at between their ends
@@ -46,7 +43,6 @@ JUDGED = 17  # the same, where they are not: their energy balance is
 ANALYSES = {x.title: x for x in (Motion(), Kinematics(), Instant(), Rest(), Swings(), Answers())}
 EVERY_STUDY = ("vary", "of", "analysis", "parameters", "design", "samples", "seed", "file", "executor", "threads",
                "progress")  # fmt: skip
-TRIED = 5  # runs that may fail before it is given up to choose an engine by one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,7 +149,7 @@ def study(model: Model, o: StudyOptions) -> Study:
         found.start, found.options["method"] = o.start, o.method
     with shown(o.progress, "studying") as tell, warnings.catch_warnings():
         warnings.simplefilter("ignore", StartWarning)  # remarks of the runs say it
-        _run(_decided(question, found) if found.analysis == "motion" else question, found, o, tell)
+        _run(question, found, o, tell)
     found.seconds += time.perf_counter() - started
     if o.file is not None:
         save_study(found, o.file)
@@ -197,32 +193,6 @@ def _options(o: Any) -> dict[str, Any]:
     """Options of the analysis, but those that the study has by itself."""
     told = {f.name: getattr(o, f.name) for f in fields(o) if f.name not in ("outputs", "times", "progress", "start")}
     return told | {"parameters": dict(o.parameters or {})}
-
-
-def _decided(question: Question, found: Study) -> Question:
-    """With the engine that all runs have: one choice, so that none depends on what was computed before it.
-
-    Contact and implicit methods are for the tables in any case; to ask for these may be to ask for an integrator.
-    """
-    model, o = question.model, question.options
-    others = o.method in (IMPULSE, *IMPLICIT) or isinstance(o.method, Stepping)
-    if o.specialize != AUTO or others or model.contacts or model.bulk:
-        return question
-    if found.options["specialize"] == AUTO:
-        found.options["specialize"] = o.stabilization != "partitioning" and _made_code_pays(question, found)
-    return replace(question, options=replace(o, specialize=found.options["specialize"]))
-
-
-def _made_code_pays(question: Question, found: Study) -> bool:
-    """Whether code for this mechanism pays, by what the first run that does not fail computes."""
-    todo = np.flatnonzero(found.status == WAITING)
-    for k in todo[:TRIED]:
-        try:
-            run = simulate(question.model, replace(question.at(found.points[k]), specialize=False))
-        except Exception:  # its reason is told when its turn comes
-            continue
-        return worth_making(run.values, run.health.evaluations, len(todo))
-    return False
 
 
 def _run(question: Question, found: Study, o: StudyOptions, tell: Any) -> None:

@@ -172,8 +172,8 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
     """Solve for x and lam with the factor in W; ``f`` (taken as zero unless ``loaded``) and ``gamma`` are kept.
 
     Prescribed velocities have the accelerations in `W.velocities.prescribed` if loaded, else they stay. Where M is
-    semidefinite, M + E is factored in its place and the refinement takes E out again. Returns the residual left, relative to the size
-    of its terms.
+    semidefinite, M + E is factored in its place and the refinement takes E out again. Returns the residual left,
+    relative to the size of its terms.
     """
     W.counts.solves[0] += 1
     if W.made[STEP] != 0:

@@ -1,18 +1,18 @@
-"""Kinematic records over time: the loops of the house, run in plain Python on arrays of all output times at once."""
+"""Kinematic records over time: of floats compiled, of complex numbers by the same formulas on arrays in Python."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from ..equations.over_time import AtOnce, OverTime, kinematics_over_time
 from ..equations.records import at_rest, carried, load
+from ..equations.scratch import tables
 from ..equations.tree import column, motion, pose
 from ..equations.velocities import turned_angles
-from ..math.lanes import over_time
 from ..math.products import product
 from ..math.vec import add, cross, load3, load9, mm, put3, scale, sub
 from ..model.body import Frame
@@ -37,14 +37,17 @@ class Records:
         self.n = len(q)
         S = x.system
         nb, nv = len(S.tree.parent), v.shape[1]
-        numbers = [
-            x for x in (S.bodies.mass, S.frames.position, S.const) if x.dtype != object
-        ]  # objects: arrays over time
-        self.dtype = np.result_type(q, v, *([] if vdot is None else [vdot]), *numbers)  # complex for derivatives
-        self.W = SimpleNamespace(BK=self.zeros(nb, 24), X=self.zeros(nv, 6), O=self.zeros(nb, 3))
-        for b in range(nb):
-            pose(S, self.W, b, q.T)
-            motion(S, self.W, b, v.T)
+        own = [] if vdot is None else [vdot]
+        self.dtype = np.result_type(q, v, *own, S.const)  # complex for derivatives
+        self.W = OverTime(self.zeros(nb, 24), self.zeros(nv, 6), self.zeros(nb, 3))
+        if self.dtype == float:
+            one = AtOnce(np.zeros((nb, 24)), np.zeros((nv, 6)), np.zeros((nb, 3)))
+            q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)
+            kinematics_over_time(tables(x.structure, S), one, q, v, self.W)
+        else:
+            for b in range(nb):
+                pose(S, self.W, b, q.T)
+                motion(S, self.W, b, v.T)
         if vdot is not None:
             self._accelerate(vdot.T)
         self._frames: dict[int, Record] = {}
@@ -85,6 +88,10 @@ class Records:
         """Record of body b's centre of mass."""
         return load(self.W.BK, b)
 
+    def bodies(self, b: Sequence[int]) -> Record:
+        """Records of several bodies' centres of mass: arrays (bodies, n)."""
+        return load(self.W.BK[b].swapaxes(0, 1)[None], 0)
+
     def frame(self, k: int) -> Record:
         """Record of frame k."""
         if k not in self._frames:
@@ -100,7 +107,6 @@ class Records:
 
     def carried(self, b: int, offset: tuple, turn: tuple) -> Record:
         """Record of a point and axes carried by body b (-1: ground)."""
-        offset, turn = tuple(map(over_time, offset)), tuple(map(over_time, turn))
         if b >= 0:
             return carried(self.body(b), offset, turn)
         zero = self.zeros()

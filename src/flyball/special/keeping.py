@@ -31,10 +31,10 @@ from .trace import Entry, Refused, traced
 MARK = b"flyball: code made for one mechanism\n"
 IN_MEMORY, ON_DISK = 64, 200
 """How many are kept."""
-TOLD = ("scratch", "constants", "operations", "laws", "seconds")
+TOLD = ("scratch", "constants", "operations", "laws", "seconds", "known")
 """What a file says of its code."""
 _LOCK = threading.RLock()
-_found: OrderedDict[tuple[str, str], tuple[list[Entry], Made]] = OrderedDict()
+_found: OrderedDict[tuple[str, str], Made] = OrderedDict()
 _refused: dict[str, str] = {}
 _nowhere: dict[str, int] = {}  # of what was not on disk, when the folder had last been changed
 
@@ -100,10 +100,10 @@ def _made(p: Plan, x: Values) -> Made:
         raise
     machine_code = assembled(text.text)
     seconds = time.process_time() - begun
-    made = Made(Loaded(machine_code, text.laws), text.scratch, text.constants, text.operations, text.laws, seconds)
-    _remember(p, x.system, text.known, made)
-    told = {k: getattr(made, k) for k in TOLD}
-    _write(p, digest(x.system, text.known), {**told, "known": text.known}, machine_code)
+    told = (text.scratch, text.constants, text.operations, text.laws, seconds, text.known)
+    made = Made(Loaded(machine_code, text.laws), *told)
+    _remember(p, x.system, made)
+    _write(p, digest(x.system, made.known), dict(zip(TOLD, told, strict=True)), machine_code)
     return made
 
 
@@ -114,19 +114,14 @@ def digest(S: System, entries: list[Entry]) -> str:
 
 
 def _in_memory(p: Plan, S: System) -> Made | None:
-    for key, (entries, made) in list(_found.items()):
-        if key[0] == p.key and key[1] == digest(S, entries):
+    for key, made in list(_found.items()):
+        if key[0] == p.key and key[1] == digest(S, made.known):
             return made
     return None
 
 
-def entries(made: Made) -> list[Entry] | None:
-    """Entries of the tables whose very values are in some code; None if it is forgotten."""
-    return next((known for known, its in list(_found.values()) if its is made), None)
-
-
-def _remember(p: Plan, S: System, entries: list[Entry], made: Made) -> None:
-    _found[p.key, digest(S, entries)] = entries, made
+def _remember(p: Plan, S: System, made: Made) -> None:
+    _found[p.key, digest(S, made.known)] = made
     while len(_found) > IN_MEMORY:
         _found.popitem(last=False)
 
@@ -143,23 +138,23 @@ def _files(p: Plan) -> list[Path]:
     return sorted(folder.glob(f"made-{p.key}-*.bin")) if folder is not None else []
 
 
-def _fitting(p: Plan, S: System) -> Iterator[tuple[dict[str, Any], list[Entry], bytes]]:
+def _fitting(p: Plan, S: System) -> Iterator[tuple[dict[str, Any], bytes]]:
     """What files say that may serve a mechanism, and their code."""
     for path in _files(p):
         if (read := _read(path)) is not None:
             told, machine_code = read
-            entries = [(str(name), int(k)) for name, k in told["known"]]
-            if path.stem.rpartition("-")[2] == digest(S, entries):
+            told["known"] = [(str(name), int(k)) for name, k in told["known"]]
+            if path.stem.rpartition("-")[2] == digest(S, told["known"]):
                 with contextlib.suppress(OSError):
                     path.touch()  # what is used stays: the oldest are pushed out
-                yield told, entries, machine_code
+                yield told, machine_code
 
 
 def _on_disk(p: Plan, S: System) -> Made | None:
-    for told, entries, machine_code in _fitting(p, S):
+    for told, machine_code in _fitting(p, S):
         with contextlib.suppress(RuntimeError):  # LLVM's, of wrong code
             made = Made(Loaded(machine_code, told["laws"]), *(told[k] for k in TOLD))
-            _remember(p, S, entries, made)
+            _remember(p, S, made)
             return made
     return None
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..tables.system import FLAT, SAMPLED, SCRATCH, System
 from .linked import ENTRIES
 from .machine import Loaded, tables_of
+from .trace import Entry
 
 _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_void_p] * 2, ctypes.c_double, *[ctypes.c_void_p] * 4)
 
@@ -30,6 +31,8 @@ class Made:
         Procedures of the laws that may do much within a step, in the order of `within.law_at`; "" for the others.
     seconds : float
         What tracing and compiling took [s of the processor].
+    known : list of Entry
+        Entries of the tables whose very values are in the code.
     """
 
     loaded: Loaded
@@ -38,6 +41,7 @@ class Made:
     operations: int
     laws: list[str]
     seconds: float
+    known: list[Entry]
 
     def system(self, S: System) -> System:
         """The tables with the addresses in them; the code lives as long as the array in which they stand."""
@@ -52,19 +56,7 @@ class Made:
             flat[SAMPLED] = first
             flat[first:] = [self.loaded.addresses[name] if name else 0 for name in self.laws]
         S = S._replace(flat=flat)
-        (address, tables, constants), _tables = self.reckoning(S)
-        _FUNCTION(address)(tables, None, 0.0, constants, None, None, None)
-        return S
-
-    def reckoning(self, S: System) -> tuple[list[int], np.ndarray]:
-        """What reckons the constants anew where other numbers stand in the tables of a `system`.
-
-        Returns
-        -------
-        list of int
-            Addresses: of the code, of the tables' addresses, of where the constants go (`equations.many.reckon`).
-        ndarray
-            The tables' addresses, to be kept as long as these are used.
-        """
         tables = tables_of(S)
-        return [self.loaded.addresses["CONSTANTS"], tables.ctypes.data, S.flat.ctypes.data + 8 * FLAT], tables
+        constants = flat.ctypes.data + 8 * FLAT
+        _FUNCTION(self.loaded.addresses["CONSTANTS"])(tables.ctypes.data, None, 0.0, constants, None, None, None)
+        return S

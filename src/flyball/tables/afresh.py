@@ -32,6 +32,7 @@ class Afresh:
 
     base: Values | None = None
     names: Collection[str] = frozenset()
+    only_acts: bool = False  # whether these are forces and controllers alone
 
     @classmethod
     def since(cls, base: Values | None, given: Numbers, model: Model) -> Afresh:
@@ -40,7 +41,8 @@ class Afresh:
             return cls()
         stand_on = model.kept.get("stand on", None, 1, lambda: _stand_on(model))
         other = given.changed | base.given.changed
-        return cls(base, other.union(*(stand_on.get(name, ()) for name in other)))
+        acting = model.kept.get("acting", None, 1, lambda: {e.name for e in (*model.forces, *model.controllers)})
+        return cls(base, other.union(*(stand_on.get(name, ()) for name in other)), other <= acting)
 
     def table(self, name: str, new: T, dtype: Any) -> T:
         """A table of `System` to be filled in: with what is known, or the ``new`` one."""

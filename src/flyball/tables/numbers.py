@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from ..math.lanes import has_lanes
 from ..math.products import product
 from ..math.vec import cross
 from ..model.body import GROUND, Body
@@ -64,8 +63,6 @@ def numbers(model: Model, parameters: Mapping[str, Any] | None = None) -> Number
     model = model.snapshot()
     env = _environment(model, parameters or {})
     read = tuple(_state_of(path) for path in files(model))
-    if has_lanes(env.values()):
-        return _found(model, env, (object(), read))
     if kind_of(env.values()) is object:
         return _all(model, env, object())
     key = bits(env), read
@@ -122,7 +119,7 @@ def _linked(model: Model, of: dict[str, SimpleNamespace]) -> dict[str, SimpleNam
 def _checked(e: Element, env: Mapping[str, Any]) -> SimpleNamespace:
     """The fields of an element in numbers, which make sense at these values of the parameters."""
     n = resolve(e, env)
-    if kind_of(env.values()) is float or has_lanes(env.values()):  # a complex step is none to be compared
+    if kind_of(env.values()) is float:  # a complex step is none to be compared
         e.check(n)
     return n
 

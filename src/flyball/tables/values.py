@@ -51,6 +51,7 @@ class Values:
     length: float  # a typical length of the mechanism [m]
     poses: Poses  # where frames are when it is drawn
     kept: Kept = field(default_factory=Kept, init=False)  # where motions of it start; a changed copy has its own
+    alike: Values | None = field(default=None, init=False, repr=False)  # see `unforced`
 
     @property
     def numbers(self) -> Mapping[str, SimpleNamespace]:
@@ -68,10 +69,21 @@ class Values:
         return self.given.env
 
     @property
+    def unforced(self) -> Values:
+        """Values from which these differ in numbers of forces and controllers alone; themselves, if none are known.
+
+        What depends on bodies, joints and the drawn state is worked out once for both.
+        """
+        return self if self.alike is None else self.alike
+
+    @property
     def told(self) -> dict[str, float]:
         """Values of the parameters that it was made with."""
         names = list(self.structure.model.parameters)
         return dict(zip(names, self.system.const[: len(names)].real.tolist(), strict=True))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"alike": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """In another process code has other addresses."""
@@ -107,9 +119,31 @@ def _filled(s: Structure, given: Numbers, holds: Mapping[str, Any]) -> Values:
     if holds:
         return _refilled(s, given, holds, Afresh())
     first = s.kept.known("filled first")
-    x = _refilled(s, given, holds, Afresh.since(first, given, s.model))
+    new = Afresh.since(first, given, s.model)
+    x = (_forced(s, given, new) if new.only_acts else None) or _refilled(s, given, holds, new)
     if first is None and given.dtype is float:
         s.kept.get("filled first", None, 1, lambda: x)
+    return x
+
+
+def _forced(s: Structure, given: Numbers, new: Afresh) -> Values | None:
+    """The values where forces and controllers alone have other numbers; None if bodies or frames are moved by these."""
+    base, pose = new.base, Poses(s, given)
+    assert base is not None
+    S, dtype = base.system, base.system.const.dtype
+    frames = _frames(s, pose, new.table("frames", S.frames, dtype), new)
+    const, curve_at = _constants(s, given.of, given.env, dtype)
+    terms = _term_parameters(s, pose, {}, curve_at, new.table("term_parameters", S.term_parameters, dtype), new)
+    gravity = np.array(s.model.gravity_vector(given.env), dtype)
+    same = *zip(frames, S.frames, strict=True), (terms, S.term_parameters), (gravity, S.gravity)
+    if any(a.tobytes() != b.tobytes() for a, b in same):
+        return None
+    forces = _force_parameters(s, pose, new.table("force_parameters", S.force_parameters, dtype), new)
+    of_switches = new.table("switch_numbers", S.switch_numbers, dtype)
+    switches.numbers(s, given.of, of_switches, new.asks, pose.apart)
+    S = S._replace(force_parameters=forces, const=const, switch_numbers=of_switches)
+    x = Values(s, S, base.q, base.v, given, base.length, pose)
+    x.alike = base
     return x
 
 
@@ -139,8 +173,7 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
         **{name: np.array([x], dtype) for name, x in one.items()}, units=np.array(_units(s, length), dtype),
         ldl=s.ldl, flat=np.zeros(FLAT, np.int64),
     )  # fmt: skip
-    typical = float(length.real)
-    x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, typical, pose)
+    x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, float(length.real), pose)
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
     x.q[:], x.v[:] = positions(x, drawn, new=new), free_velocities(x, drawn, new=new)
     return x

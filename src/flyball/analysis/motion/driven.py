@@ -159,16 +159,13 @@ def _halfway(a: Assembly, clock: ex.Clock, known: np.ndarray, pieces: np.ndarray
     real, count, _, y, K, accounts, seen = clock
     out = np.zeros((len(times) + 50, len(first)))
     c = a.compiled
-    for S in (c.system, c.values.system):  # the second where code made for it, if there is any, gets stuck
-        own = ex.Clock(real.copy(), count.copy(), times, y.copy(), K.copy(), accounts, seen)
-        own.y[0] = first[1 : 1 + clock.y.shape[1]]
-        own.real[[ex.T, ex.T_END]] = first[0], times[-1]
-        own.count[[ex.STARTED, ex.NEXT, ex.ACCEPTED, ex.REJECTED, ex.STATUS]] = 0
-        own.count[ex.QUOTA] = own.count[ex.LIMIT] = CALLS
-        rows = []
-        while own.count[ex.STATUS] == ex.RUNNING:
-            used = motion_kernel(S, c.work, tableau("rk45"), own, out, FOLLOW)
-            rows.append(out[:used].copy())
-        if own.count[ex.STATUS] == ex.DONE or c.made is None:
-            break
+    own = ex.Clock(real.copy(), count.copy(), times, y.copy(), K.copy(), accounts, seen)
+    own.y[0] = first[1 : 1 + clock.y.shape[1]]
+    own.real[[ex.T, ex.T_END]] = first[0], times[-1]
+    own.count[[ex.STARTED, ex.NEXT, ex.ACCEPTED, ex.REJECTED, ex.STATUS]] = 0
+    own.count[ex.QUOTA] = own.count[ex.LIMIT] = CALLS
+    rows = []
+    while own.count[ex.STATUS] == ex.RUNNING:
+        used = motion_kernel(c.system, c.work, tableau("rk45"), own, out, FOLLOW)
+        rows.append(out[:used].copy())
     return np.concatenate(rows)[1:]

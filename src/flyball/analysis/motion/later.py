@@ -50,11 +50,8 @@ def solved(start: Start, rows: np.ndarray, health: Health) -> tuple[np.ndarray, 
     s, W = c.structure, c.work
     ny = s.nq + s.nv + len(s.states)
     W.options.deferred[0] = 0.0
-    for tables in (c.system, c.values.system):  # what made code cannot do the engine's loops may
-        out = rows.copy()
-        if motion_kernel(tables, W, tableau("rk45"), standing(ny), out, COMPLETE) == 0:
-            break
-    else:
+    out = rows.copy()
+    if motion_kernel(c.system, W, tableau("rk45"), standing(ny), out, COMPLETE):
         health.remarks = (*health.remarks, unsolved(c, out))
     return np.ascontiguousarray(out[:, 1 + ny : 1 + ny + s.nv]), np.ascontiguousarray(out[:, 1 + ny + s.nv :])
 

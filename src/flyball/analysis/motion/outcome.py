@@ -79,7 +79,7 @@ def outcome(
     result.final = (t, clock.y[0].copy())
     result.owed, result.unsolved = owed, unsolved and partial(unsolved, health)
     result.wound, result.begun = start.wound, begun(start)
-    result.carried |= carried(here) | {"made": start.engine is not None and a.compiled.made is not None}
+    result.carried |= carried(here)
     if here.start.part.paused:
         result.carried |= _for_the_next(here, owed is not None)
     health.late = {

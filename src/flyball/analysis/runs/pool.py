@@ -7,12 +7,12 @@ import threading
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 
-from .compute import Answers, Question
+from .compute import Answers, Question, compute, prepared
 from .remote import elsewhere, packed
-from .runner import runner, timed
 
 LONG, FIRST, PARTS = 512, 8, 64  # most runs in a task; in the first ones; into how many these divide a study
 SECONDS = 0.5  # that a task should take
@@ -74,10 +74,10 @@ def _submitting(
             max(cores(), getattr(executor, "_max_workers", 0)),
         )
         return
-    stop, run = threading.Event(), runner(question, points)
+    stop, run = threading.Event(), partial(compute, prepared(question, points, len(points)))
     pool = ThreadPoolExecutor(threads, thread_name_prefix="flyball study")
     try:
-        yield lambda some: pool.submit(timed, run, some, stop.is_set), threads
+        yield lambda some: pool.submit(run, some, stop.is_set), threads
     finally:
         stop.set()  # runs that go on end, others do not begin
         pool.shutdown(cancel_futures=True)

@@ -7,13 +7,14 @@ import pickle
 import threading
 import warnings
 from collections import OrderedDict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 
 from ...errors import ModelError, StartWarning
-from .compute import Answers, Question
-from .runner import Runner, runner, timed
+from .compute import Answers, Question, compute, prepared
 
 HELD = 4  # questions that a worker process keeps
 
@@ -45,21 +46,28 @@ def _by_value(question: tuple[Question, int], pickling: Exception) -> bytes:
     return cloudpickle.dumps(question)
 
 
-_HELD: OrderedDict[str, Runner] = OrderedDict()
+_HELD: OrderedDict[str, Question] = OrderedDict()
 _LOCK = threading.Lock()
 
 
 def elsewhere(key: str, data: bytes, points: np.ndarray) -> Answers:
     """Some runs in another process, which keeps what it made ready for the runs before."""
     with _LOCK:
-        run = _HELD.get(key)
-    if run is None:
+        question = _HELD.get(key)
+    if question is None:
         question, runs = pickle.loads(data)
-        run = runner(replace(question, model=question.model.snapshot()), points, runs)
+        with _quiet():
+            question = prepared(replace(question, model=question.model.snapshot()), points, runs)
         with _LOCK:
-            _HELD[key] = run
+            _HELD[key] = question
             while len(_HELD) > HELD:
                 _HELD.popitem(last=False)
+    with _quiet():
+        return compute(question, points)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StartWarning)  # remarks say it
-        return timed(run, points, lambda: False)
+        yield
