@@ -16,15 +16,6 @@ from flyball.equations.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivativ
 from flyball.equations.solve import REFINEMENTS, factor, solve
 from flyball.equations.tree import retract
 from flyball.tables.system import (
-    F_APPLIED,
-    GAMMA,
-    LAM,
-    PASS,
-    STABILIZE,
-    TOL_G,
-    TOL_V,
-    V3,
-    X_SOLVED,
     System,
     Work,
 )
@@ -40,9 +31,9 @@ def follow(S: System, W: Work, times: Float1, y: Float1, dy: Float1, task: int) 
     velocities, and accelerations from the constraints alone. REACTIONS: the same with forces, accelerations and
     reactions, as a simulation reports them.
     """
-    nq, nv = S.coordinates[0], W.vel.shape[1]
+    nq, nv = S.coordinates[0], W.velocities.solved.shape[0]
     q, v, z = y[:nq], y[nq : nq + nv], y[nq + nv :]
-    a, step = W.vel[X_SOLVED], W.vel[V3]
+    a, step = W.velocities.solved, W.velocities.scratch_3
     for k in range(times.shape[0]):
         if task == RIGHT_HAND_SIDE:
             status = derivative(times[k], y, dy, S, W)
@@ -61,7 +52,7 @@ def follow(S: System, W: Work, times: Float1, y: Float1, dy: Float1, task: int) 
                 remember(S, W, z)
                 if not factored:
                     factor(S, W)
-                solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], a, W.row[LAM], False, REFINEMENTS)
+                solve(S, W, W.velocities.applied, W.rows.gamma, a, W.rows.multiplier, False, REFINEMENTS)
         if status != 0:
             return status
     return 0
@@ -76,8 +67,8 @@ def clock(c: Any, y: np.ndarray, times: np.ndarray, task: int) -> float:
         If the loop could not go on.
     """
     S, W = c.values.system, c.work
-    W.option[STABILIZE], W.option[PASS] = STAGES, 1e-13
-    W.option[TOL_G], W.option[TOL_V] = 1e-10, 1e-9  # those of a simulation at rtol 1e-8
+    W.options.stabilization[0], W.options.solve_tolerance[0] = STAGES, 1e-13
+    W.options.position_tolerance[0], W.options.velocity_tolerance[0] = 1e-10, 1e-9  # those of a simulation at rtol 1e-8
     y, dy = y.copy(), np.zeros(len(y))
     run = follow
     run(S, W, times[:1], y.copy(), dy, task)  # compiles, and brings the arrays into the cache

@@ -23,9 +23,9 @@ PARTS = {
     "rows": "row_values(S, W, 0.0, z)",
     "motions": "motions(S, W, v)",
     "biases": "row_biases(S, W, 0.0, v, z)",
-    "forces": "inertial(S, W); forces(S, W, 0.0, dy); gather(S, W, W.vel[0]); efforts(S, W, 0.0, dy, W.vel[0])",
+    "forces": "inertial(S, W); forces(S, W, 0.0, dy); f = W.velocities.applied; gather(S, W, f); efforts(S, W, 0.0, dy, f)",
     "factor": "factor(S, W)",
-    "solve": "solve(S, W, W.vel[0], W.row[2], W.vel[1], W.row[4], True, 20)",
+    "solve": "solve(S, W, W.velocities.applied, W.rows.gamma, W.velocities.solved, W.rows.multiplier, True, 20)",
     "all": "derivative(0.0, y, dy, S, W)",
 }
 
@@ -222,7 +222,6 @@ def main() -> None:
     from flyball.analysis.motion.start import begin
     from flyball.equations.engine import MOTION
     from flyball.equations.motion import STAGES
-    from flyball.tables.system import STABILIZE, TOL_G, TOL_V
 
     per_ns = rate()
     print(f"compiled scalar code at its best: {per_ns:.1f} operations a nanosecond\n")
@@ -233,7 +232,7 @@ def main() -> None:
             c = start.assembly.compiled
             c.at(0.0, start.assembly.q, start.assembly.v, MOTION)
             S, W = c.values.system, c.work
-            W.option[STABILIZE], W.option[TOL_G], W.option[TOL_V] = STAGES, 1e-10, 1e-9
+            W.options.stabilize[0], W.options.tol_g[0], W.options.tol_v[0] = STAGES, 1e-10, 1e-9
             nq, nv = c.structure.nq, c.structure.nv
             ns = times(S, W, start.y, nq, nv)
             bytes_ = sum(a.nbytes for T in (S, W) for a in T if hasattr(a, "nbytes")) + sum(a.nbytes for a in S.ldl)

@@ -18,7 +18,7 @@ from flyball.compiler.kernels import kernel
 from flyball.compiler.layout import Float1
 from flyball.equations.motion import STAGES, derivative
 from flyball.equations.scratch import work
-from flyball.tables.system import MADE, PASS, SAMPLED, STABILIZE, TOL_G, TOL_V, System, Work
+from flyball.tables.system import SAMPLED, System, Work
 from mechanisms import Kernel, example
 
 MECHANISMS = {
@@ -54,8 +54,13 @@ def right_hand_sides(S: System, W: Work, y: Float1, dy: Float1, n: int) -> int:
 def microseconds(s: Any, S: Any, y: np.ndarray, calls: int = 20000) -> tuple[float, np.ndarray]:
     """Of a right-hand side, and what it is."""
     W, dy = work(s, S), np.zeros(len(y))
-    W.info[MADE + 1 : MADE + SAMPLED] = S.flat[1:SAMPLED]
-    W.option[[STABILIZE, PASS, TOL_G, TOL_V]] = STAGES, 1e-13, 1e-10, 1e-9
+    W.made[1:SAMPLED] = S.flat[1:SAMPLED]
+    (
+        W.options.stabilization[0],
+        W.options.solve_tolerance[0],
+        W.options.position_tolerance[0],
+        W.options.velocity_tolerance[0],
+    ) = STAGES, 1e-13, 1e-10, 1e-9
     run = right_hand_sides
     if run(S, W, y, dy, 1) != 0:
         raise RuntimeError("the right-hand side has no value")

@@ -23,9 +23,6 @@ from flyball.tables.system import (
     COUPLED,
     SCHUR,
     SOLVER,
-    STABILIZE,
-    TOL_G,
-    TOL_V,
 )
 from tests.mechanisms import EXAMPLES, G, bricard, circles, door, example, four_bar, planar_rod
 
@@ -206,7 +203,11 @@ def test_independent_coordinates_stay_as_they_are(make):
     random = np.random.default_rng(1)
     q = start.assembly.q + 1e-4 * random.standard_normal(nq)
     v = start.assembly.v + random.standard_normal(c.structure.nv)
-    W.option[[STABILIZE, TOL_G, TOL_V]] = projection.PARTITIONING, 1e-13, 1e-12
+    W.options.stabilization[0], W.options.position_tolerance[0], W.options.velocity_tolerance[0] = (
+        projection.PARTITIONING,
+        1e-13,
+        1e-12,
+    )
     status, _ = c.at(0.0, q, v, MOTION)
     assert status == 0
     settled = W.y[0].copy()

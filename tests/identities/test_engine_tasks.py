@@ -15,7 +15,6 @@ from flyball.equations.tree import retract
 from flyball.equations.within import ROWS
 from flyball.numerics.integrators.clock import COUNTS, REALS, STATES, Clock
 from flyball.numerics.integrators.tableaux import tableau
-from flyball.tables.system import ALPHA, BETA, PASS, STABILIZE
 from tests.mechanisms import four_bar
 
 LAYERS = pytest.mark.parametrize("tree", [(), ("A", "B")], ids=["absolute", "joint"])
@@ -52,7 +51,7 @@ def off_the_constraints(tree):
 def test_baumgarte_restores_violated_rows(tree):
     """Baumgarte 1972: d2g/dt2 + 2 alpha dg/dt + beta^2 g = 0, so G vdot differs by the last two terms."""
     c, q, v = off_the_constraints(tree)
-    c.work.option[[ALPHA, BETA, PASS]] = 5.0, 7.0, 1e-13
+    c.work.options.alpha[0], c.work.options.beta[0], c.work.options.solve_tolerance[0] = 5.0, 7.0, 1e-13
     found = []
     for choice in (NONE, BAUMGARTE):
         c.work.options.stabilization[0] = choice
@@ -68,7 +67,7 @@ def test_baumgarte_restores_violated_rows(tree):
 def test_an_error_keeps_only_what_the_rows_allow(tree):
     """G e = 0 of what is left of an error, which what the rows allow is not taken from."""
     c, q, v = off_the_constraints(tree)
-    c.work.option[[STABILIZE, PASS]] = STEPS, 1e-13
+    c.work.options.stabilization[0], c.work.options.solve_tolerance[0] = STEPS, 1e-13
     y = np.r_[q, v, c.z]
     evaluate(c.system, c.work, 0.3, y, MOTION)
     error = np.random.default_rng(4).normal(size=len(y))

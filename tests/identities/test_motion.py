@@ -13,7 +13,6 @@ from flyball.equations import motion, projection
 from flyball.equations.engine import MOTION, motion_kernel
 from flyball.numerics.integrators import clock as explicit
 from flyball.numerics.integrators.tableaux import tableau
-from flyball.tables.system import PASS, STABILIZE, TOL_G, TOL_V
 from tests.layers import both_layers, cached
 from tests.mechanisms import G, bricard, door, example, four_bar, spatial_four_bar
 from tests.verification.test_reactions import actuated
@@ -47,7 +46,12 @@ def ready(name, stabilize):
     c.at(0.0, q, v)
     y = np.r_[q, v, c.z]
     y[: len(q) + len(v)] += 1e-5 * np.sin(np.arange(len(q) + len(v)))
-    c.work.option[[STABILIZE, TOL_G, TOL_V, PASS]] = stabilize, 1e-12, 1e-11, 1e-13
+    (
+        c.work.options.stabilization[0],
+        c.work.options.position_tolerance[0],
+        c.work.options.velocity_tolerance[0],
+        c.work.options.solve_tolerance[0],
+    ) = stabilize, 1e-12, 1e-11, 1e-13
     return c, y
 
 
@@ -72,7 +76,7 @@ def test_compiled_is_plain_python(name):
     size = np.abs(dy).max()
     assert size > 0.1
     assert clock.K[0] == pytest.approx(dy, rel=1e-10, abs=1e-12 * size)
-    assert c.work.info[:4].tolist() == plain.work.info[:4].tolist()
+    assert [x[0] for x in c.work.counts[:4]] == [x[0] for x in plain.work.counts[:4]]
 
 
 # ------------------------------------------------------------------------------------------------- order of accuracy
@@ -98,7 +102,10 @@ def fixed_steps(monkeypatch, h, method):
         made = original(start, *args)
         made.real[explicit.RTOL] = made.real[explicit.ATOL] = 1e6
         made.real[explicit.H] = made.real[explicit.H_MAX] = h
-        start.assembly.compiled.work.option[[TOL_G, TOL_V]] = 1e-13, 1e-12
+        (
+            start.assembly.compiled.work.options.position_tolerance[0],
+            start.assembly.compiled.work.options.velocity_tolerance[0],
+        ) = 1e-13, 1e-12
         return made
 
     monkeypatch.setattr(simulate, "clock_for", clock)

@@ -112,7 +112,7 @@ def test_a_kernel_with_its_structures_bound_to_it():
         clock.y[0, s.nq : s.nq + s.nv] *= 1.0 - t
         status = motion_kernel(S, W, R, clock, sheet.rows, MOTION)
         expected, lam = clock.K.copy(), W.rows.multiplier.copy()
-        clock.K[:], W.row[:], W.vel[:] = 0.0, 0.0, 0.0
+        clock.K[:], W.rows.multiplier[:], W.velocities.solved[:] = 0.0, 0.0, 0.0
         assert bound(MOTION) == status
         assert (expected == clock.K).all() and (W.rows.multiplier == lam).all()
 

@@ -24,11 +24,7 @@ from flyball.numerics.integrators.tableaux import tableau
 from flyball.special import keeping
 from flyball.special.recorder import TERMS, Recorder
 from flyball.tables.system import (
-    PASS,
     RATE,
-    STABILIZE,
-    TOL_G,
-    TOL_V,
     VALUE,
 )
 from tests.contract.zoo import PLANAR, SPATIAL, joined
@@ -66,7 +62,12 @@ def states(x, y, seed=0):
 def solved(x, S, rows, stabilize=STAGES):
     """Every state projected, its accelerations and multipliers; and the scratch after the last."""
     W, rows = work(x.structure, S), rows.copy()
-    W.option[[STABILIZE, PASS, TOL_G, TOL_V]] = stabilize, 1e-13, 1e-12 * x.length, 1e-12
+    (
+        W.options.stabilization[0],
+        W.options.solve_tolerance[0],
+        W.options.position_tolerance[0],
+        W.options.velocity_tolerance[0],
+    ) = stabilize, 1e-13, 1e-12 * x.length, 1e-12
     ny = W.y.shape[1]
     clock = ex.Clock(
         np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64), np.zeros(0), np.zeros((ex.STATES, ny)), np.zeros((1, ny)),

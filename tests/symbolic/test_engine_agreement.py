@@ -13,7 +13,7 @@ from flyball.graph.values import evaluated
 from flyball.model.touching import has_contact
 from flyball.tables.names import velocity_names
 from flyball.tables.spanning import spanning
-from flyball.tables.system import G_VALUE, GAMMA, LOAD, NU
+from flyball.tables.system import LOAD
 from flyball.tracing.trace import plain, traced
 from tests import mechanisms
 from tests.contract import zoo
@@ -51,7 +51,7 @@ def engine_at(c, rng):
     i, j, _ = c.values.system.mass_entries
     M[i, j] = M[j, i] = W.M
     found = {"M": M if len(i) else c.mass().toarray(), "f": W.velocities.applied, "G": c.jacobian()}
-    found |= {name: W.row[k] for name, k in (("g", G_VALUE), ("nu", NU), ("gamma", GAMMA))}
+    found |= {"g": W.rows.value, "nu": W.rows.nu, "gamma": W.rows.gamma}
     found["measured"] = W.sensed[:3, :nm].T
     return state, {name: np.array(x) for name, x in found.items()}
 

@@ -24,7 +24,7 @@ ADDED = 1e-13  # to the diagonal, where rows of unit length have 1
 
 @formula
 def unit_rows(S, W, scale):
-    """Rows of unit size in W.H, of velocities counted in lengths; what they were divided by in W.row[DIAGONAL]."""
+    """Rows of unit size in W.H, of velocities counted in lengths; what they were divided by in `W.rows.diagonal`."""
     for k in range(S.rows.law.shape[0]):
         s = 0.0
         for e in range(S.row_start[k], S.row_start[k + 1]):

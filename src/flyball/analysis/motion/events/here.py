@@ -21,7 +21,7 @@ from ..start import Start
 class Here:
     """A motion where it stands.
 
-    Modes are in ``c.work.switch``, the sides of switches behind what is sensed (see `equations.guards`).
+    Modes are in ``c.work.modes``, the sides of switches behind what is sensed (see `equations.guards`).
 
     Attributes
     ----------
