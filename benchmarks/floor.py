@@ -23,7 +23,10 @@ PARTS = {
     "rows": "row_values(S, W, 0.0, z)",
     "motions": "motions(S, W, v)",
     "biases": "row_biases(S, W, 0.0, v, z)",
-    "forces": "inertial(S, W); forces(S, W, 0.0, dy); f = W.velocities.applied; gather(S, W, f); efforts(S, W, 0.0, dy, f)",
+    "forces": (
+        "inertial(S, W); forces(S, W, 0.0, dy); gather(S, W, W.velocities.applied); "
+        "efforts(S, W, 0.0, dy, W.velocities.applied)"
+    ),
     "factor": "factor(S, W)",
     "solve": "solve(S, W, W.velocities.applied, W.rows.gamma, W.velocities.solved, W.rows.multiplier, True, 20)",
     "all": "derivative(0.0, y, dy, S, W)",
