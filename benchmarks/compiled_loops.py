@@ -31,7 +31,7 @@ def follow(S: System, W: Work, times: Float1, y: Float1, dy: Float1, task: int) 
     velocities, and accelerations from the constraints alone. REACTIONS: the same with forces, accelerations and
     reactions, as a simulation reports them.
     """
-    nq, nv = S.coordinates[0], W.velocities.solved.shape[0]
+    nq, nv = S.sizes.coordinates, W.velocities.solved.shape[0]
     q, v, z = y[:nq], y[nq : nq + nv], y[nq + nv :]
     a, step = W.velocities.solved, W.velocities.scratch_3
     for k in range(times.shape[0]):
@@ -48,7 +48,7 @@ def follow(S: System, W: Work, times: Float1, y: Float1, dy: Float1, task: int) 
                 status = arrive(times[k], y, dy, S, W)[0]
             else:
                 prepare(S, W, times[k], q, v)
-                status, _, factored = settle(S, W, times[k], q, v, z, TIGHT_G * S.length[0], TIGHT_V)
+                status, _, factored = settle(S, W, times[k], q, v, z, TIGHT_G * S.scales.length, TIGHT_V)
                 remember(S, W, z)
                 if not factored:
                     factor(S, W)
@@ -67,8 +67,8 @@ def clock(c: Any, y: np.ndarray, times: np.ndarray, task: int) -> float:
         If the loop could not go on.
     """
     S, W = c.values.system, c.work
-    W.options.stabilization[0], W.options.solve_tolerance[0] = STAGES, 1e-13
-    W.options.position_tolerance[0], W.options.velocity_tolerance[0] = 1e-10, 1e-9  # those of a simulation at rtol 1e-8
+    W.options.stabilization, W.options.solve_tolerance = STAGES, 1e-13
+    W.options.position_tolerance, W.options.velocity_tolerance = 1e-10, 1e-9  # those of a simulation at rtol 1e-8
     y, dy = y.copy(), np.zeros(len(y))
     run = follow
     run(S, W, times[:1], y.copy(), dy, task)  # compiles, and brings the arrays into the cache

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from flyball.numerics.cone.gauss_seidel import gauss_seidel
-from flyball.numerics.cone.problem import COULOMB, ENOUGH, MOST, Problem
+from flyball.numerics.cone.problem import Problem
 from flyball.numerics.cone.rooms import rooms, unfilled
 from flyball.numerics.cone.solve import solve
 
@@ -81,14 +81,14 @@ def pile(count: int = 1000, time: float = 1.5) -> tuple[Problem, np.ndarray, np.
         v[:, 2] -= STEP * GRAVITY
         key = (P.at[:, 0] + 1) * 6 * count + P.at[:, 1] * 6 + np.argmax(P.frame[:, :3], 1) * (P.at[:, 0] < 0)
         known = warm(X.p, P.frame, key, known)
-        X.v[:], O.count[MOST], O.real[ENOUGH], O.count[COULOMB] = v, 50, 1e-4, 1
+        X.v[:], O.count.most, O.real.enough, O.count.coulomb = v, 50, 1e-4, 1
         solve(gauss_seidel, P, X, W, O, F)
         v, known = X.v.copy(), (key, world(X.p, P.frame))
         moved = rooms(P)[0]
         i, j = P.at[:, 0], P.at[:, 1]
         rate = ((v[j, :3] - v[i, :3] * (i >= 0)[:, None]) * P.frame[:, :3]).sum(1)
         P.bias[:, 0], P.mu[:] = gap / STEP + rate, 0.0
-        O.count[COULOMB] = 0
+        O.count.coulomb = 0
         solve(gauss_seidel, P, moved, W, O, F)
         x += STEP * (v[:, :3] + moved.v[:, :3])
     P, _ = balls(x, half)

@@ -47,7 +47,6 @@ def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], A
     from flyball.analysis.progress import unwatched
     from flyball.analysis.simulate import clock_for, run_clock
     from flyball.equations.engine import INTEGRATE
-    from flyball.numerics.integrators import explicit as ex
     from flyball.numerics.integrators.tableaux import tableau
     from flyball.tables.cost import counts
 
@@ -62,7 +61,7 @@ def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], A
         run_clock(start.assembly, clock, tableau("dop853"), unwatched, INTEGRATE)
         seconds = time.process_time() - begun
         spent += seconds
-        found.append(seconds / (clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]) / STAGES)
+        found.append(seconds / (clock.count.accepted + clock.count.rejected) / STAGES)
     return 1e6 * float(np.median(found)), counts(start.assembly.compiled.structure), start
 
 

@@ -26,7 +26,7 @@ from flyball.compiler.formulas import formula
 from flyball.compiler.kernels import kernel
 from flyball.equations.engine import MOTION, engine, motion_kernel
 from flyball.equations.motion import derivative
-from flyball.numerics.integrators.clock import Clock, T
+from flyball.numerics.integrators.clock import Clock
 from flyball.tables.system import System, Work
 
 CALLS = 100_000
@@ -36,7 +36,7 @@ CALLS = 100_000
 def again(S, W, clock, n):
     """Right-hand sides, contained."""
     for _ in range(n):
-        derivative(clock.real[T], clock.y[0], clock.K[0], S, W)
+        derivative(clock.real.t, clock.y[0], clock.K[0], S, W)
 
 
 @kernel

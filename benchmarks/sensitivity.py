@@ -27,7 +27,6 @@ from flyball.analysis.motion.options import projected
 from flyball.analysis.motion.start import begin
 from flyball.analysis.simulate import clock_for, run_clock
 from flyball.equations.engine import INTEGRATE
-from flyball.numerics.integrators import clock as ex
 from flyball.numerics.integrators.tableaux import tableau
 from mechanisms import example
 
@@ -110,13 +109,13 @@ def kernels(m: fb.Mechanism, to: Sequence[str], t_end: float, coordinates: str) 
     def plain() -> None:
         clock = clock_for(start, 0.0, t_end, times, o)
         run_clock(start.assembly, clock, tableau("dop853"), lambda fraction, note="": None, INTEGRATE)
-        steps[:] = [int(clock.count[ex.ACCEPTED])]
+        steps[:] = [int(clock.count.accepted)]
 
     def varied() -> None:
         loop.run(*changes)
 
     seconds = best(plain), best(varied)
-    return *seconds, f"{steps[0]} / {int(loop.ended.count[ex.ACCEPTED])}"
+    return *seconds, f"{steps[0]} / {int(loop.ended.count.accepted)}"
 
 
 def differences(m: fb.Mechanism, to: Sequence[str], of: Sequence[str], t_end: float, h: float) -> np.ndarray:

@@ -21,7 +21,7 @@ import matplotlib as mpl
 import numpy as np
 from cone_problems import chain, pile, stack
 
-from flyball.numerics.cone.problem import ENDED, ENOUGH, MOST, NEEDED_NUMBERS, NEEDED_PLACES, SMALL, Factor
+from flyball.numerics.cone.problem import SMALL, Factor
 from flyball.numerics.cone.pyramid import sliding_share
 from flyball.numerics.cone.registry import FACTORED, SOLVERS, room_for_all
 from flyball.numerics.cone.residual import residuals
@@ -52,13 +52,13 @@ def points(name: str, P, v: np.ndarray, wide: np.ndarray) -> list[tuple[float, f
     F = Factor(room.numbers, room.places)
     solver = SOLVERS[name]
     solver(P, X, W, O, F, 0)
-    if O.count[ENDED] == SMALL:
-        F = Factor(np.zeros(O.count[NEEDED_NUMBERS]), np.zeros(O.count[NEEDED_PLACES], np.int64))
+    if O.count.ended == SMALL:
+        F = Factor(np.zeros(O.count.needed_numbers), np.zeros(O.count.needed_places, np.int64))
     for cut in CUTS:
         spent, used = np.inf, 0
         for _ in range(3):
             X.v[:], X.wide[:], X.p[:] = v, wide, 0.0
-            O.count[MOST], O.real[ENOUGH] = cut, 0.0
+            O.count.most, O.real.enough = cut, 0.0
             began = time.process_time()
             used = solver(P, X, W, O, F, 0)
             spent = min(spent, time.process_time() - began)

@@ -56,10 +56,10 @@ def microseconds(s: Any, S: Any, y: np.ndarray, calls: int = 20000) -> tuple[flo
     W, dy = work(s, S), np.zeros(len(y))
     W.made[1:SAMPLED] = S.flat[1:SAMPLED]
     (
-        W.options.stabilization[0],
-        W.options.solve_tolerance[0],
-        W.options.position_tolerance[0],
-        W.options.velocity_tolerance[0],
+        W.options.stabilization,
+        W.options.solve_tolerance,
+        W.options.position_tolerance,
+        W.options.velocity_tolerance,
     ) = STAGES, 1e-13, 1e-10, 1e-9
     run = right_hand_sides
     if run(S, W, y, dy, 1) != 0:

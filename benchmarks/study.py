@@ -20,15 +20,15 @@ from threading import Thread
 
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
+from flyball.analysis.runs.desk import Desk
+from flyball.analysis.runs.lean import shared
+from flyball.analysis.runs.spread import BLOCK
 
 import flyball as fb
 from flyball.analysis.motion.choice import SimulateOptions
 from flyball.analysis.runs.compute import Question
-from flyball.analysis.runs.desk import Desk
-from flyball.analysis.runs.lean import shared
 from flyball.analysis.runs.reading import readings
 from flyball.analysis.runs.single import Motion
-from flyball.analysis.runs.spread import BLOCK
 from mechanisms import example
 
 VARIED = {"stiffness": 0.1, "torque": 0.1, "d": 0.001}  # by how much, as part of the model's value

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from flyball.numerics.cone.problem import COULOMB, ENDED, ENOUGH, ISLAND, MOST
 from flyball.numerics.cone.registry import ready
 from flyball.numerics.cone.rooms import rooms, unfilled
 
@@ -61,9 +60,9 @@ class Stack:
         P, X, O = self.P, self.X, self.O
         P.mu[:], P.bias[:, 0], X.v[:, :6], X.p[:] = mu, bias, v, p
         O.count[:], O.real[:] = 0, 0
-        O.count[MOST], O.count[ISLAND], O.count[COULOMB], O.real[ENOUGH] = self.most, -1, 1, 1e-9
+        O.count.most, O.count.island, O.count.coulomb, O.real.enough = self.most, -1, 1, 1e-9
         self.door.kernel(P, X, self.W, O, self.door.F, 0)
-        return X.v[:, :6].copy(), X.p.copy(), O.count[ENDED]
+        return X.v[:, :6].copy(), X.p.copy(), O.count.ended
 
     def step(self):
         gap, v = self.find(), self.v.copy()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flyball.numerics.cone.admm import admm
-from flyball.numerics.cone.problem import CONVERGED, COULOMB, CUT, ENDED, ENOUGH, MOST, RESIDUAL, STALLED
+from flyball.numerics.cone.problem import CONVERGED, CUT, STALLED
 from tests.cone.enlarge import solved
 from tests.cone.problems import KINDS, dense, impulses, random_problem
 from tests.cone.test_gauss_seidel import cone_lack
@@ -22,14 +22,14 @@ def test_it_solves(seed, kind, coulomb):
     P, X, W, O, F = random_problem(seed, **KINDS[kind])
     _, DK, N, b = dense(P, X)
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
-    O.count[MOST], O.real[ENOUGH], O.count[COULOMB] = 20_000, 1e-10, coulomb
+    O.count.most, O.real.enough, O.count.coulomb = 20_000, 1e-10, coulomb
     solved(admm, P, X, W, O, F)
     p = impulses(P, X)
     if coulomb and (seed, kind) in NOT_FOUND:  # the fixed point of De Saxce's additions
-        assert O.count[ENDED] in (CUT, STALLED)
-        assert O.real[RESIDUAL] > O.real[ENOUGH]
+        assert O.count.ended in (CUT, STALLED)
+        assert O.real.residual > O.real.enough
         return
-    assert O.count[ENDED] == CONVERGED
+    assert O.count.ended == CONVERGED
     assert cone_lack(P, p, N @ p + b, coulomb=bool(coulomb)) < 1e-8 * (1 + abs(p).max())
     after = np.concatenate([X.v[:, :6].ravel(), X.wide])
     np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
@@ -40,7 +40,7 @@ def test_it_solves(seed, kind, coulomb):
 def test_a_cut_solve_makes_no_energy(kind, most):
     P, X, W, O, F = random_problem(5, **KINDS[kind])
     _, _, N, b = dense(P, X)
-    O.count[MOST] = most
+    O.count.most = most
     X.p[:, 0] = 50.0
     solved(admm, P, X, W, O, F)
     p = impulses(P, X)

@@ -8,13 +8,7 @@ import pytest
 from flyball.numerics.cone.gauss_seidel import gauss_seidel
 from flyball.numerics.cone.problem import (
     CONVERGED,
-    COULOMB,
-    ENDED,
-    ENOUGH,
     FORCE_RESIDUAL,
-    HISTORY,
-    ISLAND,
-    MOST,
     RESIDUAL,
 )
 from flyball.numerics.cone.rooms import rooms, unfilled
@@ -28,13 +22,13 @@ def test_the_convex_form_is_solved(kind, seed):
     P, X, W, O, F = random_problem(seed, **KINDS[kind])
     _, DK, N, b = dense(P, X)
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
-    O.count[MOST], O.real[ENOUGH] = 200_000, 1e-12
+    O.count.most, O.real.enough = 200_000, 1e-12
     solve(gauss_seidel, P, X, W, O, F)
     p = impulses(P, X)
     assert cone_lack(P, p, N @ p + b) < 1e-9 * (1 + abs(p).max())
     after = np.concatenate([X.v[:, :6].ravel(), X.wide])
     np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
-    assert O.count[ENDED] == CONVERGED and O.real[RESIDUAL] < 1e-9 and O.real[FORCE_RESIDUAL] < 1e-9
+    assert O.count.ended == CONVERGED and O.real.residual < 1e-9 and O.real.force_residual < 1e-9
 
 
 @pytest.mark.parametrize("kind", ["nodes", "balls", "smooth", "soft", "groups and lines"])
@@ -42,7 +36,7 @@ def test_coulombs_law(kind):
     """|p_t| <= mu p_n, u_n >= 0, u_n p_n = 0, and friction against the velocity: where it converges it is that."""
     P, X, W, O, F = random_problem(1, **KINDS[kind])
     _, _, N, b = dense(P, X)
-    O.count[MOST], O.real[ENOUGH], O.count[COULOMB] = 10_000, 1e-12, 1
+    O.count.most, O.real.enough, O.count.coulomb = 10_000, 1e-12, 1
     solve(gauss_seidel, P, X, W, O, F)
     p = impulses(P, X)
     assert cone_lack(P, p, N @ p + b, coulomb=True) < 1e-9
@@ -55,7 +49,7 @@ def test_a_cut_solve_makes_no_energy(kind, coulomb, most):
     """p' N p / 2 + b' p, by which the kinetic energy changes, is at most 0, from a foolish warm start as well."""
     P, X, W, O, F = random_problem(5, **KINDS[kind])
     _, _, N, b = dense(P, X)
-    O.count[MOST], O.count[COULOMB] = most, coulomb
+    O.count.most, O.count.coulomb = most, coulomb
     X.p[:, 0] = 50.0
     solve(gauss_seidel, P, X, W, O, F)
     p = impulses(P, X)
@@ -71,7 +65,7 @@ def test_a_start_outside_of_the_cone(kind, coulomb):
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
     X.p[:] = np.random.default_rng(0).standard_normal(X.p.shape)
     X.p[::2, 0] = 0.0
-    O.count[MOST], O.count[COULOMB] = 3, coulomb
+    O.count.most, O.count.coulomb = 3, coulomb
     solve(gauss_seidel, P, X, W, O, F)
     p, after = impulses(P, X), np.concatenate([X.v[:, :6].ravel(), X.wide])
     np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
@@ -94,7 +88,7 @@ def test_a_ball_on_a_slope(angle):
     """It rolls with 5/7 g sin a up to tan a = 7/2 mu, and slides with g (sin a - mu cos a) beyond."""
     mu, h, g = 0.3, 1e-2, 9.81
     P, X, W, O, F = on_a_slope(angle, mu)
-    O.count[COULOMB], O.real[ENOUGH] = 1, 1e-14
+    O.count.coulomb, O.real.enough = 1, 1e-14
     solve(gauss_seidel, P, X, W, O, F)
     rolls = np.tan(angle) <= 3.5 * mu
     a = 5 / 7 * g * np.sin(angle) if rolls else g * (np.sin(angle) - mu * np.cos(angle))
@@ -107,7 +101,7 @@ def test_a_ball_on_a_slope(angle):
 def test_the_convex_form_floats_by_mu_times_the_slip():
     angle, mu = 1.2, 0.3
     P, X, W, O, F = on_a_slope(angle, mu)
-    O.count[MOST], O.real[ENOUGH] = 1000, 1e-15
+    O.count.most, O.real.enough = 1000, 1e-15
     solve(gauss_seidel, P, X, W, O, F)
     assert X.v[0, 2] == pytest.approx(mu * (X.v[0, 0] - 0.1 * X.v[0, 4]), rel=1e-9)
 
@@ -116,8 +110,8 @@ def test_the_history_tells_every_sweep():
     P, X, W, _, F = random_problem(3)
     _, _, N, b = dense(P, X)
     _, _, O, _ = rooms(P, history=50)
-    assert O.count[HISTORY] == 1
-    O.count[MOST], O.real[ENOUGH] = 50, 0.0
+    assert O.count.history == 1
+    O.count.most, O.real.enough = 50, 0.0
     solve(gauss_seidel, P, X, W, O, F)
     p = impulses(P, X)
     assert list(O.history[:, 0]) == list(range(1, 51))
@@ -129,9 +123,9 @@ def test_the_history_tells_every_sweep():
 def test_a_least_impulse_is_held():
     P, X, W, O, F = random_problem(2, balls=True)
     P = P._replace(least=np.full(12, 0.7))
-    O.count[MOST], O.real[ENOUGH] = 10_000, 1e-12
+    O.count.most, O.real.enough = 10_000, 1e-12
     solve(gauss_seidel, P, X, W, O, F)
-    assert X.p[:, 0].min() == 0.7 and O.real[RESIDUAL] < 1e-9
+    assert X.p[:, 0].min() == 0.7 and O.real.residual < 1e-9
 
 
 def test_islands_are_solved_one_at_a_time():
@@ -142,13 +136,13 @@ def test_islands_are_solved_one_at_a_time():
     P = P._replace(island=np.array([0, 4, 8]), member_p=np.array([0, 3, 6]), line_p=np.zeros(3, np.int64))
     both = rooms(P)[0]
     both.v[:] = X.v
-    O.count[MOST], O.real[ENOUGH] = 10_000, 1e-14
+    O.count.most, O.real.enough = 10_000, 1e-14
     solve(gauss_seidel, P, both, W, O, F)
-    O.count[ISLAND] = 1
+    O.count.island = 1
     before = X.v.copy()
     solve(gauss_seidel, P, X, W, O, F)
     np.testing.assert_array_equal(X.v[:3], before[:3])
     np.testing.assert_allclose(X.v[3:], both.v[3:], atol=1e-12)
-    O.count[ISLAND] = 0
+    O.count.island = 0
     solve(gauss_seidel, P, X, W, O, F)
     np.testing.assert_allclose(X.v, both.v, atol=1e-12)

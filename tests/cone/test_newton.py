@@ -9,12 +9,6 @@ from flyball.numerics.cone.newton import newton
 from flyball.numerics.cone.problem import (
     BROKEN,
     CONVERGED,
-    COULOMB,
-    ENDED,
-    ENOUGH,
-    FORCE_RESIDUAL,
-    MOST,
-    RESIDUAL,
     SMALL,
 )
 from flyball.numerics.cone.solve import solve
@@ -31,10 +25,10 @@ def test_the_convex_form_is_solved(kind, seed):
     P, X, W, O, F = random_problem(seed, **KINDS[kind])
     _, DK, N, b = dense(P, X)
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
-    O.count[MOST], O.real[ENOUGH] = 200, 1e-12
+    O.count.most, O.real.enough = 200, 1e-12
     solved(newton, P, X, W, O, F)
     p = impulses(P, X)
-    assert O.count[ENDED] == CONVERGED and O.real[RESIDUAL] < 1e-12
+    assert O.count.ended == CONVERGED and O.real.residual < 1e-12
     assert cone_lack(P, p, N @ p + b) < 1e-10 * (1 + abs(p).max())
     after = np.concatenate([X.v[:, :6].ravel(), X.wide])
     np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
@@ -46,10 +40,10 @@ def test_coulombs_law(kind, seed):
     """|p_t| <= mu p_n, u_n >= 0, u_n p_n = 0, and friction against the velocity."""
     P, X, W, O, F = random_problem(seed, **KINDS[kind])
     _, _, N, b = dense(P, X)
-    O.count[MOST], O.real[ENOUGH], O.count[COULOMB] = 200, 1e-12, 1
+    O.count.most, O.real.enough, O.count.coulomb = 200, 1e-12, 1
     solved(newton, P, X, W, O, F)
     p = impulses(P, X)
-    assert O.count[ENDED] == CONVERGED
+    assert O.count.ended == CONVERGED
     assert cone_lack(P, p, N @ p + b, coulomb=True) < 1e-10 * (1 + abs(p).max())
 
 
@@ -62,7 +56,7 @@ def test_a_cut_solve_makes_no_energy(kind, coulomb, most):
     """p' N p / 2 + b' p, by which the kinetic energy changes, is at most 0, from a foolish warm start as well."""
     P, X, W, O, F = random_problem(5, **KINDS[kind])
     _, _, N, b = dense(P, X)
-    O.count[MOST], O.count[COULOMB] = most, coulomb
+    O.count.most, O.count.coulomb = most, coulomb
     X.p[:, 0] = 50.0
     solved(newton, P, X, W, O, F)
     p = impulses(P, X)
@@ -73,7 +67,7 @@ def test_least_impulses_are_held():
     P, X, W, O, F = random_problem(2, balls=True)
     P = P._replace(least=np.full(12, 0.7))
     _, _, N, b = dense(P, X)
-    O.real[ENOUGH] = 1e-12
+    O.real.enough = 1e-12
     solved(newton, P, X, W, O, F)
     p, u = X.p, (N @ X.p.ravel() + b).reshape(-1, 3)
     assert p[:, 0].min() == pytest.approx(0.7, rel=1e-14)
@@ -90,7 +84,7 @@ def test_what_is_left_is_told_as_a_force_too(seed):
     """The impulse that is lacking by the natural map, over the largest impulse; rough solves, so that some is left."""
     P, X, W, O, F = random_problem(seed)
     _, _, N, b = dense(P, X)
-    O.count[MOST], O.real[ENOUGH] = 200, 0.3
+    O.count.most, O.real.enough = 200, 0.3
     solved(newton, P, X, W, O, F)
     p, u = X.p, (N @ X.p.ravel() + b).reshape(-1, 3)
     lacking = 0.0
@@ -101,18 +95,18 @@ def test_what_is_left_is_told_as_a_force_too(seed):
         a = min(1.0, mu * near / r)
         lacking = max(lacking, np.linalg.norm(p[c] - (near, a * s, a * t)))
     assert lacking > 0.0
-    assert O.real[FORCE_RESIDUAL] == pytest.approx(lacking / np.linalg.norm(p, axis=1).max(), rel=1e-6)
+    assert O.real.force_residual == pytest.approx(lacking / np.linalg.norm(p, axis=1).max(), rel=1e-6)
 
 
 def test_rooms_too_small_are_said():
     P, X, W, O, F = random_problem(0)
     p = X.p.copy()
-    assert solve(newton, P, X, W, O, F) == 0 and O.count[ENDED] == SMALL
+    assert solve(newton, P, X, W, O, F) == 0 and O.count.ended == SMALL
     np.testing.assert_array_equal(X.p, p)
 
 
 def test_the_convex_form_of_rolling_friction_is_refused():
     P, X, W, O, F = random_problem(0, **KINDS["rolling friction"])
     v = X.v.copy()
-    assert solve(newton, P, X, W, O, F) == 0 and O.count[ENDED] == BROKEN
+    assert solve(newton, P, X, W, O, F) == 0 and O.count.ended == BROKEN
     np.testing.assert_array_equal(X.v, v)

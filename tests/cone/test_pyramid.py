@@ -10,7 +10,7 @@ import pytest
 from flyball.errors import AnalysisError
 from flyball.numerics.cone.gauss_seidel import gauss_seidel
 from flyball.numerics.cone.lemke import delassus, lemke, pyramid_by_lemke
-from flyball.numerics.cone.problem import BROKEN, CONVERGED, COULOMB, DIRECTIONS, ENDED, ENOUGH, MOST
+from flyball.numerics.cone.problem import BROKEN, CONVERGED, COULOMB, DIRECTIONS
 from flyball.numerics.cone.pyramid import in_polygon, pyramid, sliding_share
 from flyball.numerics.cone.rooms import rooms, unfilled
 from flyball.numerics.cone.solve import solve
@@ -93,7 +93,7 @@ def test_a_slider_on_a_pyramid(d, angle):
     X, W, O, F = rooms(P)
     free = -500 * np.cos(angle), -500 * np.sin(angle), -1.0
     X.v[0, :3], O.count[[DIRECTIONS, COULOMB]] = free, (d, 1)
-    O.count[MOST], O.real[ENOUGH] = 1000, 1e-14
+    O.count.most, O.real.enough = 1000, 1e-14
     solve(pyramid, P, X, W, O, F)
     along, across = sliding_share(d, angle)
     assert X.p[0, 0] == pytest.approx(1.0)
@@ -111,16 +111,16 @@ def test_pivoting_agrees_with_sweeps(kind):
     P.mu[:] *= 0.5
     Y = rooms(P)[0]
     Y.v[:], Y.wide[:] = X.v, X.wide
-    O.count[MOST], O.real[ENOUGH], O.count[DIRECTIONS], O.count[COULOMB] = 100_000, 1e-13, 6, 1
+    O.count.most, O.real.enough, O.count.directions, O.count.coulomb = 100_000, 1e-13, 6, 1
     solve(pyramid, P, X, W, O, F)
-    assert O.count[ENDED] == CONVERGED
+    assert O.count.ended == CONVERGED
     pyramid_by_lemke(P, Y, 6)
     np.testing.assert_allclose(Y.v, X.v, atol=1e-8)
 
 
 def test_many_edges_are_the_cone():
     P, X, W, O, F = random_problem(8, nc=5)
-    O.count[MOST], O.real[ENOUGH], O.count[DIRECTIONS], O.count[COULOMB] = 100_000, 1e-12, 400, 1
+    O.count.most, O.real.enough, O.count.directions, O.count.coulomb = 100_000, 1e-12, 400, 1
     Y = rooms(P)[0]
     Y.v[:] = X.v
     solve(pyramid, P, X, W, O, F)
@@ -130,6 +130,6 @@ def test_many_edges_are_the_cone():
 
 def test_what_it_is_not_made_for_is_left_alone():
     P, X, W, O, F = random_problem(1)
-    before, O.count[DIRECTIONS] = X.v.copy(), 4
-    assert solve(pyramid, P, X, W, O, F) == 0 and O.count[ENDED] == BROKEN
+    before, O.count.directions = X.v.copy(), 4
+    assert solve(pyramid, P, X, W, O, F) == 0 and O.count.ended == BROKEN
     np.testing.assert_array_equal(X.v, before)

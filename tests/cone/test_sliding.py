@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flyball.numerics.cone.newton import newton
-from flyball.numerics.cone.problem import CONVERGED, COULOMB, ENDED, ENOUGH, MOST
+from flyball.numerics.cone.problem import CONVERGED
 from flyball.numerics.cone.rooms import rooms, unfilled
 from tests.cone.enlarge import solved
 
@@ -25,7 +25,7 @@ def box(mass=2.0):
     P.at[:] = -1, 0
     P.arm[:, 3:] = [(x, y, -c) for x in (-a, a) for y in (-b, b)]
     P.mu[:] = MU
-    O.count[MOST], O.real[ENOUGH], O.count[COULOMB] = 200, 1e-12, 1
+    O.count.most, O.real.enough, O.count.coulomb = 200, 1e-12, 1
     return P, X, W, O, F
 
 
@@ -37,7 +37,7 @@ def test_below_the_angle_of_friction_nothing_creeps(degrees):
     for _ in range(200):
         X.v[0, :3] += H * G * np.array([np.sin(a), 0, -np.cos(a)])
         _, F = solved(newton, P, X, W, O, F)
-        assert O.count[ENDED] == CONVERGED
+        assert O.count.ended == CONVERGED
         moved += H * X.v[0, :6]
     assert abs(moved).max() < 1e-9  # a second
 
@@ -50,7 +50,7 @@ def test_above_it_the_acceleration_is_exact(degrees):
     for k in range(1, 201):
         X.v[0, :3] += H * G * np.array([np.sin(a), 0, -np.cos(a)])
         used, F = solved(newton, P, X, W, O, F)
-        assert O.count[ENDED] == CONVERGED
+        assert O.count.ended == CONVERGED
         assert X.v[0, 0] == pytest.approx(k * H * G * (np.sin(a) - MU * np.cos(a)), rel=1e-10)
         away += H * X.v[0, 2]
         steps.append(used)
@@ -78,7 +78,7 @@ def rod(mu, theta=0.9, spin=1.0):
     P.frame[0] = 0, 0, 1, 1, 0, 0, 0, 1, 0
     P.at[0], P.mu[0] = (-1, 0), mu
     P.arm[0, 3:] = np.cos(theta), 0, -np.sin(theta)
-    O.count[MOST], O.real[ENOUGH], O.count[COULOMB] = 200, 1e-10, 1
+    O.count.most, O.real.enough, O.count.coulomb = 200, 1e-10, 1
     return P, X, W, O, F
 
 
@@ -92,7 +92,7 @@ def test_painleves_rod_ends(mu, speed):
     solved(newton, P, X, W, O, F)
     after = 0.5 * (X.v[0, :3] @ X.v[0, :3]) + 0.5 * X.v[0, 3:6] @ X.v[0, 3:6] / 3.0
     assert after <= before * (1 + 1e-12)
-    if O.count[ENDED] == CONVERGED:
+    if O.count.ended == CONVERGED:
         u = X.v[0, :3] + np.cross(X.v[0, 3:6], P.arm[0, 3:])
         p = X.p[0]
         assert u[2] > -1e-9 and abs(p[0] * u[2]) < 1e-9 and np.hypot(p[1], p[2]) <= mu * p[0] * (1 + 1e-12)

@@ -17,12 +17,7 @@ from flyball.numerics.cone.operator import push, push_turning, seen, seen_turnin
 from flyball.numerics.cone.problem import (
     BROKEN,
     CONVERGED,
-    COULOMB,
-    ENDED,
-    ENOUGH,
     FORCE_RESIDUAL,
-    ISLAND,
-    MOST,
     RESIDUAL,
 )
 from flyball.numerics.cone.projection import projected_turning
@@ -42,10 +37,10 @@ def test_the_convex_form_is_solved(kind, name):
     P, X, W, O, F = random_problem(2, **KINDS[kind])
     _, DK, N, b = dense(P, X)
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
-    O.count[MOST], O.real[ENOUGH] = 100_000, 1e-10
+    O.count.most, O.real.enough = 100_000, 1e-10
     solve(SOLVERS[name], P, X, W, O, F)
     p = impulses(P, X)
-    assert O.count[ENDED] == CONVERGED and O.real[RESIDUAL] < 1e-9
+    assert O.count.ended == CONVERGED and O.real.residual < 1e-9
     assert cone_lack(P, p, N @ p + b) < 1e-8 * (1 + abs(p).max())
     after = np.concatenate([X.v[:, :6].ravel(), X.wide])
     np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
@@ -69,7 +64,7 @@ def test_pyramids_enclose_the_objective(seed):
     N = N + 1e-9 * np.eye(len(N))
     above, below = (pyramid_objective(N, b, P.mu, 64, outside) for outside in (False, True))
     assert above - below < 5e-3 * abs(above)
-    O.count[MOST], O.real[ENOUGH] = 10_000, 1e-10
+    O.count.most, O.real.enough = 10_000, 1e-10
     for solver in SOLVERS.values():
         Y = rooms(P)[0]
         Y.v[:] = X.v
@@ -86,18 +81,18 @@ def test_coulombs_law(name, kind):
     P, X, W, O, F = random_problem(4, **KINDS[kind], **fewer)
     P.mu[:] *= 0.5
     _, _, N, b = dense(P, X)
-    O.count[MOST], O.real[ENOUGH], O.count[COULOMB] = 50_000, 1e-10, 1
+    O.count.most, O.real.enough, O.count.coulomb = 50_000, 1e-10, 1
     solve(SOLVERS[name], P, X, W, O, F)
-    assert O.count[ENDED] == CONVERGED
+    assert O.count.ended == CONVERGED
     p = impulses(P, X)
     assert cone_lack(P, p, N @ p + b, coulomb=True) < 1e-8
 
 
 def test_what_needs_an_objective_leaves_coulombs_law_alone():
     P, X, W, O, F = random_problem(4)
-    before, O.count[COULOMB] = X.v.copy(), 1
+    before, O.count.coulomb = X.v.copy(), 1
     assert solve(barzilai_borwein, P, X, W, O, F) == 0
-    assert O.count[ENDED] == BROKEN
+    assert O.count.ended == BROKEN
     np.testing.assert_array_equal(X.v, before)
 
 
@@ -107,7 +102,7 @@ def test_a_cut_solve_makes_no_energy(kind, name):
     for most in (1, 3, 10):
         P, X, W, O, F = random_problem(5, **KINDS[kind])
         _, _, N, b = dense(P, X)
-        O.count[MOST] = most
+        O.count.most = most
         X.p[:, 0] = 50.0
         solve(SOLVERS[name], P, X, W, O, F)
         p = impulses(P, X)
@@ -162,7 +157,7 @@ def test_residuals_by_definition(kind, coulomb, seed):
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
     (v, wide), w = (X.v.copy(), X.wide.copy()), free + DK.T @ p
     v[:, :6], wide[:] = w[: v[:, :6].size].reshape(-1, 6), w[v[:, :6].size :]
-    O.count[COULOMB] = coulomb
+    O.count.coulomb = coulomb
     found = residuals(P, X, O, (v, wide, X.v, X.wide))
     u, lack, rates = N @ p + b, [], []
     for c in range(nc):
@@ -193,7 +188,7 @@ def test_residuals_with_rolling_and_spinning_friction_by_definition(coulomb, see
     p = impulses(P, X)
     (v, wide), w = (X.v.copy(), X.wide.copy()), np.concatenate([X.v[:, :6].ravel(), X.wide]) + DK.T @ p
     v[:, :6], wide[:] = w[: v[:, :6].size].reshape(-1, 6), w[v[:, :6].size :]
-    O.count[COULOMB] = coulomb
+    O.count.coulomb = coulomb
     found = residuals(P, X, O, (v, wide, X.v, X.wide))
     u, lack, rates = N @ p + b, [], []
     for c in range(P.size[0]):
@@ -257,7 +252,7 @@ def test_the_units_of_residuals(name):
         P.node[:, 0] /= mass
         P.node[:, 1:7] /= mass * length**2
         X.v[:, :3] *= length
-        O.count[MOST], O.real[ENOUGH] = 20, 0.0
+        O.count.most, O.real.enough = 20, 0.0
         solve(SOLVERS[name], P, X, W, O, F)
         told.append(O.real[[RESIDUAL, FORCE_RESIDUAL]] / [length, 1.0])
     if name != "apgd":  # which takes N - 1 for a vector to start from, whatever the unit of 1
@@ -269,10 +264,10 @@ def test_the_units_of_residuals(name):
 def test_a_warm_start_is_used(name):
     """From the solution one iteration is enough."""
     P, X, W, O, F = random_problem(7)
-    O.count[MOST], O.real[ENOUGH] = 100_000, 1e-11
+    O.count.most, O.real.enough = 100_000, 1e-11
     free = X.v.copy()
     solve(SOLVERS[name], P, X, W, O, F)
-    X.v[:], O.real[ENOUGH] = free, 1e-9
+    X.v[:], O.real.enough = free, 1e-9
     assert solve(SOLVERS[name], P, X, W, O, F) <= 3
 
 
@@ -281,7 +276,7 @@ def test_the_history_tells_every_iteration(name):
     P, X, W, _, F = random_problem(3)
     _, _, N, b = dense(P, X)
     _, _, O, _ = rooms(P, history=40)
-    O.count[MOST], O.real[ENOUGH] = 40, 0.0
+    O.count.most, O.real.enough = 40, 0.0
     solve(SOLVERS[name], P, X, W, O, F)
     p = impulses(P, X)
     rows = O.history[: O.count[5]]
@@ -298,11 +293,11 @@ def test_an_island_alone(name):
     P = P._replace(island=np.array([0, 4, 8]), member_p=np.array([0, 3, 6]), line_p=np.zeros(3, np.int64))
     both = rooms(P)[0]
     both.v[:] = X.v
-    O.count[MOST], O.real[ENOUGH] = 10_000, 1e-13
+    O.count.most, O.real.enough = 10_000, 1e-13
     solve(SOLVERS[name], P, both, W, O, F)
     before = X.v.copy()
     for island in (1, 0):
-        O.count[ISLAND] = island
+        O.count.island = island
         solve(SOLVERS[name], P, X, W, O, F)
         if island:
             np.testing.assert_array_equal(X.v[:3], before[:3])
@@ -316,7 +311,7 @@ def test_what_is_no_number_is_told(name):
     P.bias[3, 0] = np.nan
     free = X.v.copy()
     solve(SOLVERS[name], P, X, W, O, F)
-    assert O.count[ENDED] == BROKEN
+    assert O.count.ended == BROKEN
     np.testing.assert_array_equal(X.v, free)
     assert not X.p.any()
 
@@ -328,9 +323,9 @@ def test_a_contact_of_what_cannot_move_is_left_alone(name, balls):
     P, X, W, O, F = random_problem(1, balls=balls)
     P.node[:3, :7], X.v[:3], P.bias[:, 0] = 0.0, 0.0, abs(P.bias[:, 0])
     P.bias[(P.at < 3).all(1), 0] = -1.0  # nothing can be done about these
-    O.count[MOST], O.real[ENOUGH] = 50_000, 1e-9
+    O.count.most, O.real.enough = 50_000, 1e-9
     solve(SOLVERS[name], P, X, W, O, F)
     stuck = (P.at < 3).all(1)
     assert stuck.any() and not stuck.all()
     assert not X.p[stuck].any() and X.p.any()
-    assert O.count[ENDED] == CONVERGED and O.real[RESIDUAL] < 1e-7
+    assert O.count.ended == CONVERGED and O.real.residual < 1e-7

@@ -39,7 +39,7 @@ def moving(m, modes, ways, coordinates="absolute"):
     W, n = c.work, len(c.structure.switches)
     W.modes.mode[: len(modes)] = modes
     W.sensed[VALUE, W.sensed.shape[1] - n : W.sensed.shape[1] - n + len(ways)] = ways
-    W.counts.load_updates[0] = FORGOTTEN
+    W.counts.load_updates = FORGOTTEN
     status, dy = c.at(a.t, a.q, a.v, MOTION)
     assert status == 0
     nq, nv = c.structure.nq, c.structure.nv

@@ -13,7 +13,7 @@ from flyball.numerics.integrators.explicit import answer
 from flyball.numerics.integrators.loop import TRY, advance
 from flyball.numerics.integrators.tableaux import tableau
 from flyball.numerics.integrators.watched import begun, onward
-from flyball.numerics.integrators.watching import EVENT, STAGE, START, Watch, watching
+from flyball.numerics.integrators.watching import EVENT, START, Watch, watching
 
 
 class Equations(NamedTuple):
@@ -28,8 +28,8 @@ def derivative(t, y, dy, S, W):
     n = len(y) // 2
     dy[:n], dy[n:] = y[n:], S.f(t, y[:n], y[n:])
     S.latest[:] = [t, y.copy()]
-    W.count[STAGE] += 1
-    for j in np.flatnonzero(W.met == W.count[STAGE]):
+    W.count.stage += 1
+    for j in np.flatnonzero(W.met == W.count.stage):
         W.met_g[j] = S.g(t, y[:n], y[n:])
     return 0
 
@@ -72,7 +72,7 @@ def look(t, h, x, S, W, row):
 
 def ask(own, S, W, R, c, task):
     if task == TRY:
-        W.count[STAGE] = 0
+        W.count.stage = 0
     return answer(own, S, W, R, c, task)
 
 
@@ -91,9 +91,9 @@ def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", mo
         [],
         (np.zeros((2, 2 * n)), np.zeros(0)),
     )
-    real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
+    real, count = ex.ClockReals.blank(), ex.ClockCounts.blank()
     real[[ex.T_END, ex.RTOL, ex.ATOL, ex.SPAN, ex.SCALE, ex.LARGEST]] = t_end, rtol, 1e-2 * rtol, t_end, 1.0, t_end
-    real[ex.H_MAX] = min(h_max, t_end)
+    real.h_max = min(h_max, t_end)
     count[[ex.QUOTA, ex.LIMIT, ex.CONTROLLED]] = 1000, most, 2 * n
     Y = np.zeros((ex.STATES, 2 * n))
     Y[0] = y
@@ -104,12 +104,12 @@ def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", mo
     while True:
         used = advance(callbacks, S, W, R, c, out)
         rows.append(out[:used].copy())
-        status = count[ex.STATUS]
+        status = count.status
         if status == EVENT:
-            events.append((real[ex.T], tuple(np.flatnonzero(W.fired)), Y[0].copy()))
-            if act is not None and act(real[ex.T], Y[0], events[-1][1]):
+            events.append((real.t, tuple(np.flatnonzero(W.fired)), Y[0].copy()))
+            if act is not None and act(real.t, Y[0], events[-1][1]):
                 break
-            count[ex.STARTED] = 0
+            count.started = 0
         elif status != ex.RUNNING:
             assert status == ex.DONE, status
             break

@@ -13,7 +13,7 @@ from flyball.equations.slopes import ALONG, DAMPING, DIRECTIONS, SLOPE_WIDTH, ST
 from flyball.equations.tasks import MOTION, POSITION, SLOPES, TANGENT, WATCH
 from flyball.equations.tree import retract
 from flyball.equations.within import ROWS
-from flyball.numerics.integrators.clock import COUNTS, REALS, STATES, Clock
+from flyball.numerics.integrators.clock import STATES, Clock, ClockCounts, ClockReals
 from flyball.numerics.integrators.tableaux import tableau
 from tests.mechanisms import four_bar
 
@@ -26,7 +26,7 @@ def perform(c, y, task, rows=1, width=1, rates=None):
     Y, out = np.zeros((STATES, len(y))), np.zeros((rows, width))
     Y[0] = y
     none = np.zeros(0, np.int64)
-    clock = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), Y, K, none, np.zeros((ROWS, 0)))
+    clock = Clock(ClockReals.blank(), ClockCounts.blank(), np.zeros(0), Y, K, none, np.zeros((ROWS, 0)))
     if task == SLOPES:
         out[:, DIRECTIONS] = 6.0
     motion_kernel(c.system, c.work, tableau("rk45"), clock, out, task)
@@ -51,10 +51,10 @@ def off_the_constraints(tree):
 def test_baumgarte_restores_violated_rows(tree):
     """Baumgarte 1972: d2g/dt2 + 2 alpha dg/dt + beta^2 g = 0, so G vdot differs by the last two terms."""
     c, q, v = off_the_constraints(tree)
-    c.work.options.alpha[0], c.work.options.beta[0], c.work.options.solve_tolerance[0] = 5.0, 7.0, 1e-13
+    c.work.options.alpha, c.work.options.beta, c.work.options.solve_tolerance = 5.0, 7.0, 1e-13
     found = []
     for choice in (NONE, BAUMGARTE):
-        c.work.options.stabilization[0] = choice
+        c.work.options.stabilization = choice
         status, dy = evaluate(c.system, c.work, 0.3, np.r_[q, v, c.z], MOTION)
         assert status == 0
         found.append(c.jacobian() @ dy[len(q) : len(q) + len(v)])
@@ -67,7 +67,7 @@ def test_baumgarte_restores_violated_rows(tree):
 def test_an_error_keeps_only_what_the_rows_allow(tree):
     """G e = 0 of what is left of an error, which what the rows allow is not taken from."""
     c, q, v = off_the_constraints(tree)
-    c.work.options.stabilization[0], c.work.options.solve_tolerance[0] = STEPS, 1e-13
+    c.work.options.stabilization, c.work.options.solve_tolerance = STEPS, 1e-13
     y = np.r_[q, v, c.z]
     evaluate(c.system, c.work, 0.3, y, MOTION)
     error = np.random.default_rng(4).normal(size=len(y))

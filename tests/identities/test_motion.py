@@ -47,10 +47,10 @@ def ready(name, stabilize):
     y = np.r_[q, v, c.z]
     y[: len(q) + len(v)] += 1e-5 * np.sin(np.arange(len(q) + len(v)))
     (
-        c.work.options.stabilization[0],
-        c.work.options.position_tolerance[0],
-        c.work.options.velocity_tolerance[0],
-        c.work.options.solve_tolerance[0],
+        c.work.options.stabilization,
+        c.work.options.position_tolerance,
+        c.work.options.velocity_tolerance,
+        c.work.options.solve_tolerance,
     ) = stabilize, 1e-12, 1e-11, 1e-13
     return c, y
 
@@ -100,11 +100,11 @@ def fixed_steps(monkeypatch, h, method):
 
     def clock(start, *args):
         made = original(start, *args)
-        made.real[explicit.RTOL] = made.real[explicit.ATOL] = 1e6
-        made.real[explicit.H] = made.real[explicit.H_MAX] = h
+        made.real.rtol = made.real.atol = 1e6
+        made.real.h = made.real.h_max = h
         (
-            start.assembly.compiled.work.options.position_tolerance[0],
-            start.assembly.compiled.work.options.velocity_tolerance[0],
+            start.assembly.compiled.work.options.position_tolerance,
+            start.assembly.compiled.work.options.velocity_tolerance,
         ) = 1e-13, 1e-12
         return made
 
@@ -170,7 +170,7 @@ def one_step_a_call(monkeypatch):
 
     def clock(*args):
         made = original(*args)
-        made.count[explicit.QUOTA] = 1
+        made.count.quota = 1
         return made
 
     monkeypatch.setattr(simulate, "clock_for", clock)

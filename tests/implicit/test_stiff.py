@@ -20,9 +20,9 @@ def bushing(damping, *more):
 
 
 def clock_at(start):
-    real, y = np.zeros(ex.REALS), np.zeros((ex.STATES, len(start.y)))
+    real, y = ex.ClockReals.blank(), np.zeros((ex.STATES, len(start.y)))
     y[ex.NOW] = start.y
-    return ex.Clock(real, np.zeros(ex.COUNTS, np.int64), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, int))
+    return ex.Clock(real, ex.ClockCounts.blank(), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, int))
 
 
 @pytest.mark.parametrize("damping", [0.0, 10.0, 50.0, 1000.0])

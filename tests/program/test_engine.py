@@ -10,7 +10,7 @@ from flyball.compiler.formulas import call, formula
 from flyball.compiler.kernels import BoundKernel, kernel
 from flyball.equations.engine import ARRIVE, MOTION, REPORT, RESIDUAL, engine, motion_kernel
 from flyball.equations.tasks import Sheet
-from flyball.numerics.integrators.clock import Clock, T
+from flyball.numerics.integrators.clock import Clock
 from flyball.numerics.integrators.tableaux import Tableau, tableau
 from flyball.tables.system import Bodies, System, Work
 from tests.layers import LAYERS
@@ -21,20 +21,20 @@ def classical(address, S, W, R, clock, sheet, h, steps):
     """Runge and Kutta's classical method (1901), of an engine that it knows by its address only."""
     y, n = clock.y, clock.y.shape[1]
     for _ in range(steps):
-        t = clock.real[T]
+        t = clock.real.t
         for i in range(n):
             y[1, i] = y[2, i] = y[0, i]
         for stage in range(4):
             call(address, S, W, R, clock, sheet, MOTION)
             w = h / 6.0 if stage == 0 or stage == 3 else h / 3.0
             part = h if stage == 2 else 0.5 * h
-            clock.real[T] = t + (0.0 if stage == 3 else part)
+            clock.real.t = t + (0.0 if stage == 3 else part)
             for i in range(n):
                 y[2, i] += w * clock.K[0, i]
                 y[0, i] = y[1, i] + part * clock.K[0, i]
         for i in range(n):
             y[0, i] = y[2, i]
-        clock.real[T] = t + h
+        clock.real.t = t + h
     return call(address, S, W, R, clock, sheet, ARRIVE)
 
 
@@ -108,7 +108,7 @@ def test_a_kernel_with_its_structures_bound_to_it():
     s, S, W, R, clock, sheet = desk(model, "absolute")
     bound = BoundKernel(engine, *map(StructBuffer, (S, W, R, clock, sheet)))
     for t in (0.0, 0.3):
-        clock.real[T] = t
+        clock.real.t = t
         clock.y[0, s.nq : s.nq + s.nv] *= 1.0 - t
         status = motion_kernel(S, W, R, clock, sheet.rows, MOTION)
         expected, lam = clock.K.copy(), W.rows.multiplier.copy()

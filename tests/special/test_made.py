@@ -63,14 +63,14 @@ def solved(x, S, rows, stabilize=STAGES):
     """Every state projected, its accelerations and multipliers; and the scratch after the last."""
     W, rows = work(x.structure, S), rows.copy()
     (
-        W.options.stabilization[0],
-        W.options.solve_tolerance[0],
-        W.options.position_tolerance[0],
-        W.options.velocity_tolerance[0],
+        W.options.stabilization,
+        W.options.solve_tolerance,
+        W.options.position_tolerance,
+        W.options.velocity_tolerance,
     ) = stabilize, 1e-13, 1e-12 * x.length, 1e-12
     ny = W.y.shape[1]
     clock = ex.Clock(
-        np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64), np.zeros(0), np.zeros((ex.STATES, ny)), np.zeros((1, ny)),
+        ex.ClockReals.blank(), ex.ClockCounts.blank(), np.zeros(0), np.zeros((ex.STATES, ny)), np.zeros((1, ny)),
         np.zeros(0, np.int64), np.zeros((ROWS, 0)),
     )  # fmt: skip
     status = motion_kernel(S, W, rk(), clock, rows, COMPLETE)

@@ -7,7 +7,7 @@ from flyball.analysis.motion.start import begin
 from flyball.contact.tables import GAP, NORMAL, POINT, Contacts, Movers
 from flyball.equations.engine import engine
 from flyball.numerics.cone.rooms import rooms, unfilled
-from flyball.stepping.joined import ANYHOW, BEGIN, FINISH, FREE, KEEP, MEAN, ROWS, START, STEP, VELOCITIES
+from flyball.stepping.joined import BEGIN, FINISH, FREE, KEEP, MEAN, ROWS, START, VELOCITIES
 from flyball.stepping.joints import joined
 
 
@@ -21,7 +21,7 @@ class Stepped:
         self.compiled = start.assembly.compiled
         self.structure = self.compiled.structure
         A = tables(start, self.names, 0, h, stops)
-        A.count[ANYHOW] = 1  # the loop's shorter steps are not here
+        A.count.anyhow = 1  # the loop's shorter steps are not here
         lines = 2 * len(A.line)
         self.A = A._replace(job=np.zeros((2 * contacts + lines, 3), np.int64))
         n, nv = len(self.names), A.wide.shape[1]
@@ -61,7 +61,7 @@ class Stepped:
 
     def step(self, times=1):
         for _ in range(times):
-            P, X, Y, h = self.P, self.X, self.Y, self.A.real[STEP]
+            P, X, Y, h = self.P, self.X, self.Y, self.A.real.step
             found = self.touching(self.M) if self.touching else []
             P.size[0] = n = len(found)
             for c, (a, b, point, normal, gap, mu) in enumerate(found):

@@ -5,7 +5,7 @@ import pytest
 
 import flyball as fb
 from flyball.compiler.buffers import StructBuffer
-from flyball.stepping.joined import EVALUATED, UNSETTLED, no_mechanism
+from flyball.stepping.joined import no_mechanism
 from tests.layers import LAYERS
 
 from .stepped import Stepped
@@ -102,8 +102,8 @@ def test_a_top_spins_several_radians_in_a_step(spin, coordinates):
     assert w[2] == pytest.approx(spin, rel=1e-9)
     assert np.linalg.norm(p) == pytest.approx(0.1, abs=1e-12)
     assert p[2] == pytest.approx(0.1 * c, abs=0.004)
-    assert top.A.count[UNSETTLED] == 0
-    assert top.A.count[EVALUATED] < 200 * 8
+    assert top.A.count.unsettled == 0
+    assert top.A.count.evaluated < 200 * 8
 
 
 def test_no_mechanism_has_the_types_of_all_others():

@@ -229,7 +229,7 @@ def _start(job: _Task, way: Way) -> Start:
         return job.base
     if not rows:
         raise AnalysisError("there are no constraint rows, so that there is nothing to couple")
-    if a.compiled.values.system.semidefinite[0] > 0.0:
+    if a.compiled.values.system.scales.semidefinite > 0.0:
         raise AnalysisError(
             "some body has no inertia about some axis, so that M has no inverse; the coupled matrix is factored in an "
             "order that needs one"
@@ -257,7 +257,7 @@ def _run(
     W = start.assembly.compiled.work
     for x in W.counts:
         x[0] = 0
-    W.options.position_violation[0] = W.options.velocity_violation[0] = 0.0
+    W.options.position_violation = W.options.velocity_violation = 0.0
     if o.stabilization == "partitioning":
         partition.choose(job.model, start)
     start.since = time.perf_counter()
@@ -289,7 +289,7 @@ def _row(job: _Task, name: str, starts: dict[str, Start], truth: Result | None) 
     f = Formulation(name, way.meaning, not why, why or "reached the end", result.t, g, gv, result.energy.balance)
     f.steps, f.rejected, f.result = result.health.steps, result.health.rejected, result
     f.evaluations, f.factorisations = result.health.evaluations, result.health.factorisations
-    f.exchanges = int(start.assembly.compiled.work.counts.exchanges[0])
+    f.exchanges = int(start.assembly.compiled.work.counts.exchanges)
     if truth is not None and not why:
         f.difference = _difference(job.base.assembly.compiled, truth, start.assembly.compiled, result)
     return f
@@ -357,7 +357,7 @@ def _costs(job: _Task, rows: list[Formulation], starts: Mapping[str, Start], tel
             clock, _, seconds, _ = _run(job, start, _choice(job, f.name), end)
             spent[f.name].append(seconds)
             counts = start.assembly.compiled.work.counts
-            f.steps, f.rejected = int(clock.count[ex.ACCEPTED]), int(clock.count[ex.REJECTED])
+            f.steps, f.rejected = int(clock.count.accepted), int(clock.count.rejected)
             f.evaluations, f.factorisations = int(counts.evaluations[0]), int(counts.factorisations[0])
             f.exchanges = int(counts.exchanges[0])
             f.cpu = float(np.median(spent[f.name]))

@@ -71,7 +71,7 @@ class Compiled:
         if self.system.const.dtype.kind in "fc":
             return self.scratch.fields  # type: ignore[no-any-return]
         w = work(self.structure, self.system)
-        w.options.stabilization[0], w.options.solve_tolerance[0] = NONE, 1e-13
+        w.options.stabilization, w.options.solve_tolerance = NONE, 1e-13
         return w
 
     @cached_property

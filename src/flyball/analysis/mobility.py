@@ -103,7 +103,7 @@ def mobility(
     G, size, scale = scaled_jacobian(c, few(c))
     nr, nv = (int(n) for n in G.shape)
     rank, dependent, motions = null_spaces(G)
-    if inertia and S.semidefinite[0] > 0.0:
+    if inertia and S.scales.semidefinite > 0.0:
         check_inertia(model, a, massless(a, G, scale) if motions is None else motions * scale[:, None])
     names: list[str] = []
     for k in np.flatnonzero(np.abs(dependent).max(axis=1, initial=0.0) > 1e-6).tolist():

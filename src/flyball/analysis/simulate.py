@@ -229,17 +229,17 @@ def clock_for(
     a, y = start.assembly, start.y
     refuse_unheld(len(times), width(a))
     s, array = a.compiled.structure, a.compiled.array
-    real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
-    real[ex.T], real[ex.T_END], real[ex.RTOL] = t, t_end, o.rtol
+    real, count = ex.ClockReals.blank(), ex.ClockCounts.blank()
+    real.t, real.t_end, real.rtol = t, t_end, o.rtol
     first = t if start.part.first is None else start.part.first
-    real[ex.SPAN] = (t_end - first) or 1.0
-    real[ex.STEP] = o.step or 0.0
-    real[ex.H] = o.step or start.carried.get("width", 0.0)
-    real[ex.H_MAX] = min(o.step or o.max_step, t_end - t)
-    real[ex.LARGEST] = max(abs(t), abs(t_end))
-    count[ex.QUOTA] = 50
-    count[ex.LIMIT] = o.max_steps
-    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv + len(s.controls) - len(s.sampled), s.nq
+    real.span = (t_end - first) or 1.0
+    real.step = o.step or 0.0
+    real.h = o.step or start.carried.get("width", 0.0)
+    real.h_max = min(o.step or o.max_step, t_end - t)
+    real.largest = max(abs(t), abs(t_end))
+    count.quota = 50
+    count.limit = o.max_steps
+    count.controlled, count.positions = s.nq + s.nv + len(s.controls) - len(s.sampled), s.nq
     Y = np.zeros((ex.STATES, len(y)))
     Y[0] = y
     array("options.stabilization")[0] = STABILIZATION[o.stabilization]
@@ -257,9 +257,9 @@ def clock_for(
 def size(clock: ex.Clock, base: Assembly, c: Compiled, atol: float) -> None:
     """Write what follows from a mechanism's length and weight: tolerances, and what they are compared with."""
     real = clock.real
-    energy = energy_size(base, float(real[ex.SPAN]))
-    found = sizes(c.values.length, atol, real[ex.RTOL], energy)
-    (real[ex.ATOL], real[ex.SCALE], real[ex.LEDGER]), (near, slow) = found
+    energy = energy_size(base, float(real.span))
+    found = sizes(c.values.length, atol, real.rtol, energy)
+    (real.atol, real.scale, real.ledger), (near, slow) = found
     c.array("options.position_tolerance")[0], c.array("options.velocity_tolerance")[0] = near, slow
 
 
@@ -319,29 +319,29 @@ def run_clock(
     s, wide = c.structure, width(a)
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // wide + 1)), wide))
     rows = []
-    first = clock.real[ex.T]
-    span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
+    first = clock.real.t
+    span, reached = clock.real.t_end - first or 1.0, 0.0
     bound, on = None, (c.system, c.scratch)
     forget(c.array("stack"))
     engine.begin(clock)
-    quota = engine.limited(clock, float(clock.count[ex.QUOTA]))
+    quota = engine.limited(clock, float(clock.count.quota))
     if pace is not None:
         quota = pace.limited(clock, quota)
     try:
         while True:
-            begin, clock.count[ex.QUOTA] = time.perf_counter(), part.most(quota)
-            before = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
+            begin, clock.count.quota = time.perf_counter(), part.most(quota)
+            before = clock.count.accepted + clock.count.rejected
             with interrupts_kept(s.functions):
                 if bound is None or c.system is not on[0] or c.scratch is not on[1]:  # made code came, or went
                     bound, on = c.bound(method, clock, buffer), (c.system, c.scratch)
                 used = bound(task)
                 rows.append(buffer[:used].copy())
-            reached = max(reached, (clock.real[ex.T] - first) / span)
+            reached = max(reached, (clock.real.t - first) / span)
             tell(reached)
-            if clock.count[ex.STATUS] != ex.RUNNING and not engine.hands_over(clock):
+            if clock.count.status != ex.RUNNING and not engine.hands_over(clock):
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin
-            done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before
+            done = clock.count.accepted + clock.count.rejected - before
             part.took(done)
             engine.choose_again(clock)
             if part.over(clock if task == INTEGRATE else None):  # of what is followed every step is one

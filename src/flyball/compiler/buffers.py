@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .by_address import make_ready
-from .layout import DATA, DIMENSION, HEAD, Array, CodeTables, Struct, struct
+from .layout import DATA, DIMENSION, HEAD, Array, CodeTables, RecordLayout, Struct, struct
 
 EVEN = 64  # bytes at whose multiples arrays begin in a block
 _ORDER = 0x1 | 0x100  # flags of an array: C order, aligned
@@ -37,7 +37,7 @@ def _is_complex(fields: Any, plain: Struct) -> bool:
     twin = struct(plain.of, True)
     for x, (_, a), (_, b) in zip(fields, plain.fields, twin.fields, strict=True):
         if a != b:
-            return x.dtype.kind == "c" if isinstance(a, Array) else _is_complex(x, a)
+            return _is_complex(x, a) if isinstance(a, Struct) else x.dtype.kind == "c"
     return False
 
 
@@ -102,7 +102,7 @@ def _describe_one(x: Any, of: Any, name: str, layout: Struct, known: dict[int, S
         _describe(x, of, known, words)
 
 
-def described(x: np.ndarray, of: Array, name: str) -> tuple[int, ...]:
+def described(x: np.ndarray, of: Array | RecordLayout, name: str) -> tuple[int, ...]:
     """The words that describe an array.
 
     Raises
@@ -110,6 +110,7 @@ def described(x: np.ndarray, of: Array, name: str) -> tuple[int, ...]:
     TypeError
         If it is not of that type.
     """
+    of = of.array if isinstance(of, RecordLayout) else of
     if x.ndim != of.ndim or x.dtype != of.dtype or x.flags.num & _ORDER != _ORDER:
         raise TypeError(
             f"{name}: an array of {np.dtype(of.dtype)} with {of.ndim} dimensions and without gaps is needed, got "
@@ -218,7 +219,7 @@ class StructPool:
                 made.append(x)
             else:
                 shape, dtype, begin = next(laid)
-                made.append(np.ndarray(shape, dtype, block, begin))
+                made.append(np.ndarray(shape, dtype, block, begin).view(type(x)))
         return type(fields)(*made)
 
 

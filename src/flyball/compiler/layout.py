@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from functools import cache
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -53,6 +53,53 @@ class CodeTables(Array):
     """The same of addresses of code tables, which are made ready before a kernel is given the array."""
 
 
+class RecordLayout(NamedTuple):
+    """An array of one dimension whose entries have names."""
+
+    array: Array
+    of: type[Record]
+
+    @property
+    def size(self) -> int:
+        """Bytes of its description."""
+        return self.array.size
+
+    def __str__(self) -> str:
+        return f"{self.of.__name__}({','.join(self.of.names)}):{self.array}"
+
+
+class Record(np.ndarray):
+    """Numbers of one type with names, in one array: ``class Tolerances(Record, kind="Float"): position: float``.
+
+    ``x.position`` is an entry, also in compiled code; a structure has the class as the annotation of a field.
+    """
+
+    names: ClassVar[tuple[str, ...]] = ()
+    kind: ClassVar[str]
+
+    def __init_subclass__(cls, kind: str) -> None:
+        cls.names, cls.kind = tuple(cls.__annotations__), kind
+        for k, name in enumerate(cls.names):
+            if hasattr(np.ndarray, name):
+                raise TypeError(f"{cls.__name__}: arrays have an attribute {name!r}; take another name")
+            setattr(cls, name, _entry(k))
+
+    @classmethod
+    def blank(cls, dtype: Any = None) -> Any:
+        """All of them 0."""
+        return np.zeros(len(cls.names), dtype or {"Int": np.int64}.get(cls.kind, float)).view(cls)
+
+
+def _entry(k: int) -> property:
+    def get(self: Record) -> Any:
+        return self[k]
+
+    def put(self: Record, value: Any) -> None:
+        self[k] = value
+
+    return property(get, put)
+
+
 class Struct(NamedTuple):
     """A named tuple of arrays and of structures."""
 
@@ -74,7 +121,7 @@ class Struct(NamedTuple):
             at += x.size
         raise AttributeError(f"{self.of.__name__} has no field {name!r}")
 
-    def arrays(self) -> Iterator[Array]:
+    def arrays(self) -> Iterator[Array | RecordLayout]:
         """The arrays of it and of structures in it."""
         for _, x in self.fields:
             yield from x.arrays() if isinstance(x, Struct) else (x,)
@@ -135,6 +182,8 @@ def _of(text: Any, scope: dict[str, Any], is_complex: bool) -> Any:
     if kind in _TYPES and ndim.isdigit():
         return (CodeTables if kind == "CodeTables" else Array)(_TYPES[kind], int(ndim))
     made = scope[text]
+    if isinstance(made, type) and issubclass(made, Record):
+        return RecordLayout(_of(f"{made.kind}1", scope, is_complex), made)
     if hasattr(made, "__metadata__"):  # Annotated[System, COMPLEX]
         return struct(made.__origin__, COMPLEX in made.__metadata__)
     return struct(made, is_complex)

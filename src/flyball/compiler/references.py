@@ -14,12 +14,12 @@ from collections.abc import Iterator
 from typing import Any
 
 from .formulas import FIRST_ADDRESS, KERNELS, by_address, call, call_bound, formula_at, has_formula
-from .layout import DATA, HEAD, Array, Struct, struct
+from .layout import DATA, HEAD, Array, RecordLayout, Struct, struct
 
 _MADE: dict[str, Any] = {}
 
 
-def reference(layout: Struct | Array) -> Any:
+def reference(layout: Struct | Array | RecordLayout) -> Any:
     """Numba's type of a structure or of an array that a kernel takes by address."""
     return _MADE["structure" if isinstance(layout, Struct) else "array"](layout)
 
@@ -178,7 +178,7 @@ def _arrays(types: Any) -> None:
     """References to arrays, and what formulas do with them."""
     from numba.core.datamodel import models
     from numba.core.extending import lower_builtin, lower_cast, register_model
-    from numba.core.imputils import lower_getattr
+    from numba.core.imputils import lower_getattr, lower_getattr_generic, lower_setattr_generic
     from numba.core.typeconv import Conversion
     from numba.core.typing.templates import (
         AbstractTemplate,
@@ -194,11 +194,13 @@ def _arrays(types: Any) -> None:
     class Reference(types.Type):
         """An array by the address of its description."""
 
-        def __init__(self, layout: Array) -> None:
-            self.layout = layout
+        def __init__(self, named: Array | RecordLayout) -> None:
+            layout = named.array if isinstance(named, RecordLayout) else named
+            self.names = named.of.names if isinstance(named, RecordLayout) else ()
+            self.layout = named
             self.array = types.Array(from_dtype(dtype(layout.dtype)), layout.ndim, "C")
             self.dtype, self.ndim = self.array.dtype, layout.ndim
-            super().__init__(name=f"Array_{layout}")
+            super().__init__(name=f"Array_{named}")
 
         def can_convert_to(self, typingctx: Any, other: Any) -> Any:
             return Conversion.safe if other == self.array else None
@@ -228,6 +230,9 @@ def _arrays(types: Any) -> None:
 
         def resolve_shape(self, typ: Any) -> Any:
             return types.UniTuple(types.intp, typ.array.ndim)
+
+        def generic_resolve(self, typ: Any, attr: str) -> Any:  # type: ignore[override]
+            return typ.dtype if attr in typ.names else None
 
     def by_numba(context: Any, builder: Any, sig: Any, place: _Place, args: Any, what: Any) -> Any:
         own = signature(sig.return_type, place.array, *sig.args[1:])
@@ -261,6 +266,19 @@ def _arrays(types: Any) -> None:
 
         place = _Place(context, builder, typ, value)
         return cgutils.pack_array(builder, [place.shape(k) for k in range(typ.ndim)])
+
+    @lower_getattr_generic(Reference)
+    def entry(context: Any, builder: Any, typ: Any, value: Any, name: str) -> Any:
+        place = _Place(context, builder, typ, value)
+        at = place.element([context.get_constant(types.intp, typ.names.index(name))])
+        return load_item(context, builder, typ.array, at)
+
+    @lower_setattr_generic(Reference)
+    def set_entry(context: Any, builder: Any, sig: Any, args: Any, name: str) -> Any:
+        typ, of = sig.args
+        place = _Place(context, builder, typ, args[0])
+        at = place.element([context.get_constant(types.intp, typ.names.index(name))])
+        store_item(context, builder, typ.array, context.cast(builder, args[1], of, typ.dtype), at)
 
     @lower_cast(Reference, types.Array)
     def whole(context: Any, builder: Any, of: Any, to: Any, value: Any) -> Any:

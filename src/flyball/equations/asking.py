@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from ..compiler.formulas import call, call_bound, formula
-from ..numerics.integrators.clock import GROW, NEXT, SPAN, H, T
 from .tasks import ARRIVE, INSPECT, REPORT, TANGENT
 
 ENGINE, S_, W_, R_, OWN, SHEET, GROUP = range(7)
@@ -27,7 +26,7 @@ def steps(own, A, K, R, c, task):
 @formula
 def put(own, t, y):
     """Lay a time and a state on the engine's desk."""
-    own.real[T] = t
+    own.real.t = t
     for i in range(y.shape[0]):
         own.y[0, i] = y[i]
 
@@ -49,7 +48,7 @@ def arrive(t, y, dy, A, K):
 def tangent(y, e, A, K):
     """Take from an error what the projection takes."""
     own = A[OWN]
-    put(own, own.real[T], y)
+    put(own, own.real.t, y)
     for i in range(e.shape[0]):
         own.K[0, i] = e[i]
     through(A, TANGENT)
@@ -63,10 +62,10 @@ def inspect(t, h, span, first, seen, A, K):
     if seen.shape[1] == 0:
         return 0, 0.0, 0.0
     own = A[OWN]
-    own.real[T], own.real[H], own.real[SPAN] = t, h, span
-    own.count[NEXT] = first
+    own.real.t, own.real.h, own.real.span = t, h, span
+    own.count.next = first
     through(A, INSPECT)
-    return own.count[NEXT], own.real[H], own.real[GROW]
+    return own.count.next, own.real.h, own.real.grow
 
 
 @formula

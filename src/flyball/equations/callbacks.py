@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ..compiler.formulas import formula
 from ..compiler.layout import Int1
-from ..numerics.integrators.clock import Clock, T
+from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watching import Watch
 from ..tables.system import G_SHARED
@@ -50,7 +50,7 @@ def meet(A, K, j):
     for i in range(last + 1):
         K.met_g[j, i] = A[SHEET].rows[0, i]
     if S.guards.kind[last] == G_SHARED:
-        guard_of_group(S, A[W_], A[OWN].real[T], A[GROUP], K, -1 - j)
+        guard_of_group(S, A[W_], A[OWN].real.t, A[GROUP], K, -1 - j)
     for k in range(K.stages.shape[0]):
         if K.stages[k] == K.met[j]:
             levels(A, K, 1 + k)

@@ -11,7 +11,7 @@ import numpy as np
 from ..compiler.formulas import call, formula
 from ..compiler.kernels import kernel
 from ..compiler.layout import Float1, Float2, Float3
-from ..numerics.integrators.clock import COUNTS, REALS, Clock, T
+from ..numerics.integrators.clock import Clock, ClockCounts, ClockReals
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.ldl import ldl_factor
 from ..numerics.weakest import strongest, weakest
@@ -55,7 +55,7 @@ def each(address, S, W, R, clock, sheet, states, scale, block, kept, out):
     """See `dependencies_kernel`."""
     last = block.shape[0] - 2
     for n in range(states.shape[0]):
-        clock.real[T] = states[n, 0]
+        clock.real.t = states[n, 0]
         for i in range(clock.y.shape[1]):
             if states[n, 1 + i] == states[n, 1 + i]:  # what is not told goes on from the state before
                 clock.y[0, i] = states[n, 1 + i]
@@ -118,8 +118,8 @@ def dependencies(
     """
     n, nr = len(states), len(S.rows.law)
     ny = states.shape[1] - 1
-    real, y = np.zeros(REALS), np.zeros((1, ny))
-    clock = Clock(real, np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, ny)), np.zeros(0, np.int64))
+    real, y = ClockReals.blank(), np.zeros((1, ny))
+    clock = Clock(real, ClockCounts.blank(), np.zeros(0), y, np.zeros((1, ny)), np.zeros(0, np.int64))
     block = np.random.default_rng(0).standard_normal((count + 2, nr))
     kept, out = np.zeros((n, nr, count)), np.zeros((n, 3))
     sheet, R = Sheet(np.zeros((0, 0))), tableau("rk45")

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..compiler.formulas import formula
 from ..compiler.kernels import kernel
-from ..numerics.integrators.clock import COUNTS, GROW, NEXT, REALS, SPAN, STATES, Clock, H, T
+from ..numerics.integrators.clock import STATES, Clock, ClockCounts, ClockReals
 from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
@@ -45,11 +45,11 @@ from .within import ROWS, inspect
 @formula
 def perform(S, W, R, clock, out, task):
     """One task; see `motion_kernel`. A formula, so that callees have one caller's flags and are compiled once."""
-    t = clock.real[T]
+    t = clock.real.t
     y = clock.y[0]
     choose_code(S, W, task)
     if task == POSITION:
-        nq = S.coordinates[0]
+        nq = S.sizes.coordinates
         z = y[nq + W.velocities.solved.shape[0] :]
         place(S, W, t, y[:nq], z)
         move(S, W, t, y[nq : nq + W.velocities.solved.shape[0]], z)
@@ -94,8 +94,8 @@ def perform(S, W, R, clock, out, task):
         tangent(y, clock.K[0], S, W)
         return 0
     if task == INSPECT:
-        at = inspect(t, clock.real[H], clock.real[SPAN], clock.count[NEXT], clock.seen, S, W)
-        clock.count[NEXT], clock.real[H], clock.real[GROW] = at
+        at = inspect(t, clock.real.h, clock.real.span, clock.count.next, clock.seen, S, W)
+        clock.count.next, clock.real.h, clock.real.grow = at
         return 0
     if task == SLOPES:
         slopes(S, W, t, out)
@@ -150,12 +150,12 @@ def evaluate(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[in
 
     With POSITION the turns and places in ``y`` are brought up to date.
     """
-    real = np.zeros(REALS)
-    real[T] = t
+    real = ClockReals.blank()
+    real.t = t
     Y = np.zeros((STATES, len(y)))
     Y[0] = y
     none = np.zeros(0, np.int64)
-    clock = Clock(real, np.zeros(COUNTS, np.int64), np.zeros(0), Y, np.zeros((1, len(y))), none, np.zeros((ROWS, 0)))
+    clock = Clock(real, ClockCounts.blank(), np.zeros(0), Y, np.zeros((1, len(y))), none, np.zeros((ROWS, 0)))
     status = motion_kernel(S, W, tableau("rk45"), clock, np.zeros((0, 0)), task)
     y[:] = Y[0]
     return status, clock.K[0]

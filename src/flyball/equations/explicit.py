@@ -10,7 +10,6 @@ from ..compiler.kernels import BoundKernel, kernel
 from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import TRY
 from ..numerics.integrators.tableaux import Tableau
-from ..numerics.integrators.watching import STAGE
 from ..tables.system import System, Work
 from .asking import OWN, arrive, inspect, put, tangent, through
 from .callbacks import Going, Own, meet
@@ -22,10 +21,10 @@ def derivative(t, y, dy, A, K):
     """The right-hand side; guards and what they depend on are kept at the stages chosen for it."""
     own = A[OWN]
     put(own, t, y)
-    K.count[STAGE] += 1
+    K.count.stage += 1
     met = -1
     for j in range(K.met.shape[0]):
-        if K.met[j] == K.count[STAGE]:
+        if K.met[j] == K.count.stage:
             met = j
     status = through(A, WATCH if met >= 0 else MOTION)
     if status == 0:
@@ -40,7 +39,7 @@ def derivative(t, y, dy, A, K):
 def perform(S, W, R, own, going, task):
     """`explicit.answer`, asked of the engine."""
     if task == TRY:
-        going.watch.count[STAGE] = 0
+        going.watch.count.stage = 0
     A = (own.doors[0], S, W, R, own.clock, own.sheet, going.group)
     return answer((derivative, arrive, tangent, inspect), A, going.watch, R, going.clock, task)
 

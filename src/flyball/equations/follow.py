@@ -12,30 +12,16 @@ from ..laws.evaluation import evaluate_jet
 from ..laws.manner import entire
 from ..math.scalar import atan2, cos, magnitude, sin
 from ..numerics.integrators.clock import (
-    ACCEPTED,
     DONE,
-    GROW,
-    H_MAX,
-    LARGEST,
-    LIMIT,
-    NEXT,
-    QUOTA,
-    REJECTED,
     RUNNING,
-    STARTED,
-    STATUS,
     STUCK,
-    T_END,
     TOO_MANY,
-    H,
-    T,
 )
 from ..tables.system import REVOLUTE
 from .motion import arrive, write_row
 from .rows import BY_TIME
 from .tree import retract
 
-SHARE = GROW  # entry of the clock's: part of the way to the next output time that a step is
 ALL_BUT = 1.0 - 1e-6
 EVEN = 1e-6  # part of its change by which the change of a law may differ from that of its derivatives
 NEAR, SHARP = 1e-10, 10.0  # a law that leaps changes over this part of the time span by more than this times its slope
@@ -50,50 +36,50 @@ def follow(S, W, c, out):
     ``c`` is the clock of the integrators; rows 0 and 1 of ``c.K`` hold derivatives now and at the step before.
     """
     used = 0
-    c.count[STATUS] = RUNNING
-    if c.count[STARTED] == 0:
-        status, _ = arrive(c.real[T], c.y[0], c.K[0], S, W)
+    c.count.status = RUNNING
+    if c.count.started == 0:
+        status, _ = arrive(c.real.t, c.y[0], c.K[0], S, W)
         if status != 0:
-            c.count[STATUS] = STUCK
+            c.count.status = STUCK
             return used
         write(c, out[used], S, W)
         used += 1
-        c.count[STARTED] = 1
-        c.real[H] = 0.0
-        c.real[SHARE] = 1.0
-        while c.count[NEXT] < c.times.shape[0] and c.times[c.count[NEXT]] <= c.real[T]:
-            c.count[NEXT] += 1
+        c.count.started = 1
+        c.real.h = 0.0
+        c.real.grow = 1.0
+        while c.count.next < c.times.shape[0] and c.times[c.count.next] <= c.real.t:
+            c.count.next += 1
     steps = 0
-    while c.real[T] < c.real[T_END]:
-        if used == out.shape[0] or steps >= c.count[QUOTA]:
+    while c.real.t < c.real.t_end:
+        if used == out.shape[0] or steps >= c.count.quota:
             return used
-        if c.count[ACCEPTED] + c.count[REJECTED] >= c.count[LIMIT]:
-            c.count[STATUS] = TOO_MANY
+        if c.count.accepted + c.count.rejected >= c.count.limit:
+            c.count.status = TOO_MANY
             return used
-        goal = c.times[c.count[NEXT]] if c.count[NEXT] < c.times.shape[0] else c.real[T_END]
-        left = goal - c.real[T]
-        h = c.real[SHARE] * min(left, c.real[H_MAX])
+        goal = c.times[c.count.next] if c.count.next < c.times.shape[0] else c.real.t_end
+        left = goal - c.real.t
+        h = c.real.grow * min(left, c.real.h_max)
         lands = h > ALL_BUT * left  # no sliver is left over for the next step
         if lands:
             h = left
-        if h < 1e-14 * max(abs(c.real[T]), c.real[LARGEST]):
-            c.count[STATUS] = STUCK
+        if h < 1e-14 * max(abs(c.real.t), c.real.largest):
+            c.count.status = STUCK
             return used
-        t = goal if lands else c.real[T] + h
+        t = goal if lands else c.real.t + h
         predict(S, c, h)
         status, found = arrive(t, c.y[1], c.K[2], S, W)
         steps += 1
-        if status != 0 or not found <= FAR_OFF or broken(S, W, c.real[T], h, c.real[LARGEST]):
-            c.count[REJECTED] += 1
-            c.real[SHARE] *= 0.5
+        if status != 0 or not found <= FAR_OFF or broken(S, W, c.real.t, h, c.real.largest):
+            c.count.rejected += 1
+            c.real.grow *= 0.5
             continue
         accept(c, t, h)
         write(c, out[used], S, W)
         used += 1
         if t >= goal:
-            c.count[NEXT] += 1
-        c.real[SHARE] = min(1.0, 2.0 * c.real[SHARE])
-    c.count[STATUS] = DONE
+            c.count.next += 1
+        c.real.grow = min(1.0, 2.0 * c.real.grow)
+    c.count.status = DONE
     return used
 
 
@@ -123,7 +109,7 @@ def leaps(S, W, law, t, h, span, turns):
     _, vm, am = evaluate_jet(S.code, S.const, law, W.stack, t + 0.5 * h, W.sensed, BY_TIME)
     f1, v1, a1 = evaluate_jet(S.code, S.const, law, W.stack, t + h, W.sensed, BY_TIME)
     way = f1 - f0 - h / 30.0 * (7.0 * v0 + 16.0 * vm + 7.0 * v1) - h * h / 60.0 * (a0 - a1)
-    size = S.length[0]
+    size = S.scales.length
     if turns:
         way = atan2(sin(way), cos(way))
         size = 0.0 * size + 1.0
@@ -138,9 +124,9 @@ def leaps(S, W, law, t, h, span, turns):
 @formula
 def predict(S, c, h):
     """State after h into c.y[1]: velocities by the cubic that fits the last two, positions by its integral."""
-    nq = S.coordinates[0]
+    nq = S.sizes.coordinates
     y, new, now, before = c.y[0], c.y[1], c.K[0], c.K[1]
-    last = c.real[H]
+    last = c.real.h
     way = c.y[2]
     for i in range(y.shape[0]):
         new[i] = y[i]
@@ -175,7 +161,7 @@ def predict(S, c, h):
 @formula
 def write(c, out, S, W):
     """A row of the output at the present state, with powers for works."""
-    write_row(c.real[T], c.y[0], out, S, W)
+    write_row(c.real.t, c.y[0], out, S, W)
     for k in range(c.accounts.shape[0]):
         out[1 + c.accounts[k]] = c.K[0, c.accounts[k]]
 
@@ -188,6 +174,6 @@ def accept(c, t, h):
         c.K[3, i] = c.y[0, i]
         c.K[0, i] = c.K[2, i]
         c.y[0, i] = c.y[1, i]
-    c.real[H] = h
-    c.real[T] = t
-    c.count[ACCEPTED] += 1
+    c.real.h = h
+    c.real.t = t
+    c.count.accepted += 1

@@ -112,7 +112,7 @@ def returned(S, W):
         change = abs(new - W.sensed[LOAD, n]) / (small + abs(new) + abs(W.sensed[LOAD, n]))
         if not change <= worst:
             worst = change
-            W.counts.guilty_row[0] = k
+            W.counts.guilty_row = k
     return worst
 
 
@@ -143,12 +143,12 @@ def improve(S, W, attempt):
     """
     first, last = 2 * measured(S), loads_end(S, W)
     if attempt == tries(W):
-        W.counts.load_updates[0] = FORGOTTEN
+        W.counts.load_updates = FORGOTTEN
         for n in range(first, last):
             W.sensed[LOAD, n] = 0.0
         return
-    if W.counts.load_updates[0] == FORGOTTEN or (attempt == 0 and W.counts.load_updates[0] == 0):
-        W.counts.load_updates[0] = 0
+    if W.counts.load_updates == FORGOTTEN or (attempt == 0 and W.counts.load_updates == 0):
+        W.counts.load_updates = 0
         for n in range(first, last):
             for k in range(first, last):
                 W.sensed[INVERSE_JACOBIAN + n - first, k] = 1.0 if n == k else 0.0
@@ -157,10 +157,10 @@ def improve(S, W, attempt):
     for n in range(first, last):
         W.sensed[LOAD_BEFORE, n] = W.sensed[LOAD, n]
         W.sensed[GAP_BEFORE, n] = W.sensed[LOAD, n] - W.sensed[RETURNED, n]
-    if W.counts.load_updates[0] < last - first:
-        n = first + W.counts.load_updates[0]
+    if W.counts.load_updates < last - first:
+        n = first + W.counts.load_updates
         W.sensed[LOAD, n] -= TRIAL * W.sensed[GAP_BEFORE, n]
-        W.counts.load_updates[0] += 1
+        W.counts.load_updates += 1
         return
     for n in range(first, last):
         new = W.sensed[LOAD, n]
@@ -172,7 +172,7 @@ def improve(S, W, attempt):
 @formula
 def learnt(S, W):
     """Whether the slopes of all loads are known: until then the steps are small and tell nothing of convergence."""
-    return W.counts.load_updates[0] >= W.sensed.shape[0] - INVERSE_JACOBIAN
+    return W.counts.load_updates >= W.sensed.shape[0] - INVERSE_JACOBIAN
 
 
 @formula

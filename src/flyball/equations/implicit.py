@@ -14,9 +14,9 @@ from ..compiler.formulas import call, formula
 from ..compiler.kernels import kernel
 from ..compiler.layout import Float1, Int1, Int2
 from ..math.cayley import rate
-from ..numerics.integrators.clock import ASIDE, NOW, STARTED, TRIED, T
+from ..numerics.integrators.clock import ASIDE, NOW
 from ..numerics.integrators.implicit.asked import answer, rates_at_begin
-from ..numerics.integrators.implicit.desk import INDEX_3, JACOBIANS, SOFT, START, Desk
+from ..numerics.integrators.implicit.desk import START, Desk
 from ..numerics.integrators.implicit.radau import attempt, refuse
 from ..numerics.integrators.implicit.radau import enter as enter_radau
 from ..numerics.integrators.implicit.step import between as between_radau
@@ -82,7 +82,7 @@ class Means(NamedTuple):
 @formula
 def compose(y, d, v, z, out, A):
     """The state with positions an increment d from those of y, and velocities v."""
-    nq = A[S_].coordinates[0]
+    nq = A[S_].sizes.coordinates
     nv = v.shape[0]
     for i in range(nq):
         out[i] = y[i]
@@ -115,7 +115,7 @@ def missed(t, k, A, K, c):
     """
     S, W, P, own, rows = A[S_], A[W_], A[PLAN], A[OWN], A[SHEET].rows
     nv, nr = K.v.shape[1], K.lam.shape[1]
-    own.real[T] = t
+    own.real.t = t
     compose(c.y[NOW], K.d[k], K.v[k], K.z[k], own.y[0], A)
     for i in range(nv):
         rows[1, i] = K.a[k, i]
@@ -132,7 +132,7 @@ def missed(t, k, A, K, c):
         out[2 * nv + r] = rows[0, nv + nr + r]
         out[2 * nv + nr + r] = rows[0, nv + r] if P.valued[r] == 1 else K.mu[k, r]
         bad += rows[0, nv + r] - rows[0, nv + r]
-        if P.valued[r] == 1 and K.count[INDEX_3] == 1:
+        if P.valued[r] == 1 and K.count.index_3 == 1:
             out[2 * nv + r], out[2 * nv + nr + r] = rows[0, nv + r], K.mu[k, r]
         elif P.valued[r] == 1 and K.mu[k, r] != 0.0:
             for e in range(S.row_start[r], S.row_start[r + 1]):
@@ -187,14 +187,14 @@ def powers(A, K, k):
 def linearise(t, k, A, K, c):
     """The numbers of the Jacobian at stage k, or at the state at which the step begins. Returns a status."""
     S, W, P, own = A[S_], A[W_], A[PLAN], A[OWN]
-    own.real[T] = t
+    own.real.t = t
     compose(c.y[NOW], K.d[k], K.v[k], K.z[k], own.y[0], A)
     lay(own.y[0], k, A, A[MOVED], K)
     through(A, POSITION)
     rows_of(S, W, K, P, k)
     first, last = P.first[PICKED_MASS], P.first[ROWS]
     status = differentiate(A, A[MOVED], PARTS, P.pick, K.J[k, P.first[PICKED] : first])
-    if P.fixed[0] == 0 or K.count[JACOBIANS] == 0:
+    if P.fixed[0] == 0 or K.count.jacobians == 0:
         lay(own.y[0], k, A, A[PUSHED], K)
         status += differentiate(A, A[PUSHED], PUSHES, P.mass, K.J[k, first:last])
         for i in range(P.light.shape[0]):
@@ -229,7 +229,7 @@ def rows_of(S, W, K, P, k):
             J[P.first[ROWS_METRIC] + e] = -P.metric[S.column[e]] * g * P.valued[r]
             J[P.first[ROWS_HELD] + e] = g * P.valued[r]
         size = W.rows.diagonal[r]
-        J[P.first[SIZES] + r] = K.real[SOFT] * (size if size > 0.0 else 1.0)
+        J[P.first[SIZES] + r] = K.real.soft * (size if size > 0.0 else 1.0)
     for n in range(P.negative.shape[0]):
         J[P.first[END] + 1 + n] = -J[P.negative[n]]
 
@@ -237,7 +237,7 @@ def rows_of(S, W, K, P, k):
 @formula
 def lay(y, k, A, B, K):
     """Put stage k on a bench of the residuals, its state being y."""
-    B.t[0] = complex(A[OWN].real[T], 0.0)
+    B.t[0] = complex(A[OWN].real.t, 0.0)
     for i in range(B.state.shape[0]):
         B.state[i] = complex(y[i], 0.0)
     for i in range(K.v.shape[1]):
@@ -293,14 +293,14 @@ def arrive(t, y, dy, A, K):
 def land(t, y, dy, A, K):
     """`arrive`; at the end of a step guards are kept within it first."""
     own, c, watch = A[OWN], A[GOING].clock, A[GOING].watch
-    h, begin = c.real[TRIED], c.real[T]
+    h, begin = c.real.tried, c.real.t
     rates_at_begin(K, c)
-    for j in range(watch.met.shape[0] if watch.way.shape[0] > 0 and c.count[STARTED] == 1 else 0):
+    for j in range(watch.met.shape[0] if watch.way.shape[0] > 0 and c.count.started == 1 else 0):
         x = watch.met_at[j]
         z = c.y[ASIDE, : K.z.shape[1]]
         A[BETWEEN](K, x, h, K.d[START], K.a[START], z)
         compose(c.y[NOW], K.d[START], K.a[START], z, own.y[0], A)
-        own.real[T] = begin + x * h
+        own.real.t = begin + x * h
         if through(A, WATCH) != 0:
             return 1, 0.0
         meet(A, watch, j)

@@ -18,7 +18,7 @@ from ..compiler.layout import Float1, Float2, Int1
 from ..math.scalar import magnitude, sqrt
 from ..numerics.cone.dense.problem import ENDED, FOUND, NONE_FOUND, Dense
 from ..numerics.cone.dense.settle import settle
-from ..numerics.integrators.clock import Clock, T
+from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.tableaux import Tableau
 from ..tables.system import (
     BIAS,
@@ -280,7 +280,7 @@ def relaxed(S, W, t, B, P):
 @formula
 def look(S, W, y, B):
     """Value, rate, and rounding of the rate, of the quantities of B's switches, into ``now``, ``rate``, ``seen``."""
-    nq, most = S.coordinates[0], 0.0
+    nq, most = S.sizes.coordinates, 0.0
     for d in range(W.velocities.solved.shape[0]):
         most = max(most, magnitude(y[nq + d]))
     for i in range(B.which.shape[0]):
@@ -297,7 +297,7 @@ def look(S, W, y, B):
 def instant(S: System, W: Work, desk: Desk, B: Bench, P: Dense, task: int) -> int:
     """What is done at an instant, by its task: BARE, BALANCE, AGAIN (the problem from the states in it), LOOK."""
     if task == BALANCE:
-        balanced(S, W, desk.clock.real[T], B, P)
+        balanced(S, W, desk.clock.real.t, B, P)
         return P.info[ENDED]
     if task == AGAIN:
         settle(P)

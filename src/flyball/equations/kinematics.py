@@ -13,7 +13,7 @@ def poses(S, W, q):
     """Positions and rotations of all bodies, parents first, and of the frames on them."""
     for b in range(S.tree.parent.shape[0]):
         pose(S, W, b, q)
-    for k in range(S.ground_frames[0], S.moving_frames[0]):
+    for k in range(S.sizes.ground_frames, S.sizes.moving_frames):
         p, R, _, _, _, _ = carried(
             load(W.BK, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
         )
@@ -31,7 +31,7 @@ def motions(S, W, v):
 @formula
 def frame_motions(S, W):
     """Those of the frames, from their bodies'."""
-    for k in range(S.ground_frames[0], S.moving_frames[0]):
+    for k in range(S.sizes.ground_frames, S.sizes.moving_frames):
         _, _, w, u, alpha, a = carried(
             load(W.BK, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
         )
@@ -41,7 +41,7 @@ def frame_motions(S, W):
 @formula
 def frames(S, W):
     """Poses and motions of the frames in one pass."""
-    for k in range(S.ground_frames[0], S.moving_frames[0]):
+    for k in range(S.sizes.ground_frames, S.sizes.moving_frames):
         p, R, w, u, alpha, a = carried(
             load(W.BK, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
         )
@@ -52,7 +52,7 @@ def frames(S, W):
 @formula
 def ground_frames(S, W):
     """Records of the frames on ground, written once."""
-    for k in range(S.ground_frames[0]):
+    for k in range(S.sizes.ground_frames):
         p, R, w, v, alpha, a = at_rest(
             load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0), 0.0 * S.frames.position[k, 0]
         )

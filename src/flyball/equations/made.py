@@ -38,7 +38,7 @@ def run(address, S, W, t, a, b, c, d):  # type: ignore[no-untyped-def]
 def choose_code(S, W, task):
     """Say whether code made for the mechanism is in use for this task."""
     wanted = task == INTEGRATE or task == COMPLETE or task == FOLLOW
-    if W.options.stabilization[0] == PARTITIONING:
+    if W.options.stabilization == PARTITIONING:
         wanted = False
     W.made[SCRATCH] = 0
     for k in range(SCRATCH + 1, FLAT):

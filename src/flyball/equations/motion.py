@@ -62,11 +62,11 @@ def astray(S, W, t, q, v):
         if law >= 0:
             f, f1, _ = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
             way = f - S.bodies.offset[b] - q[S.tree.q[b]]
-            size = S.length[0]
+            size = S.scales.length
             if S.tree.joint[b] == REVOLUTE:  # its whole turns are the law's own
                 way = atan2(sin(way), cos(way))
                 size = 0.0 * size + 1.0
-            rate = magnitude(f1 - v[S.tree.v[b]]) / (size * S.rate[0] + magnitude(f1))
+            rate = magnitude(f1 - v[S.tree.v[b]]) / (size * S.scales.rate + magnitude(f1))
             worst = max(worst, magnitude(way) / size, rate)
     return worst
 
@@ -74,20 +74,20 @@ def astray(S, W, t, q, v):
 @formula
 def accelerate(S, W, t, p, dy, factored):
     """Dy at the settled state p, whose kinematics and rows are in W; vdot and lam are left in W. Returns a status."""
-    nq = S.coordinates[0]
+    nq = S.sizes.coordinates
     nv = W.velocities.solved.shape[0]
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
-    if W.options.stabilization[0] == BAUMGARTE:
-        a = 2.0 * W.options.alpha[0]
-        b = W.options.beta[0] * W.options.beta[0]
+    if W.options.stabilization == BAUMGARTE:
+        a = 2.0 * W.options.alpha
+        b = W.options.beta * W.options.beta
         for k in range(S.rows.law.shape[0]):
             W.rows.gamma[k] -= a * (row_times(S, W, k, v) - W.rows.nu[k]) + b * W.rows.value[k]
-    if W.options.partitioned[0] > 0.0:  # from here on with the masses
-        W.options.partitioned[0] = 0.0
+    if W.options.partitioned > 0.0:  # from here on with the masses
+        W.options.partitioned = 0.0
         factored = OLD
     if factored == NEAR:
-        if S.solver[0] == SCHUR:
+        if S.sizes.solver == SCHUR:
             reuse(S, W)
         else:
             factored = OLD  # M is another one here
@@ -97,7 +97,7 @@ def accelerate(S, W, t, p, dy, factored):
             return status
         if not bound(S, W) or settled(S, W, t, n):
             return finish(S, W, t, p, dy)
-    W.counts.status[0] = NOT_FINITE
+    W.counts.status = NOT_FINITE
     return NOT_FINITE
 
 
@@ -109,15 +109,15 @@ def balance(S, W, t, p, work, factored):
     # joints with friction need the solution to know their loads: again until these return themselves
     most = 2 * tries(W)
     for attempt in range(most):
-        control(S, W, t, p[S.coordinates[0] + W.velocities.solved.shape[0] :], work)
+        control(S, W, t, p[S.sizes.coordinates + W.velocities.solved.shape[0] :], work)
         loaded(S, W, t, p, work)
         if (
             factored == OLD
             or solve(S, W, W.velocities.applied, W.rows.gamma, x, W.rows.multiplier, True, REFINEMENTS)
-            > STALE * W.options.solve_tolerance[0]
+            > STALE * W.options.solve_tolerance
         ):
             if factor(S, W) != 0:
-                W.counts.status[0] = SINGULAR
+                W.counts.status = SINGULAR
                 return SINGULAR, factored
             factored = HERE
             solve(S, W, W.velocities.applied, W.rows.gamma, x, W.rows.multiplier, True, REFINEMENTS)
@@ -128,8 +128,8 @@ def balance(S, W, t, p, work, factored):
         if change <= CONVERGED or (change <= BLURRED and change > 0.5 * last and learnt(S, W)):
             break
         if attempt == most - 1:
-            W.counts.status[0] = JAMMED if finite(x) == 0 else NOT_FINITE
-            return W.counts.status[0], factored
+            W.counts.status = JAMMED if finite(x) == 0 else NOT_FINITE
+            return W.counts.status, factored
         improve(S, W, attempt)
     return 0, factored
 
@@ -149,14 +149,14 @@ def loaded(S, W, t, p, work):
 @formula
 def finish(S, W, t, p, dy):
     """Dy at the state p from the solution in W. Returns a status."""
-    nq = S.coordinates[0]
+    nq = S.sizes.coordinates
     nv = W.velocities.solved.shape[0]
     x = W.velocities.solved
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
     if W.made[FINISH] != 0:
-        W.counts.status[0] = 0 if run(W.made[FINISH], S, W, t, p, dy, x, W.rows.multiplier) == 0.0 else NOT_FINITE
-        return W.counts.status[0]
+        W.counts.status = 0 if run(W.made[FINISH], S, W, t, p, dy, x, W.rows.multiplier) == 0.0 else NOT_FINITE
+        return W.counts.status
     rates(S, p, v, dy)
     for d in range(nv):
         dy[nq + d] = x[d]
@@ -169,8 +169,8 @@ def finish(S, W, t, p, dy):
             work[S.tree.work[b]] = W.velocities.effort[d] * v[d]
     progress(S, W, p[nq + nv :], work)
     readings(S, W, t)
-    W.counts.status[0] = finite(dy)
-    return W.counts.status[0]
+    W.counts.status = finite(dy)
+    return W.counts.status
 
 
 @formula
@@ -181,7 +181,7 @@ def respond(S, W, f, gamma, x, lam):
     """
     for d in range(x.shape[0]):
         W.velocities.prescribed[d] = 0.0
-    if solve(S, W, f, gamma, x, lam, True, REFINEMENTS) > STALE * W.options.solve_tolerance[0] and factor(S, W) == 0:
+    if solve(S, W, f, gamma, x, lam, True, REFINEMENTS) > STALE * W.options.solve_tolerance and factor(S, W) == 0:
         solve(S, W, f, gamma, x, lam, True, REFINEMENTS)
 
 
@@ -197,7 +197,7 @@ def finite(dy):
 @formula
 def derivative(t, y, dy, S, W):
     """dy/dt = f(P(y)) with P the projection; ``y`` is left as it is. Returns 0 or a status."""
-    nq = S.coordinates[0]
+    nq = S.sizes.coordinates
     p = W.y[0]
     for i in range(y.shape[0]):
         p[i] = y[i]
@@ -206,10 +206,10 @@ def derivative(t, y, dy, S, W):
     z = p[nq + W.velocities.solved.shape[0] :]
     prepare(S, W, t, q, v)
     factored = OLD
-    if W.options.stabilization[0] >= STAGES:
-        status, _, factored = settle(S, W, t, q, v, z, W.options.position_tolerance[0], W.options.velocity_tolerance[0])
+    if W.options.stabilization >= STAGES:
+        status, _, factored = settle(S, W, t, q, v, z, W.options.position_tolerance, W.options.velocity_tolerance)
         if status != 0:
-            W.counts.status[0] = status
+            W.counts.status = status
             return status
     else:
         place(S, W, t, q, z)
@@ -220,7 +220,7 @@ def derivative(t, y, dy, S, W):
 @formula
 def arrive(t, y, dy, S, W):
     """Project the state y in place, to rounding, and evaluate there. Returns (0 or status, relative violation)."""
-    nq = S.coordinates[0]
+    nq = S.sizes.coordinates
     q = y[:nq]
     v = y[nq : nq + W.velocities.solved.shape[0]]
     z = y[nq + W.velocities.solved.shape[0] :]
@@ -231,20 +231,20 @@ def arrive(t, y, dy, S, W):
     if W.stack[fault, 0].real > 0.0:  # overcome: the step that met it was taken again, shorter
         W.stack[fault, 0] = -W.stack[fault, 0]
     prepare(S, W, t, q, v)
-    if W.options.stabilization[0] >= STEPS:
-        status, found, factored = settle(S, W, t, q, v, z, TIGHT_G * S.length[0], TIGHT_V)
+    if W.options.stabilization >= STEPS:
+        status, found, factored = settle(S, W, t, q, v, z, TIGHT_G * S.scales.length, TIGHT_V)
         if status != 0:
-            W.counts.status[0] = status
+            W.counts.status = status
             return status, found
-        found = max(0.0, found - rounding(S, W, q) / S.length[0])
-        if W.options.partitioned[0] > 0.0:
+        found = max(0.0, found - rounding(S, W, q) / S.scales.length)
+        if W.options.partitioned > 0.0:
             exchange(S, W)
     else:
         place(S, W, t, q, z)
         move(S, W, t, v, z)
         show_frames(S, W, q)
     remember(S, W, z)
-    if W.options.placed[0] > 0.0:
+    if W.options.placed > 0.0:
         return 0, max(found, astray_by)
     return accelerate(S, W, t, y, dy, factored), max(found, astray_by)
 
@@ -255,9 +255,9 @@ def report(t, y, out, S, W):
 
     Where accelerations are deferred vdot and lam stay open.
     """
-    W.options.placed[0] = W.options.deferred[0]
+    W.options.placed = W.options.deferred
     status, _ = arrive(t, y, W.y[1], S, W)
-    W.options.placed[0] = 0.0
+    W.options.placed = 0.0
     write_row(t, y, out, S, W)
     return status
 
@@ -265,13 +265,13 @@ def report(t, y, out, S, W):
 @formula
 def write_row(t, y, out, S, W):
     """Write t, the state y that W was last evaluated at, vdot, lam and the efforts of prescribed coordinates."""
-    nq = S.coordinates[0]
+    nq = S.sizes.coordinates
     nv = W.velocities.solved.shape[0]
     ny = y.shape[0]
     if S.rows.law.shape[0] > 0:
-        W.options.position_violation[0] = max(W.options.position_violation[0], violation(W, W.rows.scratch_2))
-        W.options.velocity_violation[0] = max(
-            W.options.velocity_violation[0], drift(S, W, y[nq : nq + nv], W.rows.scratch_2)[0]
+        W.options.position_violation = max(W.options.position_violation, violation(W, W.rows.scratch_2))
+        W.options.velocity_violation = max(
+            W.options.velocity_violation, drift(S, W, y[nq : nq + nv], W.rows.scratch_2)[0]
         )
     out[0] = t
     for i in range(ny):

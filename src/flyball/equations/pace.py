@@ -11,13 +11,13 @@ from .rows import measured
 @formula
 def own_speed(S):
     """The mechanism's length at its own rate [m/s]."""
-    return S.length[0] * S.rate[0]
+    return S.scales.length * S.scales.rate
 
 
 @formula
 def pace(S, m):
     """The same for quantity m, whose unit may be a radian."""
-    return S.units[m] * S.rate[0]
+    return S.units[m] * S.scales.rate
 
 
 @formula

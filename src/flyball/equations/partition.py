@@ -44,7 +44,7 @@ def exchange(S, W):
             return
         W.velocities.partition[out] = -W.velocities.partition[out]
         W.velocities.partition[taken] = -W.velocities.partition[taken]
-        W.counts.exchanges[0] += 1
+        W.counts.exchanges += 1
 
 
 @formula

@@ -34,7 +34,7 @@ FAR = 1e3  # a state this far off is given up at once
 @formula
 def place(S, W, t, q, z):
     """Poses, and the constraint rows as far as they follow from them: g, G, nu. ``z`` tells angles their turns."""
-    W.counts.evaluations[0] += 1
+    W.counts.evaluations += 1
     if W.made[PLACE] != 0:
         run(W.made[PLACE], S, W, t, q, z, q, z)
     else:
@@ -62,7 +62,7 @@ def violation(W, out):
         size = magnitude(g)
         if not size <= worst:
             worst = size
-            W.counts.guilty_row[0] = k
+            W.counts.guilty_row = k
     return worst
 
 
@@ -114,8 +114,8 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, what the factor in W is:
     OLD, of poses NEARby or of those HERE).
     """
-    W.options.partitioned[0] = 1.0 if W.options.stabilization[0] == PARTITIONING else 0.0
-    still = W.options.placed[0] > 0.0  # nobody asks for accelerations there
+    W.options.partitioned = 1.0 if W.options.stabilization == PARTITIONING else 0.0
+    still = W.options.placed > 0.0  # nobody asks for accelerations there
     if S.rows.law.shape[0] == 0 and still and S.angles.F.shape[0] == 0:
         return 0, 0.0, OLD
     place(S, W, t, q, z)
@@ -127,11 +127,11 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     found = 0.0
     lost = 0.0
     factored = OLD
-    if W.options.stabilization[0] != VELOCITIES:
+    if W.options.stabilization != VELOCITIES:
         status, found, factored = close(S, W, t, q, z, tol_g)
         if status != 0:
             return status, found, OLD
-    if W.options.stabilization[0] != POSITIONS:
+    if W.options.stabilization != POSITIONS:
         status, lost, factored = steer(S, W, v, tol_v, factored)
         if status != 0:
             return status, found, OLD
@@ -139,7 +139,7 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
         found = 0.0
     if not still:
         move(S, W, t, v, z)
-    return 0, max(found / S.length[0], lost), factored
+    return 0, max(found / S.scales.length, lost), factored
 
 
 @formula
@@ -178,7 +178,7 @@ def close(S, W, t, q, z, tol_g):
         retract(S, q, step)
         place(S, W, t, q, z)
         worst = violation(W, r)
-        W.counts.projections[0] += 1
+        W.counts.projections += 1
     if not worst <= CLOSED and not worst <= tol_g and not worst <= rounding(S, W, q):
         return NOT_CLOSED, found, OLD
     return 0, found, factored
@@ -191,12 +191,12 @@ def steer(S, W, v, tol_v, factored):
     step = W.velocities.scratch_3
     r = W.rows.scratch_2
     worst, size = drift(S, W, v, r)
-    if worst > tol_v * (min(METRE, S.length[0]) * S.rate[0] + size):
+    if worst > tol_v * (min(METRE, S.scales.length) * S.scales.rate + size):
         if factored == NEAR:
             reuse(S, W)
         if (
             factored == OLD
-            or solve(S, W, none, r, step, W.rows.residual, False, REFINEMENTS) > STALE * W.options.solve_tolerance[0]
+            or solve(S, W, none, r, step, W.rows.residual, False, REFINEMENTS) > STALE * W.options.solve_tolerance
         ):
             if factor(S, W) != 0:
                 return NOT_CLOSED, worst, OLD
@@ -213,10 +213,10 @@ def tangent(y, e, S, W):
 
     Near a singular position rounding is large along what the constraints forbid, and small along what they allow.
     """
-    choice = W.options.stabilization[0]
+    choice = W.options.stabilization
     if S.rows.law.shape[0] == 0 or choice < STEPS or choice == PARTITIONING:
         return
-    nq = S.coordinates[0]
+    nq = S.sizes.coordinates
     way = W.velocities.applied
     if choice != VELOCITIES:
         unrated(S, y, e, way)

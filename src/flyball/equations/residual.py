@@ -49,7 +49,7 @@ def residuals(S, W, bench, task):
     say, whatever the steps are; with GAPS also, and only g and G v - nu are found. With PARTS the terms of r stand
     behind all others in place of r (`parts`), with PUSHES those of the bodies alone.
     """
-    nq = S.coordinates[0]
+    nq = S.sizes.coordinates
     nv = W.velocities.solved.shape[0]
     nr = S.rows.law.shape[0]
     known = nv + 3 * nr + 3 * measured(S)
@@ -96,7 +96,7 @@ def residuals(S, W, bench, task):
 @formula
 def residual(S, W, t, p, vdot, lam, out):
     """The residual at one state, by the engine's own loops: no more of its code."""
-    nq = S.coordinates[0]
+    nq = S.sizes.coordinates
     v = p[nq : nq + W.velocities.solved.shape[0]]
     z = p[nq + W.velocities.solved.shape[0] :]
     poses(S, W, p[:nq])
@@ -111,7 +111,7 @@ def residual(S, W, t, p, vdot, lam, out):
 @formula
 def at_once(S, W, t, p, vdot, whole):
     """The same kinematics and rows in one pass; without accelerations of what is measured unless ``whole``."""
-    nq = S.coordinates[0]
+    nq = S.sizes.coordinates
     v = p[nq : nq + W.velocities.solved.shape[0]]
     for b in range(S.tree.parent.shape[0]):
         pose(S, W, b, p[:nq])
@@ -123,7 +123,7 @@ def at_once(S, W, t, p, vdot, whole):
 @formula
 def missed(S, W, t, p, lam, out):
     """What the equations miss with these multipliers, kinematics and rows being known."""
-    nq = S.coordinates[0]
+    nq = S.sizes.coordinates
     nv = W.velocities.solved.shape[0]
     nr = S.rows.law.shape[0]
     v = p[nq : nq + nv]
@@ -153,7 +153,7 @@ def missed(S, W, t, p, lam, out):
 def missed_by_parts(S, W, t, p, lam, out, first):
     """G v - nu, and from ``first`` on the terms of r."""
     nv, nr = W.velocities.solved.shape[0], S.rows.law.shape[0]
-    v = p[S.coordinates[0] : S.coordinates[0] + nv]
+    v = p[S.sizes.coordinates : S.sizes.coordinates + nv]
     for k in range(nr):
         out[nv + nr + k] = row_times(S, W, k, v) - W.rows.nu[k]
     told(S, W, t, p, lam)
@@ -168,7 +168,7 @@ def told(S, W, t, p, lam):
     reaction_loads(S, W)
     for n in range(2 * measured(S), loads_end(S, W)):
         W.sensed[LOAD, n] = W.sensed[RETURNED, n]
-    control(S, W, t, p[S.coordinates[0] + W.velocities.solved.shape[0] :], W.y[1])
+    control(S, W, t, p[S.sizes.coordinates + W.velocities.solved.shape[0] :], W.y[1])
 
 
 @formula

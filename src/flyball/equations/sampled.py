@@ -22,24 +22,11 @@ from ..compiler.kernels import kernel
 from ..compiler.layout import Float1, Float2, Int1, Int2
 from ..laws.evaluation import evaluate
 from ..numerics.integrators.clock import (
-    ACCEPTED,
     DONE,
-    ERROR,
     JUMPED,
-    NEXT,
-    QUOTA,
-    REJECTED,
     RUNNING,
-    SPAN,
-    STARTED,
-    STATUS,
     STUCK,
-    T_END,
-    TRIED,
-    WIDE,
     Clock,
-    H,
-    T,
 )
 from ..numerics.integrators.tableaux import Tableau
 from ..tables.system import VALUE, System, Work
@@ -123,11 +110,11 @@ def reached(P, t):
 def sample(A):
     """Sample what is due at the time and state of the clock. Returns the status of the evaluation there."""
     S, W, clock, P = A[S_], A[W_], A[CLOCK], A[PLAN]
-    t = clock.real[T]
+    t = clock.real.t
     status = call(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[SHEET], MOTION)
     if status != 0:
         return status
-    z = S.coordinates[0] + W.velocities.solved.shape[0]
+    z = S.sizes.coordinates + W.velocities.solved.shape[0]
     for late in range(2):
         for u in range(P.row.shape[0]):
             if P.row[u, LATER] == late and due(P, P.row[u, SAMPLED], t):
@@ -142,8 +129,8 @@ def sample(A):
     for k in range(P.next.shape[0]):
         while due(P, k, t):
             P.next[k] += 1
-    clock.count[STARTED] = JUMPED
-    clock.real[H] = max(clock.real[H], clock.real[WIDE])  # the last step was cut short
+    clock.count.started = JUMPED
+    clock.real.h = max(clock.real.h, clock.real.wide)  # the last step was cut short
     return 0
 
 
@@ -166,17 +153,17 @@ def sampled_kernel(
 def by_engine(A, rows):
     """The engine's own loop, which writes to its sheet; by the lower order where that is as good."""
     clock, lower = A[CLOCK], A[PLAN].lower
-    if clock.count[STARTED] != 1:
-        lower[TAKEN], lower[REFUSED] = clock.count[ACCEPTED], clock.count[REJECTED]
+    if clock.count.started != 1:
+        lower[TAKEN], lower[REFUSED] = clock.count.accepted, clock.count.rejected
     if lower[WAIT] == 0:
         n = call(A[ENGINE], A[S_], A[W_], A[LOWER], clock, A[SHEET], INTEGRATE)
     else:
         n = call(A[ENGINE], A[S_], A[W_], A[R_], clock, A[SHEET], INTEGRATE)
-    if clock.count[STATUS] == DONE and lower[WAIT] >= 0:
-        at_once = clock.count[ACCEPTED] == lower[TAKEN] + 1 and clock.count[REJECTED] == lower[REFUSED]
+    if clock.count.status == DONE and lower[WAIT] >= 0:
+        at_once = clock.count.accepted == lower[TAKEN] + 1 and clock.count.rejected == lower[REFUSED]
         if lower[WAIT] > 0:
             lower[WAIT] = lower[WAIT] - 1 if at_once else lower[AGAIN]
-        elif at_once and clock.real[ERROR] * clock.real[SPAN] <= clock.real[TRIED]:
+        elif at_once and clock.real.error * clock.real.span <= clock.real.tried:
             lower[AGAIN] = 1
         else:
             lower[WAIT] = lower[AGAIN]
@@ -192,20 +179,20 @@ def advance(loop, own, A, rows, out):
     """
     clock, P = A[CLOCK], A[PLAN]
     used = 0
-    end = clock.real[T_END]
-    taken = clock.count[ACCEPTED] + clock.count[REJECTED]
+    end = clock.real.t_end
+    taken = clock.count.accepted + clock.count.rejected
     while True:
-        if reached(P, clock.real[T]) and sample(A) != 0:
-            clock.count[STATUS] = STUCK
+        if reached(P, clock.real.t) and sample(A) != 0:
+            clock.count.status = STUCK
             break
         at = min(beside(P, clock.times, coming(P)), end)
-        clock.real[T_END] = at
+        clock.real.t_end = at
         n = loop(own, rows)
-        clock.real[T_END] = end
-        over = clock.count[STATUS] != DONE or at == end
+        clock.real.t_end = end
+        over = clock.count.status != DONE or at == end
         if not over and n > 0 and rows[n - 1, 0] == at:  # written when it is known what is held from then on
             n -= 1
-            clock.count[NEXT] -= 1
+            clock.count.next -= 1
         for i in range(n):
             for j in range(out.shape[1]):
                 out[used + i, j] = rows[i, j]
@@ -213,8 +200,8 @@ def advance(loop, own, A, rows, out):
         if over:
             break
         full = used + rows.shape[0] > out.shape[0]
-        if full or clock.count[ACCEPTED] + clock.count[REJECTED] - taken >= clock.count[QUOTA]:
-            clock.count[STATUS] = RUNNING
+        if full or clock.count.accepted + clock.count.rejected - taken >= clock.count.quota:
+            clock.count.status = RUNNING
             break
     return used
 

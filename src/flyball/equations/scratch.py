@@ -51,7 +51,7 @@ def fill(s: Structure, system: System, array: Callable[[str], np.ndarray]) -> No
     """Put into blank scratch, whose arrays are found by name, what the tables say of it."""
     if len(system.switch_numbers.lower):
         array("modes.lower")[:], array("modes.upper")[:] = system.switch_numbers.lower, system.switch_numbers.upper
-    if n := system.ground_frames[0]:
+    if n := system.sizes.ground_frames:
         frames = system.frames  # told by their address
         _, at_rest = s.kept.get("ground", id(frames), MOST, lambda: (frames, on_ground(system)))
         array("FK")[:n] = at_rest
@@ -69,7 +69,7 @@ def _described(s: Structure, system: System) -> StructBuffer:
 
 def on_ground(system: System) -> np.ndarray:
     """Records of the frames on ground: they stand first in `Work.FK`, and nothing writes them again."""
-    W = Records(np.zeros((system.ground_frames[0], 24), system.const.dtype))
+    W = Records(np.zeros((system.sizes.ground_frames, 24), system.const.dtype))
     ground_frames(system, W)
     return W.FK
 
@@ -96,6 +96,6 @@ def blank(s: Structure, system: System, dtype: Any) -> Work:
         z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl + ne + nc + nw),
         Modes(*(z(nw) for _ in Modes._fields[:-1]), z(nw, nw)),  # type: ignore[call-arg]
         z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n), z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny),
-        Options(*(np.zeros(1) for _ in Options._fields)), Counts(*(np.zeros(1, np.int64) for _ in Counts._fields)),
+        Options.blank(), Counts.blank(),
         np.zeros(FLAT, np.int64), z(system.flat[SCRATCH]),
     )  # fmt: skip

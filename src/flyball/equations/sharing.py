@@ -24,7 +24,7 @@ from ..math.scalar import magnitude, sqrt
 from ..numerics.cone.shares import CELLS, OPEN, Shares, best, room
 from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.tableaux import Tableau
-from ..numerics.integrators.watching import TERMS, Watch
+from ..numerics.integrators.watching import Watch
 from ..tables.system import (
     VALUE,
     System,
@@ -141,10 +141,10 @@ def guard_of_group(S, W, t, G, K, row):
         call(G.door[0], S, W, G, K, K, row)
     elif row >= 0:
         K.g[row, K.way.shape[0] - 1] = NOT_WATCHED
-        K.count[TERMS] = 0
+        K.count.terms = 0
     else:
         K.met_g[-1 - row, K.way.shape[0] - 1] = NOT_WATCHED
-        K.count[TERMS] = 0
+        K.count.terms = 0
 
 
 @formula
@@ -152,7 +152,7 @@ def written(S, W, G, K, row):
     """`margin` and `terms` into that row."""
     out, last = K.g[row] if row >= 0 else K.met_g[-1 - row], K.way.shape[0] - 1
     out[last] = margin(S, W, G.t[0], G)
-    K.count[TERMS] = terms(G, out, last + 1)
+    K.count.terms = terms(G, out, last + 1)
     return 0
 
 

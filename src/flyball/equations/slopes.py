@@ -37,7 +37,7 @@ def along(S, W, t, k, out):
     """Of a force along a measured quantity."""
     m = S.forces.F[k]
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
-    d = STEP * min(1.0, S.length[0])
+    d = STEP * min(1.0, S.scales.length)
     e = d + STEP * abs(rate)
     pressed = W.sensed[LOAD, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
     for j in range(5):
@@ -58,7 +58,7 @@ def between(S, W, t, k, out):
     par = wide(S.force_parameters, k)
     F = load(W.FK, S.forces.F[k])
     p, R, w, v, alpha, a = load(W.FK, S.forces.M[k])
-    d = STEP * min(1.0, S.length[0])
+    d = STEP * min(1.0, S.scales.length)
     e = d + STEP * norm(sub(v, F[3]))
     n = int(out[k, DIRECTIONS])
     for j in range(4 * n):

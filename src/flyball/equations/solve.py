@@ -55,12 +55,12 @@ def inverse_mass(S, b, x, at, out, to):
 @formula
 def factor(S, W):
     """Factor the matrix of the solve at the kinematics and rows now in W. Returns 0 or 1 + a guilty unknown."""
-    W.counts.factorisations[0] += 1
+    W.counts.factorisations += 1
     if W.made[FACTOR] != 0:
         return int(run(W.made[FACTOR], S, W, 0.0, W.A, W.A, W.A, W.A))
-    if S.solver[0] == SCHUR:
+    if S.sizes.solver == SCHUR:
         return factor_schur(S, W)
-    if S.solver[0] == COUPLED:
+    if S.sizes.solver == COUPLED:
         return factor_coupled(S, W)
     return articulate(S, W)
 
@@ -70,7 +70,7 @@ def turn_rows(S, W):
     """H = M^-1 G^T for the rows now in W."""
     for e in range(S.blocks.body.shape[0]):
         at = S.blocks.entry[e]
-        if W.options.partitioned[0] > 0.0:
+        if W.options.partitioned > 0.0:
             turn_dependent(S, W, S.blocks.body[e], at)
         else:
             inverse_mass(S, S.blocks.body[e], W.G, at, W.H, at)
@@ -110,7 +110,7 @@ def natural_size(S, W):
 @formula
 def reuse(S, W):
     """Keep the last factor for rows that have moved a little: as a preconditioner of the refinement."""
-    if S.solver[0] == SCHUR:
+    if S.sizes.solver == SCHUR:
         if W.made[REUSE] != 0:
             run(W.made[REUSE], S, W, 0.0, W.A, W.A, W.A, W.A)
         else:
@@ -132,7 +132,7 @@ def factor_schur(S, W):
     natural_size(S, W)
     for k in range(S.rows.law.shape[0]):
         place = S.ldl.Ap[S.ldl.perm[k] + 1] - 1
-        W.A[place] += S.regularization[0] * W.rows.diagonal[k] + ROUNDING * W.A[place]
+        W.A[place] += S.scales.regularization * W.rows.diagonal[k] + ROUNDING * W.A[place]
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
 
 
@@ -145,14 +145,14 @@ def factor_coupled(S, W):
     """
     nv = W.velocities.solved.shape[0]
     per = W.velocities.scratch_1
-    lever = minimum(1.0, S.length[0]) ** 2
+    lever = minimum(1.0, S.scales.length) ** 2
     mass_entries(S, W)
     for e in range(S.mass_entries.row.shape[0]):
         d = S.mass_entries.row[e]
         own = d == S.mass_entries.column[e]
         if own:
             per[d] = 1.0 / W.M[e]
-        if W.options.partitioned[0] > 0.0:  # masses of the dependent coordinates alone
+        if W.options.partitioned > 0.0:  # masses of the dependent coordinates alone
             W.M[e] *= (RIGID if W.velocities.partition[d].real < 0.0 else 1.0) if own else 0.0
         W.A[S.mass_entries.place[e]] = W.M[e]
     for k in range(S.rows.law.shape[0]):
@@ -163,7 +163,7 @@ def factor_coupled(S, W):
                 s += (W.G[e] * W.G[e] + lever) * per[S.column[e]]
         s = choose(s, s, s + 1.0)
         W.rows.diagonal[k] = s
-        W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.regularization[0] * s
+        W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.scales.regularization * s
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
 
 
@@ -175,7 +175,7 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
     semidefinite, M + E is factored in its place and the refinement takes E out again. Returns the residual left,
     relative to the size of its terms.
     """
-    W.counts.solves[0] += 1
+    W.counts.solves += 1
     if W.made[STEP] != 0:
         return solve_made(S, W, f, gamma, x, lam, loaded, refinements)
     for d in range(x.shape[0]):
@@ -183,9 +183,9 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
     for k in range(lam.shape[0]):
         lam[k] = 0.0
         W.rows.scratch_1[k] = gamma[k]
-    if S.solver[0] == SCHUR:
+    if S.sizes.solver == SCHUR:
         return solve_schur(S, W, f, gamma, x, lam, loaded, refinements)
-    if S.solver[0] == COUPLED:
+    if S.sizes.solver == COUPLED:
         return solve_coupled(S, W, f, gamma, x, lam, loaded, refinements)
     articulated_solve(S, W, f, x, W.velocities.effort)
     return 0.0
@@ -198,7 +198,7 @@ def solve_made(S, W, f, gamma, x, lam, loaded, refinements):
     last = 1e300
     for _ in range(refinements + 1 if W.made[REFINE] != 0 else 0):
         worst = run(W.made[REFINE], S, W, 0.0, f, gamma, x, lam)
-        if not worst > W.options.solve_tolerance[0] or worst > STALLED * last:
+        if not worst > W.options.solve_tolerance or worst > STALLED * last:
             break
         last = worst
     return worst
@@ -208,7 +208,7 @@ def solve_made(S, W, f, gamma, x, lam, loaded, refinements):
 def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
     """Through S = G M^-1 G^T: one pass, then as many for what is left as it takes."""
     rhs = W.velocities.scratch_2
-    semidefinite = S.semidefinite[0] > 0.0 and not W.options.partitioned[0] > 0.0
+    semidefinite = S.scales.semidefinite > 0.0 and not W.options.partitioned > 0.0
     for d in range(x.shape[0]):
         rhs[d] = f[d] if loaded else 0.0
     if loaded and not semidefinite:
@@ -224,7 +224,7 @@ def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
             worst = residual(S, W, gamma, x)
         if semidefinite:
             worst = larger(worst, excess(S, W.velocities.scratch_1, rhs, x))
-        if not worst > W.options.solve_tolerance[0] or worst > STALLED * last:
+        if not worst > W.options.solve_tolerance or worst > STALLED * last:
             break
         last = worst
         pass_schur(S, W, rhs, x, lam, semidefinite)
@@ -269,7 +269,7 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
         remainder(S, W, f, gamma, x, lam, rhs, loaded)
     for attempt in range(refinements):
         worst = pass_coupled(S, W, f, gamma, x, lam, rhs, loaded)
-        if not worst > W.options.solve_tolerance[0] or (attempt > 0 and worst > STALLED * last):
+        if not worst > W.options.solve_tolerance or (attempt > 0 and worst > STALLED * last):
             break
         last = worst
     return worst
@@ -374,6 +374,6 @@ def excess(S, dx, rhs, x):
                 worst = larger(worst, magnitude(t[i]))
         for i in range(2):
             rhs[v0 + i] = S.bodies.excess_mass[b] * dx[v0 + i]
-            worst = larger(worst, magnitude(rhs[v0 + i]) * S.length[0])
-            size = larger(size, S.bodies.mass[b] * magnitude(x[v0 + i]) * S.length[0])
+            worst = larger(worst, magnitude(rhs[v0 + i]) * S.scales.length)
+            size = larger(size, S.bodies.mass[b] * magnitude(x[v0 + i]) * S.scales.length)
     return worst / size

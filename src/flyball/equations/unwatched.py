@@ -15,7 +15,7 @@ from ..compiler.buffers import JoinedBuffer, StructBuffer, StructPool
 from ..compiler.formulas import formula
 from ..compiler.kernels import BoundKernel, kernel
 from ..compiler.layout import Float2, Int1
-from ..numerics.integrators.clock import COUNTS, REALS, Clock
+from ..numerics.integrators.clock import Clock, ClockCounts, ClockReals
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..tables.specs import Structure
 from ..tables.system import System, Work
@@ -61,7 +61,7 @@ def _own(ny: int, width: int, seen: np.ndarray) -> Own:
     """What goes to the engine's door besides: of its clock only time, state and what is seen are looked at."""
     none = np.zeros(0, np.int64)
     clock = Clock(
-        np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), np.zeros((3, ny)), np.zeros((1, ny)), none, seen
+        ClockReals.blank(), ClockCounts.blank(), np.zeros(0), np.zeros((3, ny)), np.zeros((1, ny)), none, seen
     )
     return Own(clock, Sheet(np.zeros((4, width))), idle_tableau().fields, np.zeros(2, np.int64))
 

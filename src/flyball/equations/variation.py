@@ -15,7 +15,7 @@ from __future__ import annotations
 from ..compiler.formulas import formula
 from ..compiler.kernels import kernel
 from ..compiler.layout import Float2
-from ..numerics.integrators.clock import Clock, T
+from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau
@@ -56,7 +56,7 @@ def changes(y, dy, A, P):
 def derivative(t, y, dy, A, P):
     """Rates of the motion, at the state put on its constraints, and of its changes."""
     own = A[OWN]
-    own.real[T] = t
+    own.real.t = t
     split(own.y[0], y, P, False)
     status = through(A, MOTION)
     if status == 0:
@@ -86,7 +86,7 @@ def land(t, y, dy, A, P):
 def arrive(t, y, dy, A, P):
     """Put motion and changes on their constraints, in place, and evaluate there; how far the motion moved."""
     own, rows = A[OWN], A[SHEET].rows
-    own.real[T] = t
+    own.real.t = t
     split(own.y[0], y, P, False)
     status = through(A, ARRIVE)
     moved = rows[0, 0]
@@ -114,7 +114,7 @@ def report(t, y, out, A, P):
     """
     own, rows = A[OWN], A[SHEET].rows
     nv, nz, n = P.zero.shape[0], P.size[NZ], P.size[COUNT]
-    own.real[T] = t
+    own.real.t = t
     split(own.y[0], y, P, False)
     status = through(A, REPORT)
     if status != 0:

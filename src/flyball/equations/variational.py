@@ -10,7 +10,6 @@ from ..compiler.kernels import kernel
 from ..math.cayley import bent
 from ..math.scalar import sqrt, tan
 from ..math.vec import add, cross, dot, load9, mv, scale, sub
-from ..numerics.integrators.clock import T
 from ..numerics.integrators.implicit.desk import VariationalDesk
 from ..numerics.integrators.implicit.hermite import between
 from ..numerics.integrators.implicit.variational import answer
@@ -141,8 +140,8 @@ def solve3(columns, r):
 def push(t, y, lam, f, A):
     """Generalised forces at a state, but for those of inertia and of rows; friction presses with ``lam``."""
     S, W, own, rows = A[S_], A[W_], A[OWN], A[SHEET].rows
-    nv, nq = f.shape[0], S.coordinates[0]
-    own.real[T] = t
+    nv, nq = f.shape[0], S.sizes.coordinates
+    own.real.t = t
     for i in range(y.shape[0]):
         own.y[0, i] = y[i]
     for i in range(nv):
@@ -168,7 +167,7 @@ def push(t, y, lam, f, A):
 def place(t, y, g, A):
     """What positions miss of the constraints, into g, and the largest of it; turns in y are brought up to date."""
     W, own = A[W_], A[OWN]
-    own.real[T] = t
+    own.real.t = t
     for i in range(y.shape[0]):
         own.y[0, i] = y[i]
     through(A, POSITION)

@@ -17,12 +17,12 @@ from ..compiler.formulas import formula
 from ..compiler.kernels import ArrayBuffer, BoundKernel, kernel
 from ..compiler.layout import Array, Float2, Int1
 from ..numerics.cone.shares import OPEN
-from ..numerics.integrators.clock import Clock, T
+from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.expected import expect
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.integrators.watched import begun, onward
-from ..numerics.integrators.watching import ASTRAY, FASTEST, GRAIN_END, GRAIN_START, START, Watch, watching
+from ..numerics.integrators.watching import ASTRAY, GRAIN_END, GRAIN_START, START, Watch, watching
 from ..tables.specs import Structure
 from ..tables.system import (
     BIAS,
@@ -119,11 +119,11 @@ def note(A, K, row):
         K.moving[end, 0, m], K.moving[end, 1, m], K.moving[end, 2, m] = W.sensed[VALUE, m], W.sensed[RATE, m], a
     levels(A, K, 0 if row == START else K.levels.shape[0] - 1)
     balanced(A)
-    all_guards(A, W, A[OWN].real[T], K, row)
+    all_guards(A, W, A[OWN].real.t, K, row)
     grain = GRAIN_START if row == START else GRAIN_END
-    K.real[FASTEST] = max(K.real[FASTEST], quickest(S, W))
-    grains(S, W, A[OWN].real[T], A[EXPECTED].sensed, K.real[FASTEST], K.g[grain])
-    astray(S, W, A[OWN].real[T], K.g[ASTRAY])
+    K.real.fastest = max(K.real.fastest, quickest(S, W))
+    grains(S, W, A[OWN].real.t, A[EXPECTED].sensed, K.real.fastest, K.g[grain])
+    astray(S, W, A[OWN].real.t, K.g[ASTRAY])
     last = K.grain.shape[0] - 1
     if S.guards.kind[last] == G_SHARED:
         K.g[grain, last] = GRAIN * A[GROUP].size[0]

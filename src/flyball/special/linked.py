@@ -52,7 +52,7 @@ class Linked:
         self.searched: dict[str, set[tuple[Head, int] | None]] = {}
         made = stages.procedures
         before = dict(BEFORE)
-        if stages.S.solver[0] == ARTICULATED:
+        if stages.S.sizes.solver == ARTICULATED:
             before["STEP"] = before["STEP_UNLOADED"] = ("PLACE", "FACTOR")
         self.laws = stages.laws
         for name in (*ENTRIES, *filter(None, self.laws)):

@@ -25,7 +25,7 @@ class Solves(Recorder):
 
     def solved(self) -> None:
         """Factor and solves."""
-        solver = self.S.solver[0]
+        solver = self.S.sizes.solver
         S, W = self.S, self.W
         if solver == SCHUR:
             turn_rows(S, W)
@@ -57,15 +57,15 @@ class Solves(Recorder):
         if is_loaded:
             reads |= self.fresh("velocities.prescribed", None, self.driven)
             x[self.driven] = W.velocities.prescribed[self.driven]
-        if S.solver[0] == SCHUR and self.semidefinite:  # what a pass gives back of E is of all that it has moved
+        if S.sizes.solver == SCHUR and self.semidefinite:  # what a pass gives back of E is of all that it has moved
             W.velocities.scratch_2[:] = f if is_loaded else 0.0
-        elif S.solver[0] == SCHUR:
+        elif S.sizes.solver == SCHUR:
             for b in range(len(S.tree.parent)) if is_loaded else ():
                 inverse_mass(S, b, f, S.tree.v[b], x, S.tree.v[b])
             W.rows.scratch_1[:] = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]
-        elif S.solver[0] == COUPLED and is_loaded:
+        elif S.sizes.solver == COUPLED and is_loaded:
             remainder(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
-        elif S.solver[0] == ARTICULATED:
+        elif S.sizes.solver == ARTICULATED:
             articulated_solve(S, W, f, x, W.velocities.effort)
         stores = [*self.solution(x, lam), (("W_flat", LOADED), 1.0 if is_loaded else 0.0)]
         self.add(name, reads, stores)
@@ -75,7 +75,7 @@ class Solves(Recorder):
         out: list[tuple[Place, Any]] = [(("c", k), y) for k, y in enumerate(x)] + [
             (("d", k), y) for k, y in enumerate(lam)
         ]
-        if self.S.solver[0] == SCHUR:
+        if self.S.sizes.solver == SCHUR:
             left = self.stored("velocities.scratch_2", None, range(self.nv)) if self.semidefinite else []
         else:
             left = self.stored("velocities.scratch_2", None, range(self.nv)) + self.stored(
@@ -86,7 +86,7 @@ class Solves(Recorder):
     @property
     def semidefinite(self) -> bool:
         """Whether something stands in for missing masses."""
-        return bool(self.S.semidefinite[0] > 0.0)
+        return bool(self.S.scales.semidefinite > 0.0)
 
     def schur_left(self, gamma: np.ndarray, x: np.ndarray) -> Any:
         """What is left after a pass, and its size."""
@@ -106,7 +106,7 @@ class Solves(Recorder):
             "velocities.scratch_2", None, range(self.nv)
         )
         x, lam = x.copy(), lam.copy()
-        if S.solver[0] == SCHUR:
+        if S.sizes.solver == SCHUR:
             pass_schur(S, W, W.velocities.scratch_2, x, lam, self.semidefinite)
             worst = self.schur_left(gamma, x)
         else:

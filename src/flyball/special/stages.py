@@ -83,7 +83,7 @@ class Stages(Solves):
     def entries(self, readers: Sequence[Callable[[Work], list[Any]]], far: bool = False) -> list[tuple[int, int]]:
         """Entries of the frames' records that others read; all positions if they ask how ``far`` frames are."""
         S, FK, graph = self.S, self.W.FK, self.graph
-        moving = range(S.ground_frames[0], S.moving_frames[0])
+        moving = range(S.sizes.ground_frames, S.sizes.moving_frames)
         asked = {(k, c) for k in moving for c in range(3)} if far else set()
         granted = len(graph.granted)
         for reader in readers:

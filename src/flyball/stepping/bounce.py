@@ -20,7 +20,7 @@ from ..contact.tables import FOUND, GAP, MATERIAL, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
 from ..math.vec import add, dot, load3, put3, scale, sub
 from ..numerics.cone.operator import across, seen, seen_turning
-from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, MOST, NONE, RESIDUAL
+from ..numerics.cone.problem import CONVERGED, NONE
 from .motion import no_impact
 from .penalty import stiffness
 from .sequence import one_after_the_other
@@ -185,10 +185,10 @@ def solve_afresh(address, R, Z, W, O, F, pace):
             Z.torque[c, i] = 0.0
     for k in range(R.size[3]):
         Z.line[k] = 0.0
-    O.count[MOST] = MORE * pace.count[SWEEPS]
-    O.real[ENOUGH] = pace.real[ENOUGH_V]
+    O.count.most = MORE * pace.count[SWEEPS]
+    O.real.enough = pace.real[ENOUGH_V]
     call(address, R, Z, W, O, F.impacts, 0)
-    if O.count[ENDED] != CONVERGED and O.real[RESIDUAL] > pace.real[ROUGH] * pace.real[STEP]:
+    if O.count.ended != CONVERGED and O.real.residual > pace.real[ROUGH] * pace.real[STEP]:
         pace.count[CUTS] += 1
 
 

@@ -10,7 +10,7 @@ from ..compiler.formulas import formula
 from ..math.vec import add, load3
 from ..numerics.cone.problem import NONE
 from .implicit import climb, respond, stiffened
-from .joined import FIRST, IMPULSE, JOB_AT, JOB_NEXT, JOB_ROWS, JOBS, LINE_AT, LINE_GROUP, NEEDED, NO_ROOM, STRUCK
+from .joined import IMPULSE, JOB_AT, JOB_NEXT, JOB_ROWS, LINE_AT, LINE_GROUP, NO_ROOM, STRUCK
 from .lines import line_laws, line_rows
 
 
@@ -20,11 +20,11 @@ def contact_rows(A, M, C, P):
 
     Returns 0, or NO_ROOM where J and Y, or the table of jobs, are too small for ``A.count[NEEDED]`` and [JOBS].
     """
-    first = A.count[FIRST]
+    first = A.count.first
     rows = 6 if P.turn.shape[0] > 0 else 3
     used, jobs = needed(A, P, rows)
     used, jobs, lines = line_rows(A, P, used, jobs, False)
-    A.count[NEEDED], A.count[JOBS] = used, jobs
+    A.count.needed, A.count.jobs = used, jobs
     if used > min(P.J.shape[0], P.Y.shape[0]) or jobs > A.job.shape[0] or lines > P.line_at.shape[0]:
         return NO_ROOM
     for g in range(A.queue.shape[0]):
@@ -76,8 +76,8 @@ def needed(A, P, rows):
         last = -1
         for side in range(2):
             mover = P.at[c, side]
-            if mover >= A.count[FIRST]:
-                g = A.mover[mover - A.count[FIRST], 1]
+            if mover >= A.count.first:
+                g = A.mover[mover - A.count.first, 1]
                 if g != last and g >= 0:
                     used += rows * (A.group[g + 1] - A.group[g])
                     jobs += 1

@@ -15,7 +15,7 @@ from ..math.rotation import rotation_vector
 from ..math.vec import col, dot, mm, norm, sub, transpose
 from ..tables.system import BIAS, VALUE
 from .implicit import dot_rows, solve_springs
-from .joined import BEND, OF_DIRECTION, OF_MANY, REACH, SHARE, SOLVED, SPRING_OF, SPRINGS, STEP, WAY
+from .joined import BEND, OF_DIRECTION, OF_MANY, REACH, SHARE, SOLVED, SPRING_OF, WAY
 
 PASSES = 3
 STIFF = 1e-3  # share of the end of the step from which on a spring is put right
@@ -46,7 +46,7 @@ def read(A, i):
 @formula
 def note_bends(A):
     """Keep the bias accelerations of what springs act along."""
-    for i in range(A.count[SPRINGS]):
+    for i in range(A.count.springs):
         x = A.spring_x[i]
         k = int(x[SPRING_OF])
         x[BEND] = 0.0
@@ -70,7 +70,7 @@ def bend_of_line(F, M):
 @formula
 def note_lengths(A):
     """Keep where the springs are at half the step."""
-    for i in range(A.count[SPRINGS]):
+    for i in range(A.count.springs):
         A.spring_x[i, REACH] = read(A, i)
 
 
@@ -78,17 +78,17 @@ def note_lengths(A):
 def put_right(A):
     """Move the positions in the clock, which went ``A.wide[WAY]`` from half the step, to where springs were told."""
     stiff = False
-    for i in range(A.count[SPRINGS]):
+    for i in range(A.count.springs):
         stiff = stiff or A.spring_x[i, SHARE] > STIFF
     if not stiff:
         return
-    h = A.real[STEP]
-    q = A.clock.y[0, : A.S.coordinates[0]]
+    h = A.real.step
+    q = A.clock.y[0, : A.S.sizes.coordinates]
     step = A.mixing[0]
     for _ in range(PASSES):
         call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, POSITION)
         worst = 0.0
-        for i in range(A.count[SPRINGS]):
+        for i in range(A.count.springs):
             x = A.spring_x[i]
             told = x[REACH] + dot_rows(A.spring_J[i], A.wide[WAY]) + 0.125 * h * h * x[BEND]
             x[SOLVED] = read(A, i) - told
@@ -98,7 +98,7 @@ def put_right(A):
         solve_springs(A)
         for d in range(step.shape[0]):
             step[d] = 0.0
-        for i in range(A.count[SPRINGS]):
+        for i in range(A.count.springs):
             for d in range(step.shape[0]):
                 step[d] -= A.spring_x[i, SOLVED] * A.spring_Y[i, d]
         retract(A.S, q, step)

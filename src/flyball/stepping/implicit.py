@@ -33,7 +33,6 @@ from .joined import (
     SPRING_C,
     SPRING_K,
     SPRING_OF,
-    SPRINGS,
 )
 
 SOFT = 1e-3  # h^2 k / m + h c / m: what is softer than this is left to the evaluation at half the step
@@ -93,7 +92,7 @@ def respond(A, force, out):
 def take_springs(A, h):
     """Find what is to be taken implicitly, at the state evaluated last, and factor what it adds."""
     S, W = A.S, A.W
-    A.count[SPRINGS] = 0
+    A.count.springs = 0
     if S.forces.F.shape[0] == 0:
         return
     call(A.door[0], S, W, A.R, A.clock, A.slopes, SLOPES)
@@ -107,7 +106,7 @@ def take_springs(A, h):
                 A.spring_x[used, SPRING_OF] = k
                 A.spring_x[used, OF_MANY], A.spring_x[used, OF_DIRECTION] = n, i
                 used += 1
-    A.count[SPRINGS] = used
+    A.count.springs = used
     factor_springs(A)
 
 
@@ -117,7 +116,7 @@ def one_spring(A, h, n, which, stiffness, damping):
     J, Y, x = A.spring_J[n], A.spring_Y[n], A.spring_x[n]
     gradient(A.S, A.W, which[0], which[1], which[2], J)
     z = h * (h * stiffness + damping)
-    if A.S.solver[0] == SCHUR:  # joints make nothing lighter
+    if A.S.sizes.solver == SCHUR:  # joints make nothing lighter
         for b in range(A.S.tree.parent.shape[0]):
             inverse_mass(A.S, b, J, A.S.tree.v[b], Y, A.S.tree.v[b])
         if z * dot_rows(J, Y) < SOFT:
@@ -137,7 +136,7 @@ def one_spring(A, h, n, which, stiffness, damping):
 def factor_springs(A):
     """Cholesky's factor of 1 / A + J M^-1 J'."""
     C = A.stiff
-    for i in range(A.count[SPRINGS]):
+    for i in range(A.count.springs):
         for j in range(i + 1):
             s = dot_rows(A.spring_J[i], A.spring_Y[j])
             if i == j:
@@ -150,7 +149,7 @@ def factor_springs(A):
 @formula
 def stiffened(A, x):
     """Turn a response without springs into one with them, in place."""
-    n, t = A.count[SPRINGS], A.spring_x
+    n, t = A.count.springs, A.spring_x
     for i in range(n):
         t[i, SOLVED] = dot_rows(A.spring_J[i], x)
     solve_springs(A)
@@ -162,7 +161,7 @@ def stiffened(A, x):
 @formula
 def solve_springs(A):
     """Solve with Cholesky's factor, in place."""
-    n, C, t = A.count[SPRINGS], A.stiff, A.spring_x
+    n, C, t = A.count.springs, A.stiff, A.spring_x
     for i in range(n):
         s = t[i, SOLVED]
         for k in range(i):

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compiler.layout import Float1, Float2, Int1, Int2
+from ..compiler.layout import Float2, Int1, Int2, Record
 from ..equations.tasks import Sheet
 from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.tableaux import Tableau
@@ -25,14 +25,6 @@ from ..tables.system import System, Work
 # end put there. Besides, impacts over before the step whose impulses stand in a state; poses as last evaluated;
 # velocities in State.wide before an impact made those that joints allow where rows are
 START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES, KICKED, POSES, CONSISTENT = range(11)
-# entries of Joined.real: time and step; energy lost at stops; by how far (< 0) a stop
-# would be overrun; gravity's potential energy, and its work over the step at the mean velocities; kinetic energy before
-# the mechanism was put onto its joints, -1 where nothing is hit; energy that the method takes at joints
-TIME, STEP, LOST, OVERRUN, POTENTIAL, WEIGHED, KINETIC, ASTRAY = range(8)
-# entries of Joined.count: the first mover that is of the mechanism; springs taken implicitly; evaluations so far,
-# steps whose velocities did not settle; numbers that J and Y, and rows that ``job`` must hold; whether a step has
-# begun, and whether it is to be taken with velocities that did not settle
-FIRST, SPRINGS, EVALUATED, UNSETTLED, NEEDED, JOBS, BEGUN, ANYHOW = range(8)
 # rows of Joined.wide: velocities at the start of the step; their change without impulses of contact, as far as known,
 # and what the evaluation at half the change makes of it, and of the drivers' efforts; generalised impulses of contacts
 # and the rest, and what they change; velocities at the end; the way, scratch
@@ -57,6 +49,32 @@ LINE_OF, LINE_GROUP, LINE_AT = range(3)
 NO_ROOM, NO_WAY, NOT_SETTLED, TOO_LONG = 100, 101, 102, 103
 
 
+class JoinedReals(Record, kind="Float"):
+    """Time and energies of the mechanism within a step."""
+
+    time: float
+    step: float
+    lost: float  # energy lost at stops
+    overrun: float  # by how far (< 0) a stop would be overrun
+    potential: float  # gravity's potential energy,
+    weighed: float  # and its work over the step at the mean velocities
+    kinetic: float  # energy before the mechanism was put onto its joints; -1 where nothing is hit
+    astray: float  # energy that the method takes at joints
+
+
+class JoinedCounts(Record, kind="Int"):
+    """Sizes and counters of the mechanism."""
+
+    first: int  # the first mover that is of the mechanism
+    springs: int  # taken implicitly
+    evaluated: int
+    unsettled: int  # steps whose velocities did not settle
+    needed: int  # numbers that J and Y must hold
+    jobs: int  # rows that ``job`` must hold
+    begun: int  # whether a step has begun
+    anyhow: int  # whether it is to be taken with velocities that did not settle
+
+
 class Joined(NamedTuple):
     """The mechanism: tables, the engine's rooms, and those of the step."""
 
@@ -67,8 +85,8 @@ class Joined(NamedTuple):
     sheet: Sheet  # (4, width)
     slopes: Sheet  # (forces, SLOPE_WIDTH)
     door: Int1  # (1,): the engine's address
-    real: Float1  # (8,)
-    count: Int1  # type: ignore[assignment]  # (8,)
+    real: JoinedReals  # type: ignore[assignment]
+    count: JoinedCounts  # type: ignore[assignment]
     mover: Int2  # (movers, 2): row of the body table, group
     group: Int1  # (ng + 1,)
     wide: Float2  # (8, nv)
@@ -104,4 +122,4 @@ def no_mechanism() -> Joined:
     clock, R = _none(Clock, "1a122a2"), _none(Tableau, "21222a")
     sheet = Sheet(np.zeros((0, 0)))
     tables = _none(Joined, "a1aba22222222b2bba2", S=S, W=W, R=R, clock=clock, sheet=sheet, slopes=sheet)
-    return tables._replace(real=np.zeros(8), count=np.zeros(16, np.int64), group=np.zeros(1, np.int64))
+    return tables._replace(real=JoinedReals.blank(), count=JoinedCounts.blank(), group=np.zeros(1, np.int64))

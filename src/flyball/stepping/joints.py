@@ -10,7 +10,6 @@ from ..equations.tasks import ARRIVE, MOTION, POSITION, SOLVE
 from ..equations.tree import retract
 from ..math.vec import load3, load9, put3, put9
 from ..numerics.cone.problem import Problem, State
-from ..numerics.integrators.clock import T
 from ..tables.system import (
     SCHUR,
 )
@@ -19,30 +18,23 @@ from .gauges import put_right
 from .implicit import dot_rows, implied, respond
 from .joined import (
     ADDED,
-    ASTRAY,
     BEGIN,
-    BEGUN,
     CHANGE,
     CONSISTENT,
     EFFORTS,
     FINISH,
-    FIRST,
     FREE,
     IMPULSE,
     KEEP,
     KICKED,
-    KINETIC,
     MEAN,
     POSES,
     ROWS,
     SMOOTH,
     SPRING_C,
     SPRING_OF,
-    SPRINGS,
     START,
-    STEP,
     STRUCK,
-    TIME,
     V_AFTER,
     V_BEFORE,
     VELOCITIES,
@@ -75,7 +67,7 @@ def ask(A, M, C, P, X, task):
         keep(A, P, X)
         return 0
     if task == MEAN:
-        for i in range(A.S.coordinates[0]):  # at half the step, from where FINISH goes on
+        for i in range(A.S.sizes.coordinates):  # at half the step, from where FINISH goes on
             A.clock.y[2, i] = A.clock.y[0, i]
         for d in range(A.wide.shape[1]):
             X.wide[d] = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
@@ -100,11 +92,11 @@ def ask(A, M, C, P, X, task):
         for r in range(A.lam.shape[1]):
             A.lam[2, r] += A.sheet.rows[3, r]
     if task == VELOCITIES:
-        A.real[TIME] += A.real[STEP]
-        A.count[BEGUN] = 0
+        A.real.time += A.real.step
+        A.count.begun = 0
         settle_account(A)
         for d in range(A.wide.shape[1]):
-            X.wide[d] = A.clock.y[0, A.S.coordinates[0] + d]
+            X.wide[d] = A.clock.y[0, A.S.sizes.coordinates + d]
     return 0
 
 
@@ -126,17 +118,17 @@ def make_consistent(A, X):
         X.wide[d] += rows[2, d]
         A.wide[V_BEFORE, d] = X.wide[d]
     for r in range(A.S.rows.law.shape[0]):
-        A.real[ASTRAY] -= rows[3, r] * row_times(A.S, A.W, r, A.wide[WAY])
+        A.real.astray -= rows[3, r] * row_times(A.S, A.W, r, A.wide[WAY])
 
 
 @formula
 def start(A, M, X):
     """Evaluate where the motion begins, which must be on the constraints: accelerations, multipliers, efforts."""
-    A.count[BEGUN] = 0
-    A.clock.real[T] = A.real[TIME]
+    A.count.begun = 0
+    A.clock.real.t = A.real.time
     status = call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, MOTION)
-    put_aside(A, A.real[STEP])
-    nq = A.S.coordinates[0]
+    put_aside(A, A.real.step)
+    nq = A.S.sizes.coordinates
     for d in range(A.wide.shape[1]):
         X.wide[d] = A.wide[V_BEFORE, d] = A.wide[V_AFTER, d] = A.clock.y[0, nq + d]
         A.wide[STRUCK, d] = 0.0
@@ -144,7 +136,7 @@ def start(A, M, X):
         A.lam[1, r] = A.lam[2, r] = 0.0
     press(A)
     show(A, M, True)
-    A.real[KINETIC] = -1.0
+    A.real.kinetic = -1.0
     settle_account(A)
     return status
 
@@ -152,13 +144,13 @@ def start(A, M, X):
 @formula
 def free(A, M, X):
     """Velocities without contact, from those in State.wide; asked once more it begins at the same place again."""
-    y, nq = A.clock.y, A.S.coordinates[0]
-    if A.count[BEGUN] == 0:
+    y, nq = A.clock.y, A.S.sizes.coordinates
+    if A.count.begun == 0:
         for i in range(y.shape[1]):
             y[1, i] = y[0, i]
         for r in range(A.lam.shape[1]):
             A.lam[2, r] = 0.0
-        A.count[BEGUN] = 1
+        A.count.begun = 1
     for i in range(y.shape[1]):
         y[0, i] = y[1, i]
     for d in range(A.wide.shape[1]):
@@ -172,7 +164,7 @@ def free(A, M, X):
 def show(A, M, poses):
     """Velocities of the bodies for what looks for contacts, and poses if these are asked for, as last evaluated."""
     for k in range(A.mover.shape[0]):
-        b, to = A.mover[k, 0], A.count[FIRST] + k
+        b, to = A.mover[k, 0], A.count.first + k
         if poses:
             put3(M.pose, to, 0, load3(A.W.BK, b, 0))
             put9(M.pose, to, 3, load9(A.W.BK, b, 3))
@@ -186,13 +178,13 @@ def keep(A, P, X):
 
     They follow from one solve for all impulses: joints are exact to rounding, whatever the cone solver left.
     """
-    nv, h = A.wide.shape[1], A.real[STEP]
+    nv, h = A.wide.shape[1], A.real.step
     before, total = A.wide[V_BEFORE], A.wide[IMPULSE]
     for d in range(nv):
         total[d] = 0.0
         A.wide[WAY, d] = X.wide[d] - before[d] - A.wide[CHANGE, d]
     contact_impulses(A, P, X, total)
-    for i in range(A.count[SPRINGS]):
+    for i in range(A.count.springs):
         s = implied(A, h, i, before, A.wide[CHANGE])
         s += A.spring_x[i, ADDED] * dot_rows(A.spring_J[i], A.wide[WAY])
         for d in range(nv):
@@ -227,7 +219,7 @@ def struck(A):
 @formula
 def evaluate_again(A, part):
     """Evaluate at half the step once more, at the mean velocities with a part of what impacts changed."""
-    nq = A.S.coordinates[0]
+    nq = A.S.sizes.coordinates
     for d in range(A.wide.shape[1]):
         mean = A.wide[V_BEFORE, d] + 0.5 * A.wide[CHANGE, d]
         A.clock.y[0, nq + d] = mean + part * A.wide[STRUCK, d]
@@ -241,16 +233,16 @@ def turn_on(A, h):
     Coriolis' terms make up for masses that change along the way: with those of the velocities before, impacts would
     give energy. In absolute coordinates the projection that ends the step does that.
     """
-    y, z = A.clock.y, A.S.coordinates[0] + A.wide.shape[1]
-    if A.S.solver[0] == SCHUR or not struck(A):
+    y, z = A.clock.y, A.S.sizes.coordinates + A.wide.shape[1]
+    if A.S.sizes.solver == SCHUR or not struck(A):
         return
     for i in range(z, y.shape[1]):
         y[2, i] = A.clock.K[0, i]
     if evaluate_again(A, 1.0) == 0:
         for d in range(A.wide.shape[1]):
-            vdot = A.clock.K[0, A.S.coordinates[0] + d]
+            vdot = A.clock.K[0, A.S.sizes.coordinates + d]
             A.wide[V_AFTER, d] += 0.5 * (h * vdot - A.wide[SMOOTH, d])
-        for i in range(A.count[SPRINGS]):  # their dampers are taken at the velocities after impacts already
+        for i in range(A.count.springs):  # their dampers are taken at the velocities after impacts already
             s = 0.5 * h * A.spring_x[i, SPRING_C] * dot_rows(A.spring_J[i], A.wide[STRUCK])
             for d in range(A.wide.shape[1]):
                 A.wide[V_AFTER, d] += s * A.spring_Y[i, d]
@@ -286,7 +278,7 @@ def account(A, h):
     if struck(A):
         evaluate_again(A, 0.5)
     weigh_mean(A, h)
-    work = A.clock.K[0, S.coordinates[0] + A.wide.shape[1] :]
+    work = A.clock.K[0, S.sizes.coordinates + A.wide.shape[1] :]
     for r in range(S.rows.law.shape[0]):
         if S.rows.work[r] >= 0:
             work[S.rows.work[r]] = (A.lam[0, r] + A.lam[1, r] / h) * W.rows.nu[r]
@@ -297,7 +289,7 @@ def account(A, h):
             work[S.tree.work[b]] = A.wide[EFFORTS, d] * mean
     for d in range(A.wide.shape[1]):
         A.wide[WAY, d] = A.wide[V_AFTER, d] - A.wide[V_BEFORE, d]
-    for i in range(A.count[SPRINGS]):
+    for i in range(A.count.springs):
         k = int(A.spring_x[i, SPRING_OF])
         if S.forces.work[k] >= 0:
             rate = dot_rows(A.spring_J[i], A.wide[V_BEFORE]) + 0.5 * dot_rows(A.spring_J[i], A.wide[WAY])
@@ -327,7 +319,7 @@ def finish(A, M, X):
 
     It may be asked again, with others beside them.
     """
-    S, nq, nv, h = A.S, A.S.coordinates[0], A.wide.shape[1], A.real[STEP]
+    S, nq, nv, h = A.S, A.S.sizes.coordinates, A.wide.shape[1], A.real.step
     y, way = A.clock.y, A.wide[WAY]
     for d in range(nv):
         way[d] = 0.5 * h * A.wide[V_AFTER, d] + h * X.wide[d]
@@ -337,16 +329,16 @@ def finish(A, M, X):
     retract(S, y[0, :nq], way)
     for i in range(nq + nv, y.shape[1]):
         y[0, i] = y[1, i] + h * A.clock.K[0, i]
-    A.clock.real[T] = A.real[TIME] + h
+    A.clock.real.t = A.real.time + h
     put_right(A)
-    A.real[KINETIC] = -1.0
+    A.real.kinetic = -1.0
     if struck(A) or moved(X.wide):
         call(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)
-        A.real[KINETIC] = kinetic(A)
+        A.real.kinetic = kinetic(A)
         put_aside_poses(A)
-    A.W.options.placed[0] = 1.0
+    A.W.options.placed = 1.0
     status = call(A.door[0], S, A.W, A.R, A.clock, A.sheet, ARRIVE)
-    A.W.options.placed[0] = 0.0
+    A.W.options.placed = 0.0
     if status != 0:
         return status
     call(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)

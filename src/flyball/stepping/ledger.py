@@ -11,7 +11,6 @@ from __future__ import annotations
 from ..compiler.formulas import formula
 from ..equations.rows import row_times
 from ..math.vec import dot, load3, load9, mtv, mv
-from .joined import ASTRAY, KINETIC, POTENTIAL, WEIGHED
 
 
 @formula
@@ -38,19 +37,19 @@ def weighed(A, column):
 def reactions_work(A, lam, v):
     """Work of joints' impulses of impacts at velocities v, beyond that of what is prescribed."""
     for r in range(A.S.rows.law.shape[0]):
-        A.real[ASTRAY] -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.rows.nu[r])
+        A.real.astray -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.rows.nu[r])
 
 
 @formula
 def weigh_mean(A, h):
     """Keep gravity's work over the step at the mean velocities, at which impulses' works are taken too."""
-    A.real[WEIGHED] = h * weighed(A, 15)
+    A.real.weighed = h * weighed(A, 15)
 
 
 @formula
 def settle_account(A):
     """At the end of the step, where something was hit: what putting onto the joints took."""
     now = -weighed(A, 0)
-    if A.real[KINETIC] >= 0.0:
-        A.real[ASTRAY] += A.real[KINETIC] - kinetic(A) - (now - A.real[POTENTIAL]) - A.real[WEIGHED]
-    A.real[POTENTIAL] = now
+    if A.real.kinetic >= 0.0:
+        A.real.astray += A.real.kinetic - kinetic(A) - (now - A.real.potential) - A.real.weighed
+    A.real.potential = now

@@ -10,7 +10,6 @@ from ..compiler.formulas import formula
 from ..contact.tables import FOUND, MOVER, SHAPE_1, SHAPE_2
 from ..math.vec import add, cross, dot, load3, load9, mm, sub, transpose
 from ..numerics.cone.operator import seen
-from .joined import FIRST, KINETIC
 from .tables import FLAT, STEP
 
 PASSES = 16
@@ -20,7 +19,7 @@ ENOUGH = 1e3  # times the overlap that is none: what a pass may leave
 @formula
 def shifted(A, M, mover, axis, arm):
     """How far a point of a mover was moved along an axis by putting onto joints."""
-    k = mover - A.count[FIRST]
+    k = mover - A.count.first
     if k < 0:
         return 0.0
     turn = mm(load9(M.pose, mover, 3), transpose(load9(A.pose, k, 3)))
@@ -43,7 +42,7 @@ def sunk(G, A, M, C, P, Q, Y, aim, pace):
 
     ``aim`` has in column 0 the velocity that leaves no gap, by which ``Y`` was found.
     """
-    if not A.real[KINETIC] >= 0.0:
+    if not A.real.kinetic >= 0.0:
         return False
     h, worst = pace.real[STEP], 0.0
     for c in range(C.count[FOUND]):

@@ -19,11 +19,9 @@ from .joined import (
     LINE_AT,
     LINE_GROUP,
     LINE_OF,
-    LOST,
     MEASURED,
     MOST_AT,
     OF_FORCE,
-    OVERRUN,
     PRESSED,
     PULLED,
     REBOUND,
@@ -31,9 +29,7 @@ from .joined import (
     ROPE_C,
     ROPE_K,
     SHORTEST,
-    STEP,
     STOP,
-    TIME,
     V_AFTER,
     V_BEFORE,
     WHAT,
@@ -68,7 +64,7 @@ def rate_of(A, k, v):
 @formula
 def gap_of(A, k, side):
     """How far the quantity of a stop was from it when the step began; side 1 is the lower stop, -1 the upper."""
-    x = A.W.sensed[VALUE, A.line[k, MEASURED]] - 0.5 * A.real[STEP] * rate_of(A, k, A.wide[V_BEFORE])
+    x = A.W.sensed[VALUE, A.line[k, MEASURED]] - 0.5 * A.real.step * rate_of(A, k, A.wide[V_BEFORE])
     return x - A.line_x[k, LEAST] if side > 0 else A.line_x[k, MOST_AT] - x
 
 
@@ -80,7 +76,7 @@ def acts(A, k, side):
     r, dr = rate_of(A, k, A.wide[V_BEFORE]), rate_of(A, k, A.wide[CHANGE])
     if gap_of(A, k, side) < gap_of(A, k, -side):
         return True
-    return gap_of(A, k, side) < AHEAD * A.real[STEP] * (abs(r) + abs(dr)) + 1e-9
+    return gap_of(A, k, side) < AHEAD * A.real.step * (abs(r) + abs(dr)) + 1e-9
 
 
 @formula
@@ -119,7 +115,7 @@ def one_row(A, P, k, g, where):
 @formula
 def line_laws(A, P, n):
     """Biases, compliances and bounds of the lines, whose responses are known."""
-    h = A.real[STEP]
+    h = A.real.step
     P.size[3] = n
     for i in range(n):
         k = abs(A.active[i, LINE_OF]) - 1
@@ -141,12 +137,12 @@ def line_laws(A, P, n):
 @formula
 def friction_law(A, P, i, k, x):
     """Between -h F and h F. What moves no faster than rounding would have it is at rest, and held by more."""
-    h = A.real[STEP]
+    h = A.real.step
     g, at = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
     w = 0.0
     for d in range(A.group[g + 1] - A.group[g]):
         w += P.J[at + d] * P.Y[at + d]
-    t, arm, load = A.real[TIME] + 0.5 * h, A.line_x[k, LEAST], A.line_x[k, PRESSED]
+    t, arm, load = A.real.time + 0.5 * h, A.line_x[k, LEAST], A.line_x[k, PRESSED]
     rate = rate_of(A, k, A.wide[V_BEFORE])
     held = h * held_at_rest(A.S, A.W, A.line[k, OF_FORCE], t, arm, load)
     if abs(rate) > AT_REST * held * w:
@@ -157,7 +153,7 @@ def friction_law(A, P, i, k, x):
 @formula
 def rope_law(A, P, i, k, x):
     """-s = h (K (x - x0) + C r), at the place and the rate that `implicit` takes springs at; it never pushes."""
-    h = A.real[STEP]
+    h = A.real.step
     K, C = A.line_x[k, ROPE_K], A.line_x[k, ROPE_C]
     g, at = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
     w = 0.0
@@ -181,13 +177,13 @@ def lines_done(A, P, X):
         side = 1.0 if A.active[i, LINE_OF] > 0 else -1.0
         work = X.line[i] * side * 0.5 * (rate_of(A, k, A.wide[V_BEFORE]) + rate_of(A, k, A.wide[V_AFTER]))
         if A.line[k, WHAT] == STOP:
-            A.real[LOST] -= work
+            A.real.lost -= work
         else:
             f = A.line[k, OF_FORCE]
             if A.S.forces.work[f] >= 0:
-                z = A.S.coordinates[0] + A.wide.shape[1] + A.S.forces.work[f]
-                A.clock.K[0, z] += work / A.real[STEP]
-            A.line_x[k, PULLED] = X.line[i] * side / A.real[STEP]
+                z = A.S.sizes.coordinates + A.wide.shape[1] + A.S.forces.work[f]
+                A.clock.K[0, z] += work / A.real.step
+            A.line_x[k, PULLED] = X.line[i] * side / A.real.step
     press(A)
 
 
@@ -197,7 +193,7 @@ def press(A):
     if A.S.load_terms.load.shape[0] == 0:
         return
     for r in range(A.lam.shape[1]):
-        A.W.rows.multiplier[r] = A.lam[0, r] + (A.lam[1, r] + A.lam[2, r]) / A.real[STEP]
+        A.W.rows.multiplier[r] = A.lam[0, r] + (A.lam[1, r] + A.lam[2, r]) / A.real.step
     reaction_loads(A.S, A.W)
     for k in range(A.line.shape[0]):
         if A.line[k, WHAT] == FRICTION and A.S.forces.load[A.line[k, OF_FORCE]] >= 0:
@@ -207,7 +203,7 @@ def press(A):
 @formula
 def stops_only(A, P, X):
     """For the second solve: stops let pass what they are overrun by, and nothing else acts."""
-    A.real[OVERRUN] = 0.0
+    A.real.overrun = 0.0
     for i in range(P.size[3]):
         k = abs(A.active[i, LINE_OF]) - 1
         side = 1 if A.active[i, LINE_OF] > 0 else -1
@@ -216,6 +212,6 @@ def stops_only(A, P, X):
         x[SOFT] = x[LOW] = x[HIGH] = 0.0
         if A.line[k, WHAT] == STOP:
             mean = 0.5 * (rate_of(A, k, A.wide[V_BEFORE]) + rate_of(A, k, A.wide[V_AFTER]))
-            gap = gap_of(A, k, side) + A.real[STEP] * side * mean
-            A.real[OVERRUN] = min(A.real[OVERRUN], gap)
-            x[BIAS], x[HIGH] = gap / A.real[STEP], INFINITE
+            gap = gap_of(A, k, side) + A.real.step * side * mean
+            A.real.overrun = min(A.real.overrun, gap)
+            x[BIAS], x[HIGH] = gap / A.real.step, INFINITE

@@ -26,11 +26,6 @@ from ..math.vec import load3, put3
 from ..numerics.cone.operator import push, seen
 from ..numerics.cone.problem import (
     CONVERGED,
-    ENDED,
-    ENOUGH,
-    FORCE_RESIDUAL,
-    MOST,
-    RESIDUAL,
     Choices,
     Problem,
     Scratch,
@@ -38,26 +33,20 @@ from ..numerics.cone.problem import (
 )
 from .bounce import ROUNDS, bounce, hits, no_kicks
 from .joined import (
-    ASTRAY,
     BEGIN,
     CONSISTENT,
     FINISH,
-    FIRST,
     FREE,
     KEEP,
     KICKED,
-    LOST,
     MEAN,
     NO_ROOM,
     NO_WAY,
-    OVERRUN,
     POSES,
     ROWS,
     TOO_LONG,
     Joined,
 )
-from .joined import STEP as JOINTS_STEP
-from .joined import TIME as JOINTS_TIME
 from .joined import VELOCITIES as VELOCITIES_AFTER
 from .lifts import PASSES as AGAIN
 from .lifts import sunk
@@ -114,10 +103,10 @@ from .tables import (
 @formula
 def solved(address, P, X, W, O, F, pace, most, enough):
     """Go through a solver's door; keeps what came of it."""
-    O.count[MOST] = most
-    O.real[ENOUGH] = enough
+    O.count.most = most
+    O.real.enough = enough
     pace.count[ITERATIONS] += call(address, P, X, W, O, F, 0)
-    return O.count[ENDED]
+    return O.count.ended
 
 
 @formula
@@ -132,7 +121,7 @@ def held_by_joints(A, M, C, P, X, pace, task):
 def without_contact(A, M, C, P, X, N, pace):
     """Velocities that bodies would have at the end of the step if nothing touched."""
     fall(N, M, P, X, pace)
-    A.real[JOINTS_TIME], A.real[JOINTS_STEP] = pace.real[TIME], pace.real[STEP]
+    A.real.time, A.real.step = pace.real[TIME], pace.real[STEP]
     return held_by_joints(A, M, C, P, X, pace, FREE)
 
 
@@ -151,18 +140,18 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
         return TOO_LONG
     ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
     for n in range(PASSES if yielding else 0):
-        if settled(linearise(G, C, P, L, X, pace, now), O.real[RESIDUAL], pace) or (ended != CONVERGED and n == FEW):
+        if settled(linearise(G, C, P, L, X, pace, now), O.real.residual, pace) or (ended != CONVERGED and n == FEW):
             break
         put_back(N, M, X)
         held_by_joints(A, M, C, P, X, pace, BEGIN)
         ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
-    if ended != CONVERGED and O.real[RESIDUAL] > pace.real[ROUGH] * pace.real[STEP]:
+    if ended != CONVERGED and O.real.residual > pace.real[ROUGH] * pace.real[STEP]:
         pace.count[CUTS] += 1
-    pace.real[LEFT_OVER] = O.real[RESIDUAL]
-    if O.real[RESIDUAL] > pace.real[WORST_RESIDUAL]:
-        pace.real[WORST_RESIDUAL] = O.real[RESIDUAL]
+    pace.real[LEFT_OVER] = O.real.residual
+    if O.real.residual > pace.real[WORST_RESIDUAL]:
+        pace.real[WORST_RESIDUAL] = O.real.residual
         pace.real[WORST_AT] = pace.real[TIME] + pace.real[STEP]
-    pace.real[WORST_FORCE] = max(pace.real[WORST_FORCE], O.real[FORCE_RESIDUAL])
+    pace.real[WORST_FORCE] = max(pace.real[WORST_FORCE], O.real.force_residual)
     held_by_joints(A, M, C, P, X, pace, KEEP)
     return DONE
 
@@ -179,7 +168,7 @@ def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
     h = pace.real[STEP]
     halfway(N, X, Y)
     held_by_joints(A, M, C, P, Y, pace, MEAN)
-    deepest = A.real[OVERRUN] if pace.door[JOINTS] != 0 else 0.0
+    deepest = A.real.overrun if pace.door[JOINTS] != 0 else 0.0
     for c in range(C.count[FOUND]):
         u = seen(P, Y.v, Y.wide, c)
         gap = C.x[c, GAP] + h * u[0]
@@ -234,7 +223,7 @@ def onto_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, pace, now):
 def ledger(A, pace):
     """Energies that contacts, stops and joints exchanged so far, and those that the method took; counts of impacts."""
     real, count = pace.real, pace.count
-    energies = real[LOST_IMPACT], real[LOST_FRICTION], real[GIVEN], real[NUMERICAL], A.real[LOST], A.real[ASTRAY]
+    energies = real[LOST_IMPACT], real[LOST_FRICTION], real[GIVEN], real[NUMERICAL], A.real.lost, A.real.astray
     return energies, (count[IMPACTS], count[REDUCED], count[ENDLESS])
 
 
@@ -246,12 +235,12 @@ def back(N, M, A, X, pace, sums):
         for i in range(6):
             X.v[k, i] = N.start[k, 12 + i]
     for d in range(X.wide.shape[0]):
-        X.wide[d] = A.clock.y[1, A.S.coordinates[0] + d]
+        X.wide[d] = A.clock.y[1, A.S.sizes.coordinates + d]
     for r in range(A.lam.shape[1]):
         A.lam[2, r] = 0.0
     real, count = pace.real, pace.count
     energies, counts = sums
-    real[LOST_IMPACT], real[LOST_FRICTION], real[GIVEN], real[NUMERICAL], A.real[LOST], A.real[ASTRAY] = energies
+    real[LOST_IMPACT], real[LOST_FRICTION], real[GIVEN], real[NUMERICAL], A.real.lost, A.real.astray = energies
     count[IMPACTS], count[REDUCED], count[ENDLESS] = counts
 
 
@@ -337,7 +326,7 @@ def onward(G, A, M, C, D, H, B, N, P, X, L, pace, now, before, hit):
 
     hit: whether there were impacts.
     """
-    if not begin_contacts(G, M, C, D, N, P, X, L, pace, now, before, (A.count[FIRST], hit)):
+    if not begin_contacts(G, M, C, D, N, P, X, L, pace, now, before, (A.count.first, hit)):
         return DONE
     half_on(N, M, X, pace.real[STEP])
     held_by_joints(A, M, C, P, X, pace, POSES)

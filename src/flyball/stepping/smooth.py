@@ -12,10 +12,9 @@ from ..compiler.formulas import call, formula
 from ..equations.tasks import MOTION
 from ..equations.tree import retract
 from ..math.scalar import sqrt
-from ..numerics.integrators.clock import T
 from .gauges import note_bends, note_lengths
 from .implicit import implied, stiffened, take_springs
-from .joined import ANYHOW, CHANGE, EFFORTS, EVALUATED, NOT_SETTLED, SMOOTH, SPRINGS, STEP, TIME, UNSETTLED, V_BEFORE
+from .joined import CHANGE, EFFORTS, NOT_SETTLED, SMOOTH, V_BEFORE
 
 MIXED = 5  # evaluations that the next guess is made of
 MOST = 40
@@ -28,20 +27,20 @@ NOTHING = 1e-12  # part of a column that is left of it: it says nothing new
 @formula
 def free_velocities(A):
     """Go half a step on, and find there how the velocities change by all but contact. Returns a status."""
-    nq, nv = A.S.coordinates[0], A.wide.shape[1]
-    y, h = A.clock.y, A.real[STEP]
+    nq, nv = A.S.sizes.coordinates, A.wide.shape[1]
+    y, h = A.clock.y, A.real.step
     before, change, half = A.wide[V_BEFORE], A.wide[CHANGE], A.mixing[HALF]
     for d in range(nv):
         before[d] = y[0, nq + d]
         change[d] = 0.0
         half[d] = 0.5 * h * before[d]
     retract(A.S, y[0, :nq], half)
-    A.clock.real[T] = A.real[TIME] + 0.5 * h
+    A.clock.real.t = A.real.time + 0.5 * h
     for n in range(MOST):
         for d in range(nv):
             y[0, nq + d] = before[d] + 0.5 * change[d]
         status = call(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, MOTION)
-        A.count[EVALUATED] += 1
+        A.count.evaluated += 1
         if status != 0:
             return status
         put_aside(A, h)
@@ -54,14 +53,14 @@ def free_velocities(A):
             return 0
         if n < MOST - 1:
             guess(A, n)
-    A.count[UNSETTLED] += 1
-    return 0 if A.count[ANYHOW] != 0 else NOT_SETTLED
+    A.count.unsettled += 1
+    return 0 if A.count.anyhow != 0 else NOT_SETTLED
 
 
 @formula
 def put_aside(A, h):
     """What the evaluation found: h vdot, multipliers, efforts of drivers. Solving for others writes over it."""
-    nq = A.S.coordinates[0]
+    nq = A.S.sizes.coordinates
     for d in range(A.wide.shape[1]):
         A.wide[SMOOTH, d] = h * A.clock.K[0, nq + d]
         A.wide[EFFORTS, d] = A.W.velocities.effort[d]
@@ -75,7 +74,7 @@ def miss(A, h):
     now, change = A.mixing[NOW], A.wide[CHANGE]
     for d in range(now.shape[0]):
         now[d] = A.wide[SMOOTH, d] - change[d]
-    for i in range(A.count[SPRINGS]):
+    for i in range(A.count.springs):
         s = implied(A, h, i, A.wide[V_BEFORE], change)
         for d in range(now.shape[0]):
             now[d] -= s * A.spring_Y[i, d]

@@ -14,7 +14,7 @@ from ..equations.engine import engine
 from ..numerics.cone.problem import Choices, Problem, Scratch, State
 from ..numerics.cone.rooms import rooms, unfilled
 from .free import rotation_matrices
-from .joined import ANYHOW, JOBS, NEEDED, NO_ROOM, NO_WAY, START, TOO_LONG, Joined, no_mechanism
+from .joined import NO_ROOM, NO_WAY, START, TOO_LONG, Joined, no_mechanism
 from .joints import joined
 from .march import march_kernel
 from .solvers import Solvers, solvers, told
@@ -80,7 +80,7 @@ def make_rooms(
 ) -> Rooms:
     """Rooms for as many contacts; what is remembered of contacts, and velocities, are taken over from ``old``."""
     groups, lines = len(A.group) - 1, len(A.active)
-    P = unfilled(contacts, len(node), groups, lines, int(A.count[NEEDED]), turning)._replace(node=node)
+    P = unfilled(contacts, len(node), groups, lines, int(A.count.needed), turning)._replace(node=node)
     P.group[:] = A.group
     hard = {"mu": np.zeros(contacts), "soft": np.zeros(contacts), "turn": np.zeros((0, 2))}
     Q = P._replace(bias=np.zeros((contacts, 3)), **hard)
@@ -246,13 +246,13 @@ class Stepper:
         for _ in range(2):
             self._next(0.5 * h)
             self.pace.count[LEFT] = 1
-            self.joints.count[ANYHOW] = depth == 1
+            self.joints.count.anyhow = depth == 1
             self.pace.count[DIVIDES] = divides and depth > 1
             try:
                 self._march()
             except (NoWay, TooLong):
                 self._in_halves(0.5 * h, depth - 1)
-        self.joints.count[ANYHOW] = 0
+        self.joints.count.anyhow = 0
         self.pace.count[DIVIDES] = divides
 
     def _march(self) -> None:
@@ -281,8 +281,8 @@ class Stepper:
     def _roomier(self) -> None:
         """More room for rows of contacts on the mechanism."""
         A = self.joints
-        A.count[NEEDED] = int(ROOMIER * A.count[NEEDED])
-        self.joints = A._replace(job=np.zeros((int(ROOMIER * A.count[JOBS]) + 1, 3), np.int64))
+        A.count.needed = int(ROOMIER * A.count.needed)
+        self.joints = A._replace(job=np.zeros((int(ROOMIER * A.count.jobs) + 1, 3), np.int64))
         self.rooms = self._rooms(len(self.rooms.P.mu))
 
     def _rooms(self, contacts: int) -> Rooms:

@@ -65,7 +65,7 @@ def _told(model: Model, wish: str, tree: Sequence[str]) -> str:
 def _clear(c: Compiled, wish: str) -> bool:
     """Whether, as drawn, inertia moves along all velocities and rows leave no reaction open that a friction follows."""
     s, S = c.structure, c.values.system
-    light, loaded = S.semidefinite[0] != 0.0, bool(s.loads) and wish != "absolute"
+    light, loaded = S.scales.semidefinite != 0.0, bool(s.loads) and wish != "absolute"
     if not light and not loaded:
         return True
     T = traced(s, plain(S))

@@ -22,7 +22,7 @@ FACTOR = 1.0  # a product of the factorisation: seen only where a forest's matri
 def counts(s: Structure) -> dict[str, float]:
     """How much there is of each kind of work."""
     t = s.tables
-    tree, solver = t["tree"], t["solver"][0]
+    tree, solver = t["tree"], t["sizes"].solver
     column = np.diff(s.ldl.Lp).astype(float)
     free = tree.joint <= POINT
     return {

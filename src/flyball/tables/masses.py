@@ -23,7 +23,7 @@ def mass_table(s: Structure, bodies: Mapping, places: np.ndarray, length: Any, n
     joint = s.tables["tree"].joint
     table = new.table("bodies", blank(Bodies, len(joint), places.dtype), places.dtype)
     moved = {f.body for f in s.frames if new.asks(f.element)}
-    rescaled = new.base is None or new.base.system.length[0] != length
+    rescaled = new.base is None or new.base.system.scales.length != length
     usual = usual_mass([d.mass for name, d in bodies.items() if name != GROUND])
     reach = _reaches(s, places)
     for name, b in s.place.items():

@@ -45,7 +45,7 @@ def patterns(s: Structure, solved: bool = True) -> None:
         "sensor_drivers": integers(SensorDrivers, following),
         "load_terms": integers(LoadTerms, loads),
     }
-    solver = s.tables["solver"][0]
+    solver = s.tables["sizes"].solver
     if not solved:
         _nothing(s)
     elif solver == SCHUR:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..compiler.layout import COMPLEX, CodeTables1, Float1, Int1, Int2, Number1, Number2
+from ..compiler.layout import COMPLEX, CodeTables1, Int1, Int2, Number1, Number2, Record
 from ..constraints.registry import KINDS
 from ..numerics.ldl import Pattern
 
@@ -221,6 +221,24 @@ class Blocks(NamedTuple):
     row: Int1
 
 
+class Sizes(Record, kind="Int"):
+    """How the equations are solved, and how many there are of what."""
+
+    solver: int  # SCHUR, COUPLED or ARTICULATED
+    coordinates: int
+    moving_frames: int  # frames that are kept up to date
+    ground_frames: int  # those of them that are on ground
+
+
+class Scales(Record, kind="Number"):
+    """What things are compared with."""
+
+    regularization: float  # of the solve, relative
+    semidefinite: float  # 1 if some mass or inertia is none, else 0
+    length: float  # a typical length [m]
+    rate: float  # a typical rate [1/s] (`tempo`)
+
+
 class System(NamedTuple):
     """A mechanism in arrays. Nothing in it changes during an analysis."""
 
@@ -245,17 +263,11 @@ class System(NamedTuple):
     guards: Guards
     control_laws: Int1  # (nc,): law of the rate of each controller's state, the first of all states; -1: sampled
     kind_terms: Int1  # (TERM_KINDS + 1,): first term of each kind
-    solver: Int1  # (1,): SCHUR, COUPLED or ARTICULATED
-    coordinates: Int1  # (1,): number of coordinates
-    moving_frames: Int1  # (1,): number of frames that are kept up to date
-    ground_frames: Int1  # (1,): number of those of them that are on ground
+    sizes: Sizes
     code: Int1  # bytecode of the laws
     const: Number1  # parameters, literals of the laws, splines
     gravity: Number1  # (3,) [m/s^2]
-    regularization: Number1  # (1,): of the solve, relative
-    semidefinite: Number1  # (1,): 1 if some mass or inertia is none, else 0
-    length: Number1  # (1,): a typical length [m]
-    rate: Number1  # (1,): a typical rate [1/s] (`tempo`)
+    scales: Scales
     units: Number1  # (nm,): what each measured quantity is compared with: that length, or a radian
     mass_entries: MassEntries
     pairs: Pairs
@@ -265,8 +277,7 @@ class System(NamedTuple):
 
 
 NUMBERS = (
-    "bodies", "frames", "term_parameters", "force_parameters", "switch_numbers", "const", "gravity", "regularization",
-    "semidefinite", "length", "rate", "units",
+    "bodies", "frames", "term_parameters", "force_parameters", "switch_numbers", "const", "gravity", "scales", "units",
 )  # fmt: skip
 """The fields of `System` that hold numbers: they change with parameters, and may be complex, or expressions."""
 
@@ -288,7 +299,8 @@ def arrays(table: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
 def changed(function: Callable[[str, np.ndarray], Any], table: Any, name: str = "") -> Any:
     """The table of what a function makes of each array in it, and of its name."""
     if not isinstance(table, tuple):
-        return function(name, table)
+        made = function(name, table)
+        return made.view(type(table)) if isinstance(table, Record) else made
     fields = zip(table._fields, table, strict=True)  # type: ignore[attr-defined]
     return type(table)(*(changed(function, x, f"{name}.{field}" if name else field) for field, x in fields))
 
@@ -348,33 +360,33 @@ class Modes(NamedTuple):
     inverse_slopes: Number2  # (nw, nw): sides by du/dt
 
 
-class Options(NamedTuple):
-    """Choices of the analysis, and what it reports [(1,)]."""
+class Options(Record, kind="Float"):
+    """Choices of the analysis, and what it reports."""
 
-    stabilization: Float1
-    position_tolerance: Float1
-    velocity_tolerance: Float1
-    alpha: Float1  # of Baumgarte's stabilization
-    beta: Float1
-    position_violation: Float1  # largest met
-    velocity_violation: Float1
-    solve_tolerance: Float1  # relative residual of a solve that passes
-    partitioned: Float1  # whether solves are for the dependent coordinates alone
-    deferred: Float1  # whether accelerations at output times are found when they are asked for
-    placed: Float1  # whether only positions and velocities are wanted
+    stabilization: float
+    position_tolerance: float
+    velocity_tolerance: float
+    alpha: float  # of Baumgarte's stabilization
+    beta: float
+    position_violation: float  # largest met
+    velocity_violation: float
+    solve_tolerance: float  # relative residual of a solve that passes
+    partitioned: float  # whether solves are for the dependent coordinates alone
+    deferred: float  # whether accelerations at output times are found when they are asked for
+    placed: float  # whether only positions and velocities are wanted
 
 
-class Counts(NamedTuple):
-    """Counters of a run [(1,)]."""
+class Counts(Record, kind="Int"):
+    """Counters of a run."""
 
-    status: Int1
-    guilty_row: Int1  # the row that a failure is due to
-    evaluations: Int1
-    factorisations: Int1
-    solves: Int1
-    projections: Int1
-    load_updates: Int1  # how many loads' slopes are known
-    exchanges: Int1  # of dependent coordinates
+    status: int
+    guilty_row: int  # the row that a failure is due to
+    evaluations: int
+    factorisations: int
+    solves: int
+    projections: int
+    load_updates: int  # how many loads' slopes are known
+    exchanges: int  # of dependent coordinates
 
 
 class Work(NamedTuple):

@@ -18,7 +18,7 @@ from ..model.joint import Coordinate, Joint
 from ..model.touch import Touch
 from .forest import step_of
 from .specs import RowSpec, Structure, TermSpec, frame, integers
-from .system import ARTICULATED, COUPLED, SCHUR, TERM_KINDS, Angles, Forces, Rows
+from .system import ARTICULATED, COUPLED, SCHUR, TERM_KINDS, Angles, Forces, Rows, Sizes
 
 
 def rows(s: Structure, holds: Sequence[Initial]) -> None:
@@ -182,8 +182,7 @@ def sort(s: Structure) -> None:
     solver = SCHUR if absolute else COUPLED if s.rows or s.coupled else ARTICULATED
     moving = ground + sum(s.frames[new[k]].body >= 0 for k in used)
     s.tables["kind_terms"] = terms.astype(np.int64)
-    sizes = {"solver": solver, "coordinates": s.nq, "moving_frames": moving, "ground_frames": ground}
-    s.tables |= {name: np.array([n], np.int64) for name, n in sizes.items()}
+    s.tables["sizes"] = np.array([solver, s.nq, moving, ground], np.int64).view(Sizes)
     _force_frames(s, new)
 
 

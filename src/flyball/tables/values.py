@@ -31,7 +31,7 @@ from .numbers import Numbers, kind_of, numbers
 from .points import check_centred
 from .poses import Poses
 from .specs import Structure, TermSpec
-from .system import FLAT, Frames, SwitchNumbers, System, blank
+from .system import FLAT, Frames, Scales, SwitchNumbers, System, blank
 from .tempo import tempo
 
 NO_LENGTH = 1e-13  # of coordinates: a distance that is their rounding
@@ -165,12 +165,12 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     semidefinite = float((table.excess_inertia != 0.0).any() or (table.excess_mass != 0.0).any())
     gravity = model.gravity_vector(env)
     pace = tempo(given, model, gravity, length)
-    one = {"regularization": REGULARISATION, "semidefinite": semidefinite, "length": length, "rate": pace}
+    scales = np.array([REGULARISATION, semidefinite, length, pace], dtype).view(Scales)
     system = System(  # type: ignore[misc]
         **s.tables,
         bodies=table, frames=frames, term_parameters=terms, force_parameters=forces, switch_numbers=of_switches,
         force_code=addresses(s), const=const, gravity=np.array([*gravity], dtype),
-        **{name: np.array([x], dtype) for name, x in one.items()}, units=np.array(_units(s, length), dtype),
+        scales=scales, units=np.array(_units(s, length), dtype),
         ldl=s.ldl, flat=np.zeros(FLAT, np.int64),
     )  # fmt: skip
     x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, float(length.real), pose)

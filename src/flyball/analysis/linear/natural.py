@@ -63,7 +63,7 @@ class _Sizes:
         self.rate = np.abs(e.state.vdot[at])  # of a newton on 1 kg
         among = abs(K[own][:, own]).multiply(size[own]).multiply(size[own][:, None])
         inertia = float((size**2 * M)[own].max(initial=0.0))
-        pace = float(c.values.system.rate[0].real)
+        pace = float(c.values.system.scales.rate.real)
         self.energy = _energy(e, float(among.max() if among.nnz else 0.0), size * own) or inertia * pace**2 or 1.0
         self.speed = np.sqrt(self.energy / inertia) if inertia > 0.0 else 1.0  # [1/s]
         self.forces = _largest(abs(K[own][:, at]).multiply(size[own][:, None]), 0)  # by each state

@@ -53,7 +53,7 @@ def is_steady(x: State, e: Equations, f: Free, frame: Frame) -> bool:
 
 def still(x: State) -> bool:
     """Whether nothing moves, compared with the mechanism's own rate, or with what forces give."""
-    scale, pace = x.c.sizes / x.c.values.length, float(x.c.values.system.rate[0].real)
+    scale, pace = x.c.sizes / x.c.values.length, float(x.c.values.system.scales.rate.real)
     given = np.sqrt(pace**2 + np.abs(x.vdot / scale).max(initial=0.0))
     return not (np.abs(x.v) / scale).max(initial=0.0) > STILL * given
 

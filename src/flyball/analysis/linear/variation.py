@@ -95,7 +95,7 @@ def followed(loop: Variation) -> Varied:
     at = 1 + clock.accounts
     own = clock._replace(real=clock.real.copy(), count=clock.count.copy(), y=clock.y.copy(), K=clock.K.copy())
     rows, _ = run_clock(start.assembly, own, loop.R, _silent, FOLLOW)
-    if own.count[ex.STATUS] != ex.DONE:
+    if own.count.status != ex.DONE:
         raise loop.stopped(own, alone=True)
     z, n = clock.accounts - loop.nq - loop.nv, len(clock.accounts)
 
@@ -195,9 +195,9 @@ class Variation:
         buffer = np.zeros((max(2, min(len(clock.times), FOUND // self.width + 1)), self.width))
         none = np.zeros((0, self._long))
         rows = []
-        while clock.count[ex.STATUS] == ex.RUNNING:
+        while clock.count.status == ex.RUNNING:
             rows.append(buffer[: self._call(clock, none, buffer)].copy())
-        if clock.count[ex.STATUS] != ex.DONE:
+        if clock.count.status != ex.DONE:
             raise self.stopped(clock)
         self.ended = clock
         return self._varied(np.concatenate(rows))
@@ -242,7 +242,7 @@ class Variation:
         Y[0, :at], Y[0, at : at + more], Y[0, at + more : at + more + self.nz] = y[:at], changes.ravel(), y[at:]
         accounts = [own.accounts + more + k * self.nz for k in range(n + 1)]
         count = own.count.copy()
-        count[ex.CONTROLLED] = at + more
+        count.controlled = at + more
         return own._replace(
             real=own.real.copy(), count=count, y=Y, K=np.zeros((len(own.K), self._long)),
             accounts=np.concatenate(accounts).astype(np.int64),
@@ -262,9 +262,9 @@ class Variation:
 
     def stopped(self, clock: ex.Clock, t: float | None = None, alone: bool = False) -> SimulationError:
         """Why it went no further; ``alone``: the clock is that of the motion, without the changes."""
-        t = float(clock.real[ex.T]) if t is None else t
+        t = float(clock.real.t) if t is None else t
         real, own = clock.real.copy(), self.clock
-        real[ex.T] = t
+        real.t = t
         y, at = own.y.copy(), self.nq + self.nv
         changes = 0 if alone else 2 * self.nv * self.n
         y[0, :at], y[0, at:] = clock.y[0, :at], clock.y[0, at + changes :][: self.nz]

@@ -92,7 +92,7 @@ def nodes(
     shortest = SHORT * (rows[-1, 0] - rows[0, 0])
     for _ in range(ROUNDS):
         pieces, error = _pieces(known[:, 0], P)
-        allowed = ex.LOOSER * clock.real[ex.RTOL] * (clock.real[ex.LEDGER] + np.abs(pieces).sum())
+        allowed = ex.LOOSER * clock.real.rtol * (clock.real.ledger + np.abs(pieces).sum())
         uneven = _largest(np.where(np.diff(known[:, 0]) > shortest, error, 0.0), allowed)
         more = _halfway(a, clock, known, uneven) if len(uneven) else known[:0]
         if not len(more):
@@ -163,9 +163,9 @@ def _halfway(a: Assembly, clock: ex.Clock, known: np.ndarray, pieces: np.ndarray
     own.y[0] = first[1 : 1 + clock.y.shape[1]]
     own.real[[ex.T, ex.T_END]] = first[0], times[-1]
     own.count[[ex.STARTED, ex.NEXT, ex.ACCEPTED, ex.REJECTED, ex.STATUS]] = 0
-    own.count[ex.QUOTA] = own.count[ex.LIMIT] = CALLS
+    own.count.quota = own.count.limit = CALLS
     rows = []
-    while own.count[ex.STATUS] == ex.RUNNING:
+    while own.count.status == ex.RUNNING:
         used = motion_kernel(c.system, c.work, tableau("rk45"), own, out, FOLLOW)
         rows.append(out[:used].copy())
     return np.concatenate(rows)[1:]

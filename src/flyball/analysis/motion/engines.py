@@ -111,17 +111,17 @@ class Engine:
 
     def begin(self, clock: ex.Clock) -> None:
         """The motion begins there."""
-        self._first = float(clock.real[ex.T])
+        self._first = float(clock.real.t)
         if self.due < math.inf:
-            self._counted = int(self.c.work.counts.evaluations[0])
+            self._counted = int(self.c.work.counts.evaluations)
 
     def choose_again(self, clock: ex.Clock) -> None:
         """Take made code for the rest of the motion, if it is time to decide and that pays."""
-        steps = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED])
+        steps = int(clock.count.accepted + clock.count.rejected)
         if steps < self.due:
             return
         self.due = AGAIN * steps
-        t, end = clock.real[ex.T], clock.real[ex.T_END]
+        t, end = clock.real.t, clock.real.t_end
         if t > self._first:
             self._choose(self._spent() * float((end - t) / (t - self._first)))
 
@@ -129,18 +129,18 @@ class Engine:
         """Whether made code got stuck, and the engine for all mechanisms goes on from the last step: through, or it
         leaves in the scratch what the reason is told from.
         """
-        if self.c.made is None or clock.count[ex.STATUS] not in FAILED:
+        if self.c.made is None or clock.count.status not in FAILED:
             return False
-        self.told += f"; table-driven from t = {clock.real[ex.T]:.6g} s on, where it could not go on"
+        self.told += f"; table-driven from t = {clock.real.t:.6g} s on, where it could not go on"
         self.c.run_on_tables()
-        clock.count[ex.STATUS], clock.real[ex.GROW] = ex.RUNNING, 1.0
-        clock.real[ex.H] = max(clock.real[ex.H], clock.real[ex.WIDE])
+        clock.count.status, clock.real.grow = ex.RUNNING, 1.0
+        clock.real.h = max(clock.real.h, clock.real.wide)
         afresh(clock)
         return True
 
     def limited(self, clock: ex.Clock, steps: float) -> int:
         """So many steps as a call of the compiled loop should take, or as are left until it is time to choose."""
-        done = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED])
+        done = int(clock.count.accepted + clock.count.rejected)
         return int(min(max(steps, 1.0), max(self.due - done, 1.0), LONGEST))
 
     def stop(self) -> None:
@@ -157,7 +157,7 @@ class Engine:
 
     def _spent(self) -> float:
         """What was computed since it began [ns]."""
-        return (int(self.c.work.counts.evaluations[0]) - self._counted) * self._each
+        return (int(self.c.work.counts.evaluations) - self._counted) * self._each
 
     def _wanted(self, without: str) -> None:
         try:

@@ -39,7 +39,7 @@ def fastest(c: Compiled, clock: ex.Clock, pace: float) -> complex:
         parts.append(slice(s.nq + s.nv, n))
     unit, size = np.ones(n), np.maximum(np.abs(y[:n]), 1.0)
     unit[parts[1]] = pace
-    rates = _rates(c, float(clock.real[ex.T]), n)
+    rates = _rates(c, float(clock.real.t), n)
     here = rates(y)
 
     def product(x: np.ndarray) -> np.ndarray:
@@ -61,7 +61,7 @@ def bend(clock: ex.Clock) -> float:
     Over the fastest rate: what swings as fast is about so large, or less.
     """
     y = clock.y
-    return float(scaled(clock, clock.K[0] - y[ex.OLD_RATE], np.abs(y[ex.NOW]), int(clock.count[ex.CONTROLLED])))
+    return float(scaled(clock, clock.K[0] - y[ex.OLD_RATE], np.abs(y[ex.NOW]), int(clock.count.controlled)))
 
 
 def _rates(c: Compiled, t: float, n: int) -> Callable[[np.ndarray], np.ndarray]:

@@ -34,10 +34,10 @@ def open_until_asked(start: Start, o: Integration, task: int) -> bool:
 
 def standing(ny: int, t: float = 0.0) -> ex.Clock:
     """Time and state, so many numbers, for tasks that integrate nothing."""
-    real = np.zeros(ex.REALS)
-    real[ex.T] = t
+    real = ex.ClockReals.blank()
+    real.t = t
     none = np.zeros(0, np.int64)
-    count, y, K = np.zeros(ex.COUNTS, np.int64), np.zeros((ex.STATES, ny)), np.zeros((1, ny))
+    count, y, K = ex.ClockCounts.blank(), np.zeros((ex.STATES, ny)), np.zeros((1, ny))
     return ex.Clock(real, count, np.zeros(0), y, K, none, np.zeros((ROWS, 0)))
 
 
@@ -49,7 +49,7 @@ def solved(start: Start, rows: np.ndarray, health: Health) -> tuple[np.ndarray, 
     c = start.assembly.compiled
     s, W = c.structure, c.work
     ny = s.nq + s.nv + len(s.states)
-    W.options.deferred[0] = 0.0
+    W.options.deferred = 0.0
     out = rows.copy()
     if motion_kernel(c.system, W, tableau("rk45"), standing(ny), out, COMPLETE):
         health.remarks = (*health.remarks, unsolved(c, out))

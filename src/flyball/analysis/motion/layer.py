@@ -143,7 +143,7 @@ def _unsound(c: Compiled, a: Assembly) -> str | None:
     while its neighbour keeps its place. The factorisation then divides by rounding errors, or by zero.
     """
     s, S = c.structure, c.values.system
-    if S.semidefinite[0] == 0.0 or S.solver[0] != COUPLED or not s.nv:
+    if S.scales.semidefinite == 0.0 or S.sizes.solver != COUPLED or not s.nv:
         return None
     q, v = c.take(a.compiled, a.t, a.q, a.v)
     c.at(a.t, q, v, MOTION)

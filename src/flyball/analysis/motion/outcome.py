@@ -52,8 +52,8 @@ def outcome(
     """
     start, clock = here.start, here.clock
     a, model = start.assembly, start.base.compiled.structure.model
-    status = int(clock.count[ex.STATUS])
-    t = float(clock.real[ex.T])
+    status = int(clock.count.status)
+    t = float(clock.real.t)
     message, cause = here.stopped or "reached the end", here.failed
     if interrupted:
         message = f"interrupted by the user at t = {t:.6g} s; what was computed is kept"
@@ -101,15 +101,15 @@ def outcome(
 
 def _behind(a: Assembly, clock: ex.Clock) -> str:
     """What is behind a step of fixed width that has no solution, if it is known; else nothing."""
-    t = float(clock.real[ex.T])
+    t = float(clock.real.t)
     text = crossed(a.compiled, t)
-    return f"at t = {t:.6g} s, {text}" if text else of_drivers(a.compiled, t, float(clock.real[ex.LARGEST]))
+    return f"at t = {t:.6g} s, {text}" if text else of_drivers(a.compiled, t, float(clock.real.largest))
 
 
 def _for_the_next(here: Here, followed: bool) -> dict[str, Any]:
     """What the next part of the motion begins with."""
     pace, found = here.start.pace, {"open": here.start.part.open, "followed": followed}
-    return found | {"by": pace.carried if pace else "", "width": float(here.clock.real[ex.H])}
+    return found | {"by": pace.carried if pace else "", "width": float(here.clock.real.h)}
 
 
 def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
@@ -120,8 +120,8 @@ def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
         message="",
         violation=float(array("options.position_violation")[0]),
         velocity_violation=float(array("options.velocity_violation")[0]),
-        steps=int(clock.count[ex.ACCEPTED]),
-        rejected=int(clock.count[ex.REJECTED]),
+        steps=int(clock.count.accepted),
+        rejected=int(clock.count.rejected),
         evaluations=int(array("counts.evaluations")[0]),
         factorisations=int(array("counts.factorisations")[0]),
         seconds=time.perf_counter() - start.since,

@@ -91,7 +91,7 @@ class Part:
 
     def over(self, clock: ex.Clock | None = None) -> bool:
         """Whether it ends here: not after a step that was refused."""
-        calm = clock is None or (clock.count[ex.ACCEPTED] > 0 and clock.real[ex.GROW] > 1.0)
+        calm = clock is None or (clock.count.accepted > 0 and clock.real.grow > 1.0)
         if calm and self.due():
             self.paused = True
         return self.paused

@@ -67,15 +67,15 @@ def reason(
         By which it was integrated.
     """
     name = a.compiled.structure.model.name
-    t = float(clock.real[ex.T])
+    t = float(clock.real.t)
     after = f". The motion up to t = {t:.6g} s is kept in the error's result" if kept else ""
-    if clock.count[ex.STATUS] == ex.TOO_MANY:
+    if clock.count.status == ex.TOO_MANY:
         return f"{name!r}: {_too_many(a, clock)}{rounded(clock)}{after}", None
     stack = a.compiled.work.stack
     found = fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
     if found is not None:
         return f"{name!r}: just after t = {t:.6g} s, {found.message}{after}", found.exception
-    text = of_drivers(a.compiled, t, float(clock.real[ex.LARGEST])) or _ended(a, clock) or _not_finite(a, clock, method)
+    text = of_drivers(a.compiled, t, float(clock.real.largest)) or _ended(a, clock) or _not_finite(a, clock, method)
     if not text and (text := _jammed(a, clock)):
         return f"{name!r}: {text}{after}", Unresolved(text, t=t)
     text = text or boundless(a, clock, _component) or _broken(a, clock) or escaping(a, clock, _component)
@@ -126,15 +126,15 @@ def no_solution(c: Compiled, t: float, span: float) -> str:
     text = found.message if found else of_drivers(c, t, span) or broken_force(c, t) or _broken_rate(c, t)
     if text:
         return text
-    if c.work.counts.status[0] == motion.JAMMED:
-        force = c.structure.forces[int(c.work.counts.guilty_row[0])]
+    if c.work.counts.status == motion.JAMMED:
+        force = c.structure.forces[int(c.work.counts.guilty_row)]
         return f"{force.title} jams there: it grows with the load that it makes"
     return "the position is singular: constraints depend on one another, or a freedom moves no inertia"
 
 
 def _broken(a: Assembly, clock: ex.Clock) -> str:
     """A force whose formula ends where the motion stopped; else nothing."""
-    t = float(clock.real[ex.T])
+    t = float(clock.real.t)
     force = broken_force(a.compiled, t)
     return f"at t = {t:.6g} s, {force}" if force else ""
 
@@ -154,7 +154,7 @@ def _driving(c: Compiled) -> list[tuple[Any, int, bool]]:
 
 def _rivals(a: Assembly, clock: ex.Clock) -> str:
     """Two drivers of one coordinate whose laws part where the motion stopped; else nothing."""
-    S, W, t = a.compiled.values.system, a.compiled.work, float(clock.real[ex.T])
+    S, W, t = a.compiled.values.system, a.compiled.work, float(clock.real.t)
     stack = np.zeros_like(W.stack)
     first: dict[str, tuple[Any, tuple]] = {}
     for driver, law, _ in _driving(a.compiled):
@@ -209,10 +209,10 @@ def _jump(before: tuple, after: tuple, step: float, wrapped: bool) -> str:
 
 
 def _not_finite(a: Assembly, clock: ex.Clock, method: str) -> str:
-    if clock.count[ex.STATUS] != ex.NOT_FINITE and a.compiled.work.counts.status[0] != motion.NOT_FINITE:
+    if clock.count.status != ex.NOT_FINITE and a.compiled.work.counts.status != motion.NOT_FINITE:
         return ""
-    t = float(clock.real[ex.T])
-    span = float(clock.real[ex.LARGEST])
+    t = float(clock.real.t)
+    span = float(clock.real.largest)
     if text := too_long(a, clock, method):
         return f"at t = {t:.6g} s the motion is not finite any more: {text}"
     if text := boundless(a, clock, _component):
@@ -242,7 +242,7 @@ def _ended(a: Assembly, clock: ex.Clock) -> str:
         if at is None or not math.isfinite(place := float(clock.y[0][s.nq + s.nv + at])):
             continue
         if text := joint.end_message(numbers[joint.name], place):  # type: ignore[attr-defined]
-            return f"at t = {float(clock.real[ex.T]):.6g} s {text}"
+            return f"at t = {float(clock.real.t):.6g} s {text}"
     return ""
 
 
@@ -309,11 +309,11 @@ def _broken_rate(c: Compiled, t: float) -> str:
 
 def _broken_ahead(a: Assembly, clock: ex.Clock) -> str:
     """The force or controller without a finite value where the motion would be by its present rates."""
-    c, t, y, rates = a.compiled, float(clock.real[ex.T]), clock.y[ex.NOW], clock.K[0]
+    c, t, y, rates = a.compiled, float(clock.real.t), clock.y[ex.NOW], clock.K[0]
     if not np.isfinite(y).all() or not np.isfinite(rates).all():
         return ""
     s, z = c.structure, c.z
-    for d in (clock.real[ex.H], *(part * clock.real[ex.LARGEST] for part in AHEAD)):
+    for d in (clock.real.h, *(part * clock.real.largest for part in AHEAD)):
         x = y + d * rates
         c.z = x[s.nq + s.nv :].copy()
         with np.errstate(all="ignore"):
@@ -334,7 +334,7 @@ def _texts(e: Element) -> str:
 
 def _locked(a: Assembly, base: Assembly, clock: ex.Clock) -> str:
     """The elements for whose rows there are no accelerations where the motion stopped, if so."""
-    t, y, own, c = float(clock.real[ex.T]), clock.y[0], a.compiled, base.compiled
+    t, y, own, c = float(clock.real.t), clock.y[0], a.compiled, base.compiled
     if not len(c.structure.rows) or not np.isfinite(y).all():
         return ""
     nq, nv = own.structure.nq, own.structure.nv
@@ -358,26 +358,26 @@ def _locked(a: Assembly, base: Assembly, clock: ex.Clock) -> str:
 
 def _jammed(a: Assembly, clock: ex.Clock) -> str:
     W = a.compiled.work
-    if W.counts.status[0] != motion.JAMMED:
+    if W.counts.status != motion.JAMMED:
         return ""
     loads = int((a.compiled.system.forces.load >= 0).sum())
-    return jam(a.compiled.structure.forces[int(W.counts.guilty_row[0])], float(clock.real[ex.T]), loads == 1)
+    return jam(a.compiled.structure.forces[int(W.counts.guilty_row)], float(clock.real.t), loads == 1)
 
 
 def _stuck(a: Assembly, clock: ex.Clock) -> str:
     rows, W = a.compiled.structure.rows, a.compiled.work
-    k = int(W.counts.guilty_row[0])
+    k = int(W.counts.guilty_row)
     where = f" near {rows[k].element.title}" if rows else ""
     if rows and isinstance(rows[k].element, Driver):
         where += f" (whose law there has the rate {W.rows.nu[k]:.4g} and the second derivative {W.rows.nu_dot[k]:.4g})"
-    t = f"t = {clock.real[ex.T]:.6g} s"
-    begun = clock.count[ex.STARTED] == 1
-    if clock.real[ex.STEP] > 0.0 and begun:
+    t = f"t = {clock.real.t:.6g} s"
+    begun = clock.count.started == 1
+    if clock.real.step > 0.0 and begun:
         return (
-            f"at {t} a step of {clock.real[ex.STEP]:g} s has no solution{where}: give a shorter step, or leave step "
+            f"at {t} a step of {clock.real.step:g} s has no solution{where}: give a shorter step, or leave step "
             f"out, and its width is chosen"
         )
-    what = f"{t}: the step width fell to {clock.real[ex.H]:.3g} s{where}" if begun else f"its start, {t}{where}"
+    what = f"{t}: the step width fell to {clock.real.h:.3g} s{where}" if begun else f"its start, {t}{where}"
     if rounding := rounded(clock):
         return f"the integration cannot go on at {what}{rounding}"
     return (
@@ -388,26 +388,26 @@ def _stuck(a: Assembly, clock: ex.Clock) -> str:
 
 
 def _too_many(a: Assembly, clock: ex.Clock) -> str:
-    if clock.real[ex.STEP] > 0.0:
+    if clock.real.step > 0.0:
         return (
-            f"max_steps = {clock.count[ex.LIMIT]} steps of {clock.real[ex.STEP]:g} s were taken by "
-            f"t = {clock.real[ex.T]:.6g} s; give more (max_steps=)"
+            f"max_steps = {clock.count.limit} steps of {clock.real.step:g} s were taken by "
+            f"t = {clock.real.t:.6g} s; give more (max_steps=)"
         )
     if text := too_often(a.compiled, clock, a.t):
         return text
     slowest = _component(a, _pacemaker(clock))
     return (
-        f"max_steps = {clock.count[ex.LIMIT]} steps were taken by t = {clock.real[ex.T]:.6g} s; they are "
-        f"{clock.real[ex.H]:.3g} s wide by now, for the sake of {slowest}. Give more steps (max_steps=), a larger "
+        f"max_steps = {clock.count.limit} steps were taken by t = {clock.real.t:.6g} s; they are "
+        f"{clock.real.h:.3g} s wide by now, for the sake of {slowest}. Give more steps (max_steps=), a larger "
         f"rtol, or less stiffness (friction too is stiff) there"
     )
 
 
 def _pacemaker(clock: ex.Clock) -> int:
     """The component of the state whose derivative changed most within the last step, by its tolerance."""
-    n = clock.count[ex.CONTROLLED]
+    n = clock.count.controlled
     with np.errstate(all="ignore"):
-        change = np.ptp(clock.K[:, :n], axis=0) / (clock.real[ex.ATOL] + clock.real[ex.RTOL] * np.abs(clock.y[0, :n]))
+        change = np.ptp(clock.K[:, :n], axis=0) / (clock.real.atol + clock.real.rtol * np.abs(clock.y[0, :n]))
     return int(np.argmax(np.nan_to_num(change)))
 
 

@@ -28,13 +28,13 @@ def remarkable(worst: np.ndarray, far: np.ndarray, atol: np.ndarray, relative: n
 
 def excess(clock: ex.Clock) -> str:
     """The largest error of a step that rounding made and that was accepted; nothing where it is not notable."""
-    size = clock.real[ex.EXCESS]
+    size = clock.real.excess
     if not size > NOTABLE:
         return ""
     return (
-        f"rounding is the limit: near t = {clock.real[ex.EXCESS_AT]:.6g} s, where the mechanism is close to a singular "
+        f"rounding is the limit: near t = {clock.real.excess_at:.6g} s, where the mechanism is close to a singular "
         f"position, the last digits of the state alone change a step by up to {size:.2g} times what "
-        f"rtol = {clock.real[ex.RTOL]:g} allows. The step was accepted so; a larger rtol asks for what can be had"
+        f"rtol = {clock.real.rtol:g} allows. The step was accepted so; a larger rtol asks for what can be had"
     )
 
 
@@ -43,19 +43,19 @@ def far_off(a: Assembly, clock: ex.Clock) -> str:
     length = a.compiled.values.length
     far = float(np.abs(a.compiled.array("FK")[:, :3]).max(initial=0.0))
     digit = math.ulp(far)
-    if not digit > clock.real[ex.ATOL] + clock.real[ex.RTOL] * length:
+    if not digit > clock.real.atol + clock.real.rtol * length:
         return ""
     return (
         f"rounding is the limit: positions {far:.3g} m from the origin are known to {digit:.1g} m, which is more than "
-        f"rtol = {clock.real[ex.RTOL]:g} of the mechanism's length of {length:.3g} m; describe it near the origin"
+        f"rtol = {clock.real.rtol:g} of the mechanism's length of {length:.3g} m; describe it near the origin"
     )
 
 
 def rounded(clock: ex.Clock) -> str:
     """What is to be said of a run that stopped, if rounding was found to decide shortly before."""
-    if clock.real[ex.T] - clock.real[ex.BLURRED_AT] > LATELY * clock.real[ex.SPAN]:
+    if clock.real.t - clock.real.blurred_at > LATELY * clock.real.span:
         return ""
     return (
         f". Rounding is the limit there: the last digits of the state change the error of a step by a tenth of it and "
-        f"more, as they do close to a singular position; rtol = {clock.real[ex.RTOL]:g} asks for more than can be had"
+        f"more, as they do close to a singular position; rtol = {clock.real.rtol:g} asks for more than can be had"
     )

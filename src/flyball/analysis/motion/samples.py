@@ -61,10 +61,10 @@ def refuse_too_often(c: Compiled, span: tuple[float, float], most: int) -> None:
 
 def too_often(c: Compiled, clock: ex.Clock, begun: float) -> str:
     """Which controller it is for whose sake steps are so many, and what lies ahead; nothing if it is none."""
-    t, end = float(clock.real[ex.T]), _end(clock)
+    t, end = float(clock.real.t), _end(clock)
     for x in often(c)[:1]:
-        if x.between(begun, t) >= SHARE * clock.count[ex.ACCEPTED]:
-            return f"max_steps = {clock.count[ex.LIMIT]} steps were taken by t = {t:.6g} s. {x.told(t, end)}. {REMEDY}"
+        if x.between(begun, t) >= SHARE * clock.count.accepted:
+            return f"max_steps = {clock.count.limit} steps were taken by t = {t:.6g} s. {x.told(t, end)}. {REMEDY}"
     return ""
 
 
@@ -83,4 +83,4 @@ def never(c: Compiled, clock: ex.Clock) -> tuple[str, ...]:
 
 def _end(clock: ex.Clock) -> float:
     """When a motion ends [s]: what is integrated at once may end before."""
-    return float(max(clock.real[ex.T_END], clock.times[-1] if len(clock.times) else -math.inf))
+    return float(max(clock.real.t_end, clock.times[-1] if len(clock.times) else -math.inf))

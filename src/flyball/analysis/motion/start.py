@@ -135,7 +135,7 @@ def _worked_out(
     base = _base(model, t, parameters, before)
     if part.later and before is not None:
         return replace(_as_it_came(base, parameters, before, switches), part=part)
-    if base.compiled.values.system.semidefinite[0] > 0.0:
+    if base.compiled.values.system.scales.semidefinite > 0.0:
         mobility(model, base, inertia=True)
     return replace(begin_at(base, parameters, coordinates, before, switches=switches), part=part)
 

@@ -103,7 +103,7 @@ class Pace:
         if self.row < IN_A_ROW:
             return ""
         if now == EXPLICIT and (why := self.why_not()):
-            self.told = [f"{EXPLICIT}, though it is stiff from t = {clock.real[ex.T]:.6g} s on: {why}"]
+            self.told = [f"{EXPLICIT}, though it is stiff from t = {clock.real.t:.6g} s on: {why}"]
             self.every = NEVER
             return ""
         return IMPLICIT if now == EXPLICIT else EXPLICIT
@@ -135,7 +135,7 @@ class Pace:
         if not self._goes_on:
             if not self.told:
                 self.told.append(EXPLICIT if to == IMPLICIT else IMPLICIT)
-            self.told.append(f"{to} from t = {clock.real[ex.T]:.6g} s on, {why}")
+            self.told.append(f"{to} from t = {clock.real.t:.6g} s on, {why}")
         self._goes_on = False
         again = sum(x.endswith(NOT_STIFF) for x in self.told)
         self.every = self.often = SELDOM if to == IMPLICIT else EVERY * PATIENCE ** min(again, 6)
@@ -148,7 +148,7 @@ class Pace:
 
     def _speaks_for_another(self, c: Compiled, clock: ex.Clock, lately: Lately, now: str) -> bool:
         if now == EXPLICIT:
-            left = STAGES * (self.t_end - float(clock.real[ex.T])) / (lately.width * (1.0 - lately.refused))
+            left = STAGES * (self.t_end - float(clock.real.t)) / (lately.width * (1.0 - lately.refused))
             if left * each(c) < LONG:
                 return False
             fast = fastest(c, clock, 1.0 / lately.width)
@@ -158,17 +158,17 @@ class Pace:
 
     def _lately(self, clock: ex.Clock) -> Lately:
         assert self.last is not None
-        tried, done = self._since(clock), int(clock.count[ex.ACCEPTED]) - self.last[1]
-        time = float(clock.real[ex.T]) - self.last[2]
+        tried, done = self._since(clock), int(clock.count.accepted) - self.last[1]
+        time = float(clock.real.t) - self.last[2]
         return Lately(time / max(done, 1), (tried - done) / max(tried, 1), time)
 
     def _since(self, clock: ex.Clock) -> int:
         assert self.last is not None
-        return int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]) - self.last[0]
+        return int(clock.count.accepted + clock.count.rejected) - self.last[0]
 
     def _mark(self, clock: ex.Clock) -> None:
-        done = int(clock.count[ex.ACCEPTED])
-        self.last = done + int(clock.count[ex.REJECTED]), done, float(clock.real[ex.T])
+        done = int(clock.count.accepted)
+        self.last = done + int(clock.count.rejected), done, float(clock.real.t)
 
 
 def each(c: Compiled) -> float:
@@ -181,7 +181,7 @@ def limited_by(fast: complex, clock: ex.Clock, lately: Lately) -> bool:
 
     Either these are as wide as is stable, or they are refused though nothing swings that fast: rounding does.
     """
-    stretch, rtol = lately.width * abs(fast), float(clock.real[ex.RTOL])
+    stretch, rtol = lately.width * abs(fast), float(clock.real.rtol)
     if stretch < ROUGH:
         return False
     swing = bend(clock) / abs(fast)

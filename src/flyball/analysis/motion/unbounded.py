@@ -35,7 +35,7 @@ Named = Callable[[Assembly, int], str]
 
 def too_long(a: Assembly, clock: ex.Clock, method: str) -> str:
     """That a fixed step is too long, and which would do; nothing if that is not the matter."""
-    step = float(clock.real[ex.STEP])
+    step = float(clock.real.step)
     if not step > 0.0 or method not in TABLEAUX:
         return ""
     grown = np.r_[_grown(a, clock.y[ex.NOW]), _grown(a, clock.y[ex.NEW])]
@@ -58,7 +58,7 @@ def boundless(a: Assembly, clock: ex.Clock, named: Named) -> str:
         return ""
     i = int(np.argmax(grown))
     return (
-        f"the motion grows without bound: by t = {clock.real[ex.T]:.6g} s {_told(a, i, float(y[i]), named)}. "
+        f"the motion grows without bound: by t = {clock.real.t:.6g} s {_told(a, i, float(y[i]), named)}. "
         f"Look for what drives it: a gain, a damping or a stiffness of the wrong sign, a controller that is unstable"
     )
 
@@ -69,15 +69,15 @@ def escaping(a: Assembly, clock: ex.Clock, named: Named) -> str:
     A force whose law does, the state of a controller, and where there are no rows, so that nothing can lock, a
     coordinate or velocity.
     """
-    s, t = a.compiled.structure, float(clock.real[ex.T])
-    if not clock.real[ex.H] < NARROW * max(abs(t), clock.real[ex.LARGEST]):
+    s, t = a.compiled.structure, float(clock.real.t)
+    if not clock.real.h < NARROW * max(abs(t), clock.real.largest):
         return ""
     if text := _unbounded_law(a, clock):
         return text
     y, rate, n = clock.y[ex.NOW], clock.K[0], _length(a)
     first = s.nq + s.nv if s.rows else 0
     with np.errstate(all="ignore"):
-        part = np.nan_to_num(np.abs(rate[first:n]) * clock.real[ex.H] / np.abs(y[first:n]))
+        part = np.nan_to_num(np.abs(rate[first:n]) * clock.real.h / np.abs(y[first:n]))
     if not len(part) or not part.max() > ESCAPING:
         return ""
     i = first + int(np.argmax(part))
@@ -89,7 +89,7 @@ def escaping(a: Assembly, clock: ex.Clock, named: Named) -> str:
 
 def _unbounded_law(a: Assembly, clock: ex.Clock) -> str:
     """A force whose law has grown, and grows by more than `ESCAPING` of itself within such a step; else nothing."""
-    c, t, h, y = a.compiled, float(clock.real[ex.T]), float(clock.real[ex.H]), clock.y[ex.NOW]
+    c, t, h, y = a.compiled, float(clock.real.t), float(clock.real.h), clock.y[ex.NOW]
     if not np.isfinite(y).all():
         return ""
     s, S, begun, now = c.structure, c.values.system, c.again(), c.again()

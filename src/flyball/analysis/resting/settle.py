@@ -13,7 +13,6 @@ import numpy as np
 
 from ...errors import AnalysisError, NotConverged
 from ...model.model import Model
-from ...stepping.joined import TIME as JOINTS_TIME
 from ...stepping.stepper import NoWay, Stepper
 from ...stepping.tables import LAW, NO_RESTITUTION, TIME
 from ...tables.contact import Touching, touching
@@ -121,7 +120,7 @@ class _Way:
     def _step(self) -> None:
         s = self.stepper
         s.pace.real[TIME] = self.t
-        s.joints.real[JOINTS_TIME] = self.t
+        s.joints.real.time = self.t
         s.run(1, self.h)
 
     def _stop(self) -> None:

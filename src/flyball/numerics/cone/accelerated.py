@@ -11,7 +11,7 @@ from __future__ import annotations
 from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .passes import act, backward, forward
-from .problem import CONVERGED, COULOMB, CUT, ENDED, ENOUGH, HISTORY, MOST
+from .problem import CONVERGED, CUT
 from .start import begin, tell, unused
 
 LARGEST = 1e30  # of L: beyond it nothing is to be gained by smaller steps
@@ -25,11 +25,11 @@ def accelerated(P, X, W, O, first, way):
     L = first if first > 0.0 else start_of(P, X, W, O, many)
     cur, prev, new, best = 0, 0, 1, 0
     ucur, uprev, unew = 4, 4, 5
-    theta, beta, least, used, O.count[ENDED] = 1.0, 0.0, -1.0, 0, CUT
-    while used < O.count[MOST]:
+    theta, beta, least, used, O.count.ended = 1.0, 0.0, -1.0, 0, CUT
+    while used < O.count.most:
         used += 1
         ids = cur, prev, ucur, uprev, new
-        dd, rise, worst = forward(P, X, W, O, many, ids, (beta, 1.0 / L, O.count[COULOMB]))
+        dd, rise, worst = forward(P, X, W, O, many, ids, (beta, 1.0 / L, O.count.coulomb))
         curved = backward(P, X, W, O, many, ids, unew, beta)[0]
         if curved > L * dd * missed and L < LARGEST:
             L = max(grow * L, curved / dd if not plain else 0.0)
@@ -37,10 +37,10 @@ def accelerated(P, X, W, O, first, way):
         rate = L * sqrt(worst)
         if least < 0.0 or rate < least:
             best, least = new, rate
-        if O.count[HISTORY]:
+        if O.count.history:
             tell(P, X, W, O, many, best, used, False)
-        if rate <= O.real[ENOUGH]:
-            O.count[ENDED] = CONVERGED
+        if rate <= O.real.enough:
+            O.count.ended = CONVERGED
             break
         after = 0.5 * (-theta * theta + theta * sqrt(theta * theta + 4.0))
         beta = theta * (1.0 - theta) / (theta * theta + after)

@@ -18,14 +18,7 @@ from .layout import prepare, rows_of
 from .problem import (
     BROKEN,
     CONVERGED,
-    COULOMB,
     CUT,
-    ENDED,
-    ENOUGH,
-    FORCE_RESIDUAL,
-    MOST,
-    RESIDUAL,
-    USED,
     Choices,
     Factor,
     Problem,
@@ -104,16 +97,16 @@ def iterate(R, O, coulomb):
     if not factored(R, rho):
         return BROKEN, worst
     set_slips(R, coulomb)
-    for k in range(O.count[MOST]):
+    for k in range(O.count.most):
         velocities(R)
         apart, moved = impulses(R)
         from_held(R)
         set_own(R)
-        worst, O.real[FORCE_RESIDUAL] = residual(R, coulomb)
-        O.count[USED] = k + 1
+        worst, O.real.force_residual = residual(R, coulomb)
+        O.count.used = k + 1
         if worst != worst:
             return BROKEN, worst
-        if worst <= O.real[ENOUGH]:
+        if worst <= O.real.enough:
             return CONVERGED, worst
         if max(apart, moved) < DONE_WITH * worst:
             set_slips(R, coulomb)
@@ -134,9 +127,9 @@ def iterate(R, O, coulomb):
 def admm_solve(P, X, O, F):
     """See `admm`."""
     span = span_of(P, O)
-    O.count[USED] = 0
-    if P.turn.shape[0] > 0 and O.count[COULOMB] == 0:
-        O.count[ENDED] = BROKEN
+    O.count.used = 0
+    if P.turn.shape[0] > 0 and O.count.coulomb == 0:
+        O.count.ended = BROKEN
         return 0
     if not prepare(P, span, F, O):
         return 0
@@ -144,18 +137,18 @@ def admm_solve(P, X, O, F):
     fill_rows(P, X, R, span)
     from_held(R)
     set_own(R)
-    coulomb = 1.0 * O.count[COULOMB]
-    worst, O.real[FORCE_RESIDUAL] = residual(R, coulomb)
+    coulomb = 1.0 * O.count.coulomb
+    worst, O.real.force_residual = residual(R, coulomb)
     ended = CONVERGED
-    if not worst <= O.real[ENOUGH]:
+    if not worst <= O.real.enough:
         ended, worst = iterate(R, O, coulomb)
-    O.count[ENDED], O.real[RESIDUAL] = ended, worst
+    O.count.ended, O.real.residual = ended, worst
     if ended == BROKEN:
-        return O.count[USED]
+        return O.count.used
     if ended == CUT:
         make_safe(R)
     hand_back(P, X, R, span)
-    return O.count[USED]
+    return O.count.used
 
 
 @kernel

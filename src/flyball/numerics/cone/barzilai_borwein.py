@@ -15,13 +15,7 @@ from .passes import backward, forward
 from .problem import (
     BROKEN,
     CONVERGED,
-    COULOMB,
     CUT,
-    ENDED,
-    ENOUGH,
-    HISTORY,
-    MOST,
-    USED,
     Choices,
     Factor,
     Problem,
@@ -75,14 +69,14 @@ def barzilai_borwein(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, ta
     Of the convex form: the line search needs an objective, and Coulomb's law has none. Asked for it, it ends `BROKEN`
     with everything as it was.
     """
-    if O.count[COULOMB]:
-        O.count[ENDED], O.count[USED] = BROKEN, 0
+    if O.count.coulomb:
+        O.count.ended, O.count.used = BROKEN, 0
         return 0
     many = begin(P, X, W, O, False)
-    cur, new, best, used, O.count[ENDED] = 0, 1, 0, 0, CUT
+    cur, new, best, used, O.count.ended = 0, 1, 0, 0, CUT
     size, f, least = 1.0, 0.0, -1.0
     a0, a1, a2, a3 = 0.0, 0.0, 0.0, 0.0
-    while used < O.count[MOST]:
+    while used < O.count.most:
         used += 1
         ids = cur, cur, 4 + cur, 4 + cur, new
         dd, slope, worst = forward(P, X, W, O, many, ids, (0.0, size, 0))
@@ -96,10 +90,10 @@ def barzilai_borwein(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, ta
         if least < 0.0 or rate < least:
             best, least = cur, rate
         cur, new, size = new, unused(new, best, new, 0), next_step(dd, curved, square, used % 2 == 1)
-        if O.count[HISTORY]:
+        if O.count.history:
             tell(P, X, W, O, many, best, used, False)
-        if least <= O.real[ENOUGH]:
-            O.count[ENDED] = CONVERGED
+        if least <= O.real.enough:
+            O.count.ended = CONVERGED
             break
     tell(P, X, W, O, many, best, used, True)
     return used

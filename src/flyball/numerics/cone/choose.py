@@ -16,16 +16,8 @@ from .problem import (
     BROKEN,
     CONVERGED,
     CUT,
-    ENDED,
-    ENOUGH,
-    FORCE_RESIDUAL,
-    ISLAND,
-    MOST,
-    MOST_STEPS,
-    RESIDUAL,
     SMALL,
     STALLED,
-    USED,
     Choices,
     Factor,
     Problem,
@@ -185,10 +177,10 @@ def gather(O, sofar):
     """The worst of what solvers said: (residual, force residual, used, status)."""
     a, b, used, ended = sofar
     return (
-        max(a, O.real[RESIDUAL]),
-        max(b, O.real[FORCE_RESIDUAL]),
-        max(used, O.count[USED]),
-        max(ended, O.count[ENDED]),
+        max(a, O.real.residual),
+        max(b, O.real.force_residual),
+        max(used, O.count.used),
+        max(ended, O.count.ended),
     )
 
 
@@ -199,15 +191,15 @@ def by_one(P, X, W, O, F, f):
     It is asked for ``FINER`` digits than are enough, since Newton's last steps bring many of them: what sticks then
     does not creep. That it has not got them all is no fault.
     """
-    enough, most = O.real[ENOUGH], O.count[MOST]
-    O.real[ENOUGH] = max(FINER * enough, min(enough, FINEST))
-    if O.count[MOST_STEPS] > 0:
-        O.count[MOST] = O.count[MOST_STEPS]
+    enough, most = O.real.enough, O.count.most
+    O.real.enough = max(FINER * enough, min(enough, FINEST))
+    if O.count.most_steps > 0:
+        O.count.most = O.count.most_steps
     call(F.doors[SMALL_ISLANDS], P, X, W, O, f, 0)
-    O.real[ENOUGH], O.count[MOST] = enough, most
-    if (O.count[ENDED] == CUT or O.count[ENDED] == STALLED) and O.real[RESIDUAL] <= enough:
-        O.count[ENDED] = CONVERGED
-    if F.doors[THE_REST] != 0 and (O.count[ENDED] == SMALL or O.count[ENDED] == BROKEN):
+    O.real.enough, O.count.most = enough, most
+    if (O.count.ended == CUT or O.count.ended == STALLED) and O.real.residual <= enough:
+        O.count.ended = CONVERGED
+    if F.doors[THE_REST] != 0 and (O.count.ended == SMALL or O.count.ended == BROKEN):
         F.told[HANDED_ON] += 1
         call(F.doors[THE_REST], P, X, W, O, f, 0)
 
@@ -219,15 +211,15 @@ def one_by_one(P, X, Y, W, O, F, f, count, some):
     lay_out(P, X, Q, Y, F, I, count, some)
     sofar = (0.0, 0.0, 0, 0)
     for k in range(some):
-        O.count[ISLAND] = k
+        O.count.island = k
         by_one(Q, Y, W, O, F, f)
         sofar = gather(O, sofar)
     if some < count:
-        O.count[ISLAND] = some
+        O.count.island = some
         call(F.doors[THE_REST], Q, Y, W, O, f, 0)
         sofar = gather(O, sofar)
-    O.count[ISLAND] = -1
-    O.real[RESIDUAL], O.real[FORCE_RESIDUAL], O.count[USED], O.count[ENDED] = sofar
+    O.count.island = -1
+    O.real.residual, O.real.force_residual, O.count.used, O.count.ended = sofar
     take_all_back(P, X, Y, F, I, count)
 
 
@@ -235,8 +227,8 @@ def one_by_one(P, X, Y, W, O, F, f, count, some):
 def solve_all(P, X, W, O, F):
     """See `auto`."""
     f, I = by_address(Factor(F.numbers[:], F.places[:])), F.islands
-    O.count[USED], O.count[ENDED], O.count[ISLAND] = 0, CONVERGED, -1
-    O.real[RESIDUAL], O.real[FORCE_RESIDUAL] = 0.0, 0.0
+    O.count.used, O.count.ended, O.count.island = 0, CONVERGED, -1
+    O.real.residual, O.real.force_residual = 0.0, 0.0
     nc, nn, ng, nl = P.size[0], P.size[1], P.size[2], P.size[3]
     count = find_islands(P.at, P.line_at, (nc, nn, ng, nl), I)
     some = pick(P, F, I, count)
@@ -250,7 +242,7 @@ def solve_all(P, X, W, O, F):
         one_by_one(
             P, X, by_address(State(F.X.p[:], F.X.torque[:], F.X.line[:], X.v[:], X.wide[:])), W, O, F, f, count, some
         )
-    return O.count[USED]
+    return O.count.used
 
 
 @kernel

@@ -6,14 +6,10 @@ from ...compiler.formulas import formula
 from .problem import (
     BROKEN,
     CUT,
-    ENDED,
-    FORCE_RESIDUAL,
     H_FORCE,
     H_ITERATION,
     H_OBJECTIVE,
     H_VELOCITY,
-    RESIDUAL,
-    WRITTEN,
 )
 from .residual import contacts_of, lines_of, nodes_of
 
@@ -26,18 +22,18 @@ def finish(P, X, W, O, left, used, last):
     what `residuals` says.
     """
     velocity, force, linear, square = left
-    row = O.count[WRITTEN]
+    row = O.count.written
     if not last and row < O.history.shape[0]:
         O.history[row, H_ITERATION], O.history[row, H_VELOCITY] = used, velocity
         O.history[row, H_FORCE], O.history[row, H_OBJECTIVE] = force, 0.5 * square + linear
-        O.count[WRITTEN] = row + 1
+        O.count.written = row + 1
     if not last:
         return
-    O.real[RESIDUAL], O.real[FORCE_RESIDUAL] = velocity, force
+    O.real.residual, O.real.force_residual = velocity, force
     part = 1.0
     if not (velocity == velocity and square == square):
-        part, O.count[ENDED] = 0.0, BROKEN
-    elif 0.5 * square + linear > 0.0 and O.count[ENDED] == CUT and P.least.shape[0] == 0:
+        part, O.count.ended = 0.0, BROKEN
+    elif 0.5 * square + linear > 0.0 and O.count.ended == CUT and P.least.shape[0] == 0:
         part = 0.0 if linear >= 0.0 else -linear / square  # the best there is along these impulses
     hand_back(P, X, W, O, part)
 

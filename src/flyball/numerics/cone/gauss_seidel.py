@@ -29,14 +29,7 @@ from .pack import (
 from .packed import remaining
 from .problem import (
     CONVERGED,
-    COULOMB,
     CUT,
-    ENDED,
-    ENOUGH,
-    HISTORY,
-    MOST,
-    USED,
-    WRITTEN,
     Choices,
     Factor,
     Problem,
@@ -64,7 +57,7 @@ def sweep_balls(W, O, many, turned):
     begin = many[SMOOTH_BALL]
     for e in range(many[BALL]):
         s = begin + placed(e, many[BALL], turned)
-        worst = max(worst, visit_ball(W.pack, W.own, W.sides[s, 0], W.sides[s, 1], WIDTH_BALL * s, O.count[COULOMB]))
+        worst = max(worst, visit_ball(W.pack, W.own, W.sides[s, 0], W.sides[s, 1], WIDTH_BALL * s, O.count.coulomb))
     return worst
 
 
@@ -81,7 +74,7 @@ def sweep_others(P, X, W, O, many, turned):
     for e in range(many[ROUGH]):
         s = placed(e, many[ROUGH], turned)
         i, j = W.sides[begin + s, 0], W.sides[begin + s, 1]
-        worst = max(worst, visit_rough(W.pack, W.own, W.inner, i, j, at + 32 * s, O.count[COULOMB]))
+        worst = max(worst, visit_rough(W.pack, W.own, W.inner, i, j, at + 32 * s, O.count.coulomb))
     begin, at = begin + many[ROUGH], at + 32 * many[ROUGH]
     for e in range(many[4]):
         s = placed(e, many[4], turned)
@@ -143,7 +136,7 @@ def prepare(P, X, W, O):
     for k in range(X.wide.shape[0]):
         W.free_wide[k] = X.wide[k]
     many = count_kinds(P, W, first, last, 0)
-    pack(P, X, W, O.count[COULOMB], first, many)
+    pack(P, X, W, O.count.coulomb, first, many)
     begin, end = lines_of(P, O)
     for k in range(begin, end):
         push_line(P, X.wide, k, X.line[k])
@@ -154,17 +147,17 @@ def prepare(P, X, W, O):
 def gauss_seidel(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, task: int) -> int:
     """Sweeps until velocities change by less than `ENOUGH`, at most `MOST` of them; how many there were."""
     many = prepare(P, X, W, O)
-    used, O.count[ENDED], O.count[WRITTEN] = 0, CUT, 0
-    while used < O.count[MOST]:
+    used, O.count.ended, O.count.written = 0, CUT, 0
+    while used < O.count.most:
         worst = sweep(P, X, W, O, many, used % 2 == 1)
         used += 1
-        if O.count[HISTORY]:
+        if O.count.history:
             unpack(P, X, W, many)
             finish(P, X, W, O, remaining(P, X, W, O, many), used, False)
-        if worst <= O.real[ENOUGH]:
-            O.count[ENDED] = CONVERGED
+        if worst <= O.real.enough:
+            O.count.ended = CONVERGED
             break
-    O.count[USED] = used
+    O.count.used = used
     unpack(P, X, W, many)
     finish(P, X, W, O, remaining(P, X, W, O, many), used, True)
     return used

@@ -14,12 +14,7 @@ from .pack import B_IN, B_IT, BALL, IN, SLIDE
 from .passes import backward, forward
 from .problem import (
     CONVERGED,
-    COULOMB,
     CUT,
-    ENDED,
-    ENOUGH,
-    HISTORY,
-    MOST,
     NONE,
     Choices,
     Factor,
@@ -88,17 +83,17 @@ def jacobi(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, task: int) -
     """Iterations until a step changes velocities by less than `ENOUGH`, at most `MOST`; how many there were."""
     many = begin(P, X, W, O, False)
     split(P, W, O, many)
-    cur, new, used, O.count[ENDED] = 0, 1, 0, CUT
-    while used < O.count[MOST]:
+    cur, new, used, O.count.ended = 0, 1, 0, CUT
+    while used < O.count.most:
         used += 1
         ids = cur, cur, 4 + cur, 4 + cur, new
-        _, _, worst = forward(P, X, W, O, many, ids, (0.0, 1.0, O.count[COULOMB]))
+        _, _, worst = forward(P, X, W, O, many, ids, (0.0, 1.0, O.count.coulomb))
         backward(P, X, W, O, many, ids, 4 + new, 0.0)
         cur, new = new, cur
-        if O.count[HISTORY]:
+        if O.count.history:
             tell(P, X, W, O, many, cur, used, False)
-        if sqrt(worst) <= O.real[ENOUGH]:
-            O.count[ENDED] = CONVERGED
+        if sqrt(worst) <= O.real.enough:
+            O.count.ended = CONVERGED
             break
     tell(P, X, W, O, many, cur, used, True)
     return used

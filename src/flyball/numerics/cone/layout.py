@@ -21,7 +21,7 @@ from .gather import (
     rows_in,
     survey,
 )
-from .problem import ENDED, NEEDED_NUMBERS, NEEDED_PLACES, SMALL
+from .problem import SMALL
 
 WIDE = 32  # numbers of a row
 
@@ -85,9 +85,9 @@ def fits(P, F, O, size):
     numbers, places = numbers_of(size), places_of(P, size)
     if numbers <= F.numbers.shape[0] and places <= F.places.shape[0]:
         return True
-    O.count[ENDED] = SMALL
-    O.count[NEEDED_NUMBERS] = max(numbers + numbers // 2, O.count[NEEDED_NUMBERS])
-    O.count[NEEDED_PLACES] = max(places + places // 2, O.count[NEEDED_PLACES])
+    O.count.ended = SMALL
+    O.count.needed_numbers = max(numbers + numbers // 2, O.count.needed_numbers)
+    O.count.needed_places = max(places + places // 2, O.count.needed_places)
     return False
 
 
@@ -183,7 +183,7 @@ def prepare(P, span, F, O):
     """Rooms, pattern and G of an island. False if the rooms are too small: `Choices.count` says what is needed."""
     size = F.places[:SIZES]
     if F.places.shape[0] < SIZES:
-        O.count[ENDED], O.count[NEEDED_PLACES], O.count[NEEDED_NUMBERS] = SMALL, 4096, 16384
+        O.count.ended, O.count.needed_places, O.count.needed_numbers = SMALL, 4096, 16384
         return False
     if not measure(P, span, F, O, size):
         return False
@@ -191,9 +191,9 @@ def prepare(P, span, F, O):
     list_entries(P, span, R)
     fill = order(R, size[BLOCKS])
     if fill < 0:
-        O.count[ENDED] = SMALL
-        O.count[NEEDED_PLACES] = 2 * F.places.shape[0]
-        O.count[NEEDED_NUMBERS] = F.numbers.shape[0]
+        O.count.ended = SMALL
+        O.count.needed_places = 2 * F.places.shape[0]
+        O.count.needed_numbers = F.numbers.shape[0]
         return False
     size[FILL] = fill
     if not fits(P, F, O, size):

@@ -21,15 +21,8 @@ from .layout import prepare, rows_of
 from .problem import (
     BROKEN,
     CONVERGED,
-    COULOMB,
     CUT,
-    ENDED,
-    ENOUGH,
-    FORCE_RESIDUAL,
-    MOST,
-    RESIDUAL,
     STALLED,
-    USED,
     Choices,
     Factor,
     Problem,
@@ -193,15 +186,15 @@ def hold(R, coulomb):
 @formula
 def inner(R, O, coulomb, law, steps):
     """Newton steps at what is held on to: (how it ended, residual, change of what is held on to, steps)."""
-    enough, last = O.real[ENOUGH], steps + MANY
+    enough, last = O.real.enough, steps + MANY
     while True:
         set_impulses(R)
-        (worst, O.real[FORCE_RESIDUAL]), near, change = gaps(R, coulomb)
+        (worst, O.real.force_residual), near, change = gaps(R, coulomb)
         if worst != worst:
             return BROKEN, worst, change, steps
         if worst <= enough or near <= max(0.1 * change, 0.1 * enough):
             return CONVERGED, worst, change, steps
-        if steps >= O.count[MOST]:
+        if steps >= O.count.most:
             return CUT, worst, change, steps
         if steps >= last:
             return STALLED, worst, change, steps
@@ -253,26 +246,26 @@ def search(R, O, coulomb, worst):
     steps, before, law, best, force = 0, 1e300, False, 1e300, 0.0
     rho = min(max(worst / fastest(R), SMALL_RHO), MOST_RHO) if rough(R) else FLAT_RHO
     set_slips(R, coulomb)
-    for _ in range(4 * O.count[MOST] + 20):
+    for _ in range(4 * O.count.most + 20):
         set_metric(R, rho)
         if law:
             set_kind(R, CONTACT, COULOMB_CONTACT)
         set_y(R)
         ended, worst, change, steps = inner(R, O, coulomb, law, steps)
-        O.count[USED] = steps
+        O.count.used = steps
         if law:
             set_kind(R, COULOMB_CONTACT, CONTACT)
             if ended != CONVERGED or not worst < best:  # it has not come closer: on as before it
                 if ended == CUT:
-                    O.real[FORCE_RESIDUAL] = force
+                    O.real.force_residual = force
                     return CUT, best
                 from_held(R)
                 law, before, rho = False, 1e300, min(RAISE * rho, MOST_RHO)
                 continue
         hold(R, coulomb)
-        if ended == CUT or ended == BROKEN or worst <= O.real[ENOUGH]:
+        if ended == CUT or ended == BROKEN or worst <= O.real.enough:
             return ended, worst
-        best, force, law = worst, O.real[FORCE_RESIDUAL], coulomb > 0.0
+        best, force, law = worst, O.real.force_residual, coulomb > 0.0
         if ended == STALLED:
             rho, before = min(10.0 * rho, MOST_RHO), 1e300
         else:
@@ -284,27 +277,27 @@ def search(R, O, coulomb, worst):
 def newton_solve(P, X, O, F):
     """See `newton`."""
     span = span_of(P, O)
-    if P.turn.shape[0] > 0 and O.count[COULOMB] == 0:
-        O.count[ENDED] = BROKEN
+    if P.turn.shape[0] > 0 and O.count.coulomb == 0:
+        O.count.ended = BROKEN
         return 0
     if not prepare(P, span, F, O):
         return 0
     R = by_address(rows_of(P, F, F.places[:16]))
     fill_rows(P, X, R, span)
     from_held(R)
-    coulomb = 1.0 * O.count[COULOMB]
+    coulomb = 1.0 * O.count.coulomb
     set_own(R)
-    worst, O.real[FORCE_RESIDUAL] = residual(R, coulomb)
-    O.count[USED] = 0
+    worst, O.real.force_residual = residual(R, coulomb)
+    O.count.used = 0
     ended = CONVERGED
-    if not worst <= O.real[ENOUGH]:
+    if not worst <= O.real.enough:
         ended, worst = search(R, O, coulomb, worst)
         if ended == CUT:
             make_safe(R)
-    O.count[ENDED], O.real[RESIDUAL] = ended, worst
+    O.count.ended, O.real.residual = ended, worst
     if ended != BROKEN:
         hand_back(P, X, R, span)
-    return O.count[USED]
+    return O.count.used
 
 
 @kernel

@@ -34,7 +34,6 @@ from .pack import (
     SOFT,
     width,
 )
-from .problem import COULOMB
 from .projection import projected_above
 from .residual import NOTHING, of_lines, of_one, summary, worse
 from .sweeps import rough_velocity, sliding, smooth_velocity
@@ -113,11 +112,11 @@ def of_packed(P, X, W, O, kind, s, at):
     if kind == SMOOTH_BALL:
         return of_smooth_ball(W.pack, W.own, W.free, i, j, at)
     if kind == BALL:
-        return of_ball(W.pack, W.own, W.free, i, j, at, O.count[COULOMB])
+        return of_ball(W.pack, W.own, W.free, i, j, at, O.count.coulomb)
     if kind == SMOOTH:
         return of_smooth(W.pack, W.own, W.free, i, j, at)
     if kind == ROUGH:
-        return of_rough(W.pack, W.own, W.free, i, j, at, W.rows[1, c, 0], O.count[COULOMB])
+        return of_rough(W.pack, W.own, W.free, i, j, at, W.rows[1, c, 0], O.count.coulomb)
     return of_one(P, X, O, (W.own, X.wide, X.v, W.free_wide), c)
 
 

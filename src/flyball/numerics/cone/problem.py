@@ -22,23 +22,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...compiler.layout import Float1, Float2, Float3, Int1, Int2
+from ...compiler.layout import Float1, Float2, Float3, Int1, Int2, Record
 
 NONE = -1  # in Problem.at: nothing there moves; n >= 0: node n; -2 - k: group k
 # columns of Problem.node
 PER_MASS, BLOCK, ROUND = 0, 1, 7
 # columns of Problem.line_x
 BIAS, SOFT, LOW, HIGH = range(4)
-# entries of Choices.count: most iterations (sweeps), island that is meant or -1 for all, keep a history or not;
-# and what comes back: iterations used, how the solver ended, rows of the history written
-# (COULOMB: 1 for Coulomb's law by De Saxce's correction, 0 for the convex form; NEEDED: how large Factor must be;
-# DIRECTIONS: of a friction pyramid; MOST_STEPS: most steps of Newton's method where it takes islands in turn with
-# sweeps, 0 for as many as these)
-MOST, ISLAND, HISTORY, USED, ENDED, WRITTEN, COULOMB, NEEDED_NUMBERS, NEEDED_PLACES, DIRECTIONS, MOST_STEPS = range(11)
-CONVERGED, CUT, STALLED, BROKEN, SMALL = range(5)  # Choices.count[ENDED]; SMALL: enlarge what is needed, call again
-# entries of Choices.real: residual [m/s] that is enough; and what comes back: the residual reached as a velocity
-# [m/s], and as a force (what is left of an impulse over the largest impulse) [1]
-ENOUGH, RESIDUAL, FORCE_RESIDUAL = range(3)
+CONVERGED, CUT, STALLED, BROKEN, SMALL = range(5)  # ChoiceCounts.ended; SMALL: enlarge what is needed, call again
 # columns of Choices.history
 H_ITERATION, H_VELOCITY, H_FORCE, H_OBJECTIVE = range(4)
 
@@ -78,11 +69,35 @@ class State(NamedTuple):
     wide: Float1  # velocities of the groups
 
 
+class ChoiceCounts(Record, kind="Int"):
+    """How a problem is solved, and how that ended."""
+
+    most: int  # iterations (sweeps)
+    island: int  # that is meant; -1: all
+    history: int  # whether it is kept
+    used: int  # iterations
+    ended: int  # CONVERGED, CUT, STALLED, BROKEN, SMALL
+    written: int  # rows of the history
+    coulomb: int  # 1: Coulomb's law by De Saxce's correction, 0: the convex form
+    needed_numbers: int  # how large `Factor` must be
+    needed_places: int
+    directions: int  # of a friction pyramid
+    most_steps: int  # of Newton's method where it takes islands in turn with sweeps; 0: as many as these
+
+
+class ChoiceReals(Record, kind="Float"):
+    """How well."""
+
+    enough: float  # residual [m/s] that is enough
+    residual: float  # reached, as a velocity [m/s],
+    force_residual: float  # and as a force: what is left of an impulse over the largest impulse [1]
+
+
 class Choices(NamedTuple):
     """How it is solved, and what came of it."""
 
-    count: Int1  # type: ignore[assignment]  # (16,)
-    real: Float1  # (16,)
+    count: ChoiceCounts  # type: ignore[assignment]
+    real: ChoiceReals  # type: ignore[assignment]
     history: Float2  # (rows, 4): iteration, velocity residual, force residual, objective
 
 

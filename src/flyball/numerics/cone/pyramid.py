@@ -19,15 +19,7 @@ from .pack import BIAS, IMPULSE, IN, LEAST, MU, NS, NT, SLIDE, SOFT, count_kinds
 from .problem import (
     BROKEN,
     CONVERGED,
-    COULOMB,
     CUT,
-    DIRECTIONS,
-    ENDED,
-    ENOUGH,
-    HISTORY,
-    MOST,
-    USED,
-    WRITTEN,
     Choices,
     Factor,
     Problem,
@@ -125,24 +117,24 @@ def pyramid(P: Problem, X: State, W: Scratch, O: Choices, F: Factor, task: int) 
     Of Coulomb's law on a pyramid of `DIRECTIONS` edges, at least three; without rolling friction. Asked for anything
     else it ends `BROKEN` with everything as it was.
     """
-    used, O.count[ENDED], O.count[WRITTEN] = 0, CUT, 0
-    if P.turn.shape[0] > 0 or O.count[DIRECTIONS] < 3 or not O.count[COULOMB]:
-        O.count[ENDED], O.count[USED] = BROKEN, 0
+    used, O.count.ended, O.count.written = 0, CUT, 0
+    if P.turn.shape[0] > 0 or O.count.directions < 3 or not O.count.coulomb:
+        O.count.ended, O.count.used = BROKEN, 0
         return 0
     n = begin_pyramids(P, X, W, O)
     worst = 0.0
-    while used < O.count[MOST]:
+    while used < O.count.most:
         turned, worst = used % 2 == 1, 0.0
         for e in range(n):
             s = n - 1 - e if turned else e
-            worst = larger(worst, visit(P, X, W, W.sides[s, 2], 32 * s, O.count[DIRECTIONS]))
+            worst = larger(worst, visit(P, X, W, W.sides[s, 2], 32 * s, O.count.directions))
         worst = larger(worst, sweep_lines(P, X, O, turned))
         used += 1
-        if O.count[HISTORY]:
+        if O.count.history:
             finish(P, X, W, O, left_over(P, X, W, O, worst), used, False)
-        if worst <= O.real[ENOUGH]:
-            O.count[ENDED] = CONVERGED
+        if worst <= O.real.enough:
+            O.count.ended = CONVERGED
             break
-    O.count[USED] = used
+    O.count.used = used
     finish(P, X, W, O, left_over(P, X, W, O, worst), used, True)
     return used

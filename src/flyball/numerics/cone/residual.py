@@ -13,7 +13,7 @@ from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .diagonal import diagonal, diagonal_turning
 from .operator import diagonal_of_line, seen, seen_line, seen_turning
-from .problem import BIAS, COULOMB, HIGH, ISLAND, LOW, SOFT
+from .problem import BIAS, HIGH, LOW, SOFT
 from .projection import least_of, projected_above, projected_turning
 
 NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0)  # residual, impulse lacking, square of the largest impulse, b' p, p' N p
@@ -22,7 +22,7 @@ NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0)  # residual, impulse lacking, square of the 
 @formula
 def part_of(begin, whole, O):
     """First of what is meant and the one after its last, where islands begin at ``begin``."""
-    k = O.count[ISLAND]
+    k = O.count.island
     if k < 0:
         return 0, whole
     return begin[k], begin[k + 1]
@@ -113,7 +113,7 @@ def summary(sofar):
 def of_one(P, X, O, velocities, c):
     """What `worse` wants to know of contact c."""
     v, wide, free, free_wide = velocities
-    n, a, b, coulomb = X.p[c, 0], X.p[c, 1], X.p[c, 2], 1.0 * O.count[COULOMB]
+    n, a, b, coulomb = X.p[c, 0], X.p[c, 1], X.p[c, 2], 1.0 * O.count.coulomb
     d, e = seen(P, v, wide, c), seen(P, free, free_wide, c)
     u = with_bias(P, X, c, d)
     linear = n * (e[0] + P.bias[c, 0]) + a * (e[1] + P.bias[c, 1]) + b * (e[2] + P.bias[c, 2])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .problem import Choices, Factor, Problem, Scratch, State
+from .problem import ChoiceCounts, ChoiceReals, Choices, Factor, Problem, Scratch, State
 
 PACKED = 32  # numbers of `Scratch.pack` for each contact
 
@@ -89,7 +89,7 @@ def rooms(P: Problem, history: int = 0) -> tuple[State, Scratch, Choices, Factor
         pack=aligned(nc, PACKED).ravel(),
         sides=np.zeros((nc, 3), np.int64),
     )
-    O = Choices(np.zeros(16, np.int64), np.zeros(16), np.zeros((history, 4)))
+    O = Choices(ChoiceCounts.blank(), ChoiceReals.blank(), np.zeros((history, 4)))
     O.count[:3] = 100, -1, history > 0
     O.real[0] = 1e-6
     return X, W, O, Factor(np.zeros(0), np.zeros(0, np.int64))

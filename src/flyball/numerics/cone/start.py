@@ -28,7 +28,6 @@ from .pack import (
 )
 from .passes import backward
 from .problem import BIAS as LINE_BIAS
-from .problem import USED, WRITTEN
 from .residual import contacts_of, lines_of, nodes_of, residuals
 from .steps import METRIC, STEPS, TORQUE, B, write
 from .sweeps import rough_velocity, sliding
@@ -71,7 +70,7 @@ def begin(P, X, W, O, plain):
         push_line(P, X.wide, k, X.line[k])
     subtract(P, X, W, O)
     backward(P, X, W, O, many, (0, 0, 0, 0, 0), 4, 0.0)
-    O.count[WRITTEN] = 0
+    O.count.written = 0
     return many
 
 
@@ -130,7 +129,7 @@ def tell(P, X, W, O, many, best, used, last):
     for k in range(first, end):
         X.line[k] = W.lines[best, k]
         push_line(P, X.wide, k, X.line[k])
-    O.count[USED] = used
+    O.count.used = used
     finish(P, X, W, O, residuals(P, X, O, (W.own, X.wide, W.free, W.free_wide)), used, last)
 
 

@@ -8,7 +8,7 @@ from .diagonal import diagonal_turning
 from .operator import diagonal_of_line, push, push_line, push_turning, seen, seen_line, seen_turning
 from .pack import BIAS, IMPULSE, IN, LEAST, MU, SLIDE, SOFT, local_steps
 from .problem import BIAS as LINE_BIAS
-from .problem import COULOMB, HIGH, LOW
+from .problem import HIGH, LOW
 from .problem import SOFT as LINE_SOFT
 from .projection import normal_of_three, share
 from .sweeps import stepped
@@ -22,7 +22,7 @@ def visit_any(P, X, W, O, c, at):
     if P.turn.shape[0] > 0:
         visit_turning(P, X, W, O, c, at)
     else:
-        q = stepped(k, at, seen(P, W.own, X.wide, c), O.count[COULOMB])
+        q = stepped(k, at, seen(P, W.own, X.wide, c), O.count.coulomb)
         put(P, X, W, c, at, q)
     d = abs(k[at + IMPULSE] - n) + abs(k[at + IMPULSE + 1] - s) + abs(k[at + IMPULSE + 2] - t)
     return d / k[at + IN] if d > 0.0 else 0.0
@@ -56,7 +56,7 @@ def visit_turning(P, X, W, O, c, at):
     steps = local_steps(diagonal_turning(P, c), 0.0, 0)
     spin, roll = steps[0], steps[6]
     u = seen(P, W.own, X.wide, c)
-    if O.count[COULOMB]:
+    if O.count.coulomb:
         put(P, X, W, c, at, stepped(W.pack, at, u, 1))
         n = W.pack[at + IMPULSE]
         w = seen_turning(P, W.own, X.wide, c)

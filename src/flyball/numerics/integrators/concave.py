@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from ...compiler.formulas import formula
 from ...math.scalar import sqrt
-from .watching import CHECKS, LEAST, MISS, MOST, NODE, NODES, TERMS
+from .watching import CHECKS, LEAST, MISS, MOST, NODE, NODES
 
 ODD = 1e-2  # part of its change over a step by which a guard may differ from what is expected
 FAR = 0.05  # part of its least distance from zero by which it may
@@ -25,11 +25,11 @@ REACH = 1.5  # times the second differences that are seen that there may be
 @formula
 def borne_out(W):
     """Whether terms are as expected where stages of the step have met them."""
-    if W.count[TERMS] == 0:
+    if W.count.terms == 0:
         return True
     last = W.way.shape[0] - 1
     near = FAR * W.g[LEAST, last]
-    for k in range(W.count[TERMS]):
+    for k in range(W.count.terms):
         i = last + 1 + k
         low, high, miss = W.g[LEAST, i], W.g[MOST, i], W.g[MISS, i]
         if miss > max(near, ODD * (high - low)) + BLURRED * max(abs(low), abs(high)) + NOISE * W.grain[last]:
@@ -40,7 +40,7 @@ def borne_out(W):
 @formula
 def bent(W):
     """Whether the guard may dip below zero between two nodes of a panel, or its terms are not resolved there."""
-    last, n = W.way.shape[0] - 1, W.count[TERMS]
+    last, n = W.way.shape[0] - 1, W.count.terms
     if n == 0:
         return False
     least = W.g[NODE, last]

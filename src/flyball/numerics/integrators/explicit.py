@@ -9,30 +9,12 @@ from __future__ import annotations
 
 from ...compiler.formulas import formula
 from .clock import (
-    ACCEPTED,
     AT_END,
     AT_START,
-    BACK,
-    BEFORE,
     BETWEEN,
-    BLURRED_AT,
-    CALM,
-    CALM_SINCE,
-    CLEARER,
-    ERROR,
-    EXCESS,
-    EXTENDED,
-    GROW,
     NOT_FINITE,
     NOW,
-    PART,
-    SPAN,
-    STEP,
     STUCK,
-    TRIED,
-    TROUBLE,
-    H,
-    T,
 )
 from .loop import BEGIN, ENDED, ENTER, OVERLOOKED, REFUSE, TRY, WITHIN, ending
 from .refusal import SAFETY, afresh, enter, refuse
@@ -48,18 +30,18 @@ EXTENDED_TO, CLEAR = 1, 2  # what c.count[EXTENDED] says: the stages of dense ou
 @formula
 def begin(derivative, inspect, S, W, R, c):
     """First derivative and first step width. Returns a status."""
-    if derivative(c.real[T], c.y[NOW], c.K[0], S, W) != 0:
+    if derivative(c.real.t, c.y[NOW], c.K[0], S, W) != 0:
         return STUCK
-    inspect(c.real[T], 0.0, c.real[SPAN], AT_START, c.seen, S, W)
+    inspect(c.real.t, 0.0, c.real.span, AT_START, c.seen, S, W)
     for i in range(c.y.shape[1]):
         if not c.K[0, i] - c.K[0, i] == 0.0:
             return NOT_FINITE
-    if c.real[H] <= 0.0:
-        c.real[H] = first_step(derivative, S, W, R, c)
-    c.real[GROW] = 6.0
-    c.real[EXCESS] = 1.0
-    c.real[BEFORE] = c.real[BACK] = c.real[T]
-    c.real[BLURRED_AT] = c.real[T] - c.real[SPAN]
+    if c.real.h <= 0.0:
+        c.real.h = first_step(derivative, S, W, R, c)
+    c.real.grow = 6.0
+    c.real.excess = 1.0
+    c.real.before = c.real.back = c.real.t
+    c.real.blurred_at = c.real.t - c.real.span
     afresh(c)
     return 0
 
@@ -67,14 +49,14 @@ def begin(derivative, inspect, S, W, R, c):
 @formula
 def within(derivative, S, W, R, c):
     """Dense output at a part of the step. Returns a status."""
-    if c.count[EXTENDED] == 0 and extend(derivative, S, W, R, c, c.real[TRIED]) != 0:
+    if c.count.extended == 0 and extend(derivative, S, W, R, c, c.real.tried) != 0:
         return 1
-    if c.count[EXTENDED] != CLEAR:
-        c.count[EXTENDED] = EXTENDED_TO
+    if c.count.extended != CLEAR:
+        c.count.extended = EXTENDED_TO
         if not clear(R, c):
             return 1
-        c.count[EXTENDED] = CLEAR
-    interpolate(R, c, c.real[PART], c.real[TRIED], c.y[BETWEEN])
+        c.count.extended = CLEAR
+    interpolate(R, c, c.real.part, c.real.tried, c.y[BETWEEN])
     return 0
 
 
@@ -86,22 +68,22 @@ def clear(R, c):
     read within has to be narrower there, and where that comes again so have the next ones (c.real[CALM]). Elsewhere
     it is off by a few tolerances, and steps are as they would be. Steps of fixed width are not judged.
     """
-    if c.real[STEP] > 0.0:
+    if c.real.step > 0.0:
         return True
-    h = c.real[TRIED]
+    h = c.real.tried
     gap = astray(R, c, h)
     if gap <= 1.0:
         return True
     limited = stretch(R, c, h) > EDGE
-    most = max(1.0, FAR * c.real[ERROR]) if limited else FARTHER * max(1.0, c.real[ERROR])
+    most = max(1.0, FAR * c.real.error) if limited else FARTHER * max(1.0, c.real.error)
     if gap <= most:
         return True
-    c.real[CLEARER] = h * max(0.2, SAFETY * (gap / most) ** (-1.0 / R.order_i[0]))
+    c.real.clearer = h * max(0.2, SAFETY * (gap / most) ** (-1.0 / R.order_i[0]))
     if limited:
-        now = c.count[ACCEPTED] + 1
-        if c.real[CALM_SINCE] > 0.0 and 0.0 < now - c.real[CALM_SINCE] <= SOON:
-            c.real[CALM] = SAFETY * h
-        c.real[CALM_SINCE] = now
+        now = c.count.accepted + 1
+        if c.real.calm_since > 0.0 and 0.0 < now - c.real.calm_since <= SOON:
+            c.real.calm = SAFETY * h
+        c.real.calm_since = now
     return False
 
 
@@ -113,19 +95,19 @@ def overlooked(derivative, inspect, S, W, R, c):
     what the dense output misses of the equations there, over the part of the step for which it lasts. What lasts for
     more than a step is another branch of a formula: no width is right. Steps of fixed width look for that only.
     """
-    h = c.real[TRIED]
-    inspect(c.real[T], h, c.real[SPAN], AT_END, c.seen, S, W)
-    k, x, share = inspect(c.real[T], h, c.real[SPAN], 0, c.seen, S, W)
-    if k > 0 and c.count[EXTENDED] == 0:
+    h = c.real.tried
+    inspect(c.real.t, h, c.real.span, AT_END, c.seen, S, W)
+    k, x, share = inspect(c.real.t, h, c.real.span, 0, c.seen, S, W)
+    if k > 0 and c.count.extended == 0:
         if extend(derivative, S, W, R, c, h) != 0:
             return 1
-        c.count[EXTENDED] = EXTENDED_TO
+        c.count.extended = EXTENDED_TO
     while k > 0:
         if share > 1.0:
             return 1
-        if c.real[STEP] == 0.0 and not defect(derivative, S, W, R, c, h, x) * share <= 1.0:
+        if c.real.step == 0.0 and not defect(derivative, S, W, R, c, h, x) * share <= 1.0:
             return 1
-        k, x, share = inspect(c.real[T], h, c.real[SPAN], k, c.seen, S, W)
+        k, x, share = inspect(c.real.t, h, c.real.span, k, c.seen, S, W)
     return 0
 
 
@@ -134,21 +116,21 @@ def answer(own, S, W, R, c, task):
     """What the `loop` asks of a method; ``own`` are derivative, arrive, tangent, inspect."""
     derivative, arrive, tangent, inspect = own
     if task == TRY:
-        c.count[EXTENDED] = 0
-        status, c.real[ERROR] = attempt(derivative, arrive, tangent, S, W, R, c, c.real[TRIED])
+        c.count.extended = 0
+        status, c.real.error = attempt(derivative, arrive, tangent, S, W, R, c, c.real.tried)
         return status
     if task == WITHIN:
         return within(derivative, S, W, R, c)
     if task == ENTER:
-        enter(R, c, ending(c), c.real[TRIED], c.real[ERROR])
+        enter(R, c, ending(c), c.real.tried, c.real.error)
         return 0
     if task == REFUSE:
-        refuse(derivative, arrive, tangent, S, W, R, c, c.real[TRIED], c.count[TROUBLE], c.real[ERROR])
+        refuse(derivative, arrive, tangent, S, W, R, c, c.real.tried, c.count.trouble, c.real.error)
         return 0
     if task == OVERLOOKED:
         return overlooked(derivative, inspect, S, W, R, c)
     if task == ENDED:
-        inspect(c.real[T], c.real[TRIED], c.real[SPAN], AT_END, c.seen, S, W)
+        inspect(c.real.t, c.real.tried, c.real.span, AT_END, c.seen, S, W)
         return 0
     if task == BEGIN:
         return begin(derivative, inspect, S, W, R, c)

@@ -7,11 +7,11 @@ hardly bends, of which a distance or a force does, the equations are evaluated a
 from __future__ import annotations
 
 from ...compiler.formulas import formula
-from .clock import BETWEEN, PART, T
+from .clock import BETWEEN
 from .concave import BLURRED, FAR, ODD, borne_out
 from .grains import blur
 from .loop import WITHIN
-from .watching import END, LEAST, LOOKS, LOST, MISS, MOST, PLAIN, SOUGHT, START, TERMS, THERE, TRUE, TRULY
+from .watching import END, LEAST, MISS, MOST, START, THERE, TRUE
 
 SHORT = 1e-7  # part of the time span: in steps so short there is nothing but rounding to be found
 
@@ -19,23 +19,23 @@ SHORT = 1e-7  # part of the time span: in steps so short there is nothing but ro
 @formula
 def glance(callbacks, S, W, R, c, h, x, row):
     """Write guards at a part x of the step to a row."""
-    W.count[LOOKS] += 1
-    if W.count[PLAIN] == 1:
-        callbacks[7](c.real[T], h, x, S, W, row)
+    W.count.looks += 1
+    if W.count.plain == 1:
+        callbacks[7](c.real.t, h, x, S, W, row)
     elif exactly(callbacks, S, W, R, c, h, x, row) != 0:
-        W.count[LOST] = 1
+        W.count.lost = 1
 
 
 @formula
 def exactly(callbacks, S, W, R, c, h, x, row):
     """Write guards of the equations on the dense output at a part x of the step to a row. Returns a status."""
     ask, own, watch = callbacks[0], callbacks[1], callbacks[5]
-    c.real[PART] = x
+    c.real.part = x
     if ask(own, S, W, R, c, WITHIN) != 0:
         return 1
-    W.count[SOUGHT] += 1
-    W.count[TRULY] += 1
-    return watch(c.real[T] + x * h, c.y[BETWEEN], S, W, row)
+    W.count.sought += 1
+    W.count.truly += 1
+    return watch(c.real.t + x * h, c.y[BETWEEN], S, W, row)
 
 
 @formula
@@ -54,9 +54,9 @@ def true_guard(callbacks, S, W, R, c, h, x, i):
 def compare(look, S, W, t, h, span):
     """Note in W.count[PLAIN] whether guards are as expected where stages of the step have met them."""
     ng = W.way.shape[0]
-    W.count[SOUGHT] = W.count[LOST] = 0
-    W.count[PLAIN] = 1
-    every = ng + W.count[TERMS]
+    W.count.sought = W.count.lost = 0
+    W.count.plain = 1
+    every = ng + W.count.terms
     for i in range(every):
         W.g[LEAST, i] = min(W.g[START, i], W.g[END, i])
         W.g[MOST, i] = max(W.g[START, i], W.g[END, i])
@@ -68,12 +68,12 @@ def compare(look, S, W, t, h, span):
             if f == g or (f != f and g != g):
                 continue
             if not f - g == f - g:  # a number, and none
-                W.count[PLAIN] = 0
+                W.count.plain = 0
             W.g[LEAST, i] = min(W.g[LEAST, i], f, g)
             W.g[MOST, i] = max(W.g[MOST, i], f, g)
             W.g[MISS, i] = max(W.g[MISS, i], abs(f - g))
     if h <= SHORT * span:
-        W.count[PLAIN] = 1
+        W.count.plain = 1
         return
     for i in range(ng):
         low, high, miss = W.g[LEAST, i], W.g[MOST, i], W.g[MISS, i]
@@ -83,6 +83,6 @@ def compare(look, S, W, t, h, span):
             continue
         if miss < FAR * low or miss < -FAR * high:
             continue
-        W.count[PLAIN] = 0
+        W.count.plain = 0
     if not borne_out(W):
-        W.count[PLAIN] = 0
+        W.count.plain = 0

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from ...compiler.formulas import formula
 from ...math.scalar import sqrt
-from .clock import ACCEPTED, LARGEST, ULP, T
+from .clock import ULP
 from .concave import NOISE
-from .watching import ASTRAY, GRAIN_END, GRAIN_START, LEAST, MOST, START, STRAYED
+from .watching import ASTRAY, GRAIN_END, GRAIN_START, LEAST, MOST, START
 
 STRAYS = 8.0  # grains that a step adds, as a random walk
 BEGUN = 16.0  # steps that it takes to stray as far as a state does that has just been made
@@ -23,7 +23,7 @@ RESOLVED = 16.0 * ULP  # part of the largest time that is none
 @formula
 def strayed(W, c):
     """Note how many grains the state may be off by."""
-    W.real[STRAYED] = STRAYS * sqrt(BEGUN + c.count[ACCEPTED])
+    W.real.strayed = STRAYS * sqrt(BEGUN + c.count.accepted)
 
 
 @formula
@@ -43,13 +43,13 @@ def blur(W, i, x):
     """What is rounding of guard i at a part x of the step."""
     if W.kept[i] == 1 or corner(W, i):
         return NOISE * W.grain[i]
-    return W.real[STRAYED] * ((1.0 - x) * W.g[GRAIN_START, i] + x * W.g[GRAIN_END, i])
+    return W.real.strayed * ((1.0 - x) * W.g[GRAIN_START, i] + x * W.g[GRAIN_END, i])
 
 
 @formula
 def rounding(W, c, i, slope, x):
     """What is no more than rounding of a guard at a part x of the step, or of time, by which it changes so fast."""
-    return blur(W, i, x) + RESOLVED * max(abs(c.real[T]), c.real[LARGEST]) * abs(slope)
+    return blur(W, i, x) + RESOLVED * max(abs(c.real.t), c.real.largest) * abs(slope)
 
 
 @formula

@@ -12,34 +12,14 @@ from __future__ import annotations
 
 from ...compiler.formulas import formula
 from .clock import (
-    ACCEPTED,
     BETWEEN,
-    CLEARER,
     DONE,
-    ERROR,
-    GROW,
-    H_MAX,
-    LARGEST,
-    LIMIT,
     NEW,
-    NEXT,
     NOW,
-    PARDON,
-    PART,
-    QUOTA,
-    REJECTED,
     RUNNING,
-    STARTED,
-    STATUS,
-    STEP,
     STUCK,
-    T_END,
     TOO_MANY,
-    TRIED,
-    TROUBLE,
     UNREPORTED,
-    H,
-    T,
 )
 
 # what a method is asked: to begin at the state (a status of the clock); a step of the width TRIED to c.y[NEW] (0 or
@@ -63,44 +43,44 @@ def start(callbacks, S, W, R, c, out):
     status = ask(own, S, W, R, c, BEGIN)
     if status != 0:
         return status, used
-    while c.count[NEXT] < c.times.shape[0] and c.times[c.count[NEXT]] <= c.real[T]:
+    while c.count.next < c.times.shape[0] and c.times[c.count.next] <= c.real.t:
         for i in range(c.y.shape[1]):
             c.y[BETWEEN, i] = c.y[NOW, i]
-        if report(c.times[c.count[NEXT]], c.y[BETWEEN], out[used], S, W) != 0:
+        if report(c.times[c.count.next], c.y[BETWEEN], out[used], S, W) != 0:
             return UNREPORTED, used
         used += 1
-        c.count[NEXT] += 1
-    c.count[STARTED] = 1
+        c.count.next += 1
+    c.count.started = 1
     return (STUCK if begun(callbacks, S, W, c, False) != 0 else 0), used
 
 
 @formula
 def ending(c):
     """Time at which the step in the making ends: T_END itself where it reaches that, as T + h may be less."""
-    h = c.real[TRIED]
-    return c.real[T_END] if h == c.real[T_END] - c.real[T] else c.real[T] + h
+    h = c.real.tried
+    return c.real.t_end if h == c.real.t_end - c.real.t else c.real.t + h
 
 
 @formula
 def write(callbacks, S, W, R, c, out, used):
     """Report every output time within the step, as far as the buffer reaches. Returns (status, used)."""
     ask, own, report = callbacks[:3]
-    t, h, end = c.real[T], c.real[TRIED], ending(c)
-    while c.count[NEXT] < c.times.shape[0] and used < out.shape[0]:
-        s = c.times[c.count[NEXT]]
+    t, h, end = c.real.t, c.real.tried, ending(c)
+    while c.count.next < c.times.shape[0] and used < out.shape[0]:
+        s = c.times[c.count.next]
         if s > end:
             break
         if s == end:
             for i in range(c.y.shape[1]):
                 c.y[BETWEEN, i] = c.y[NEW, i]
         else:
-            c.real[PART] = (s - t) / h
+            c.real.part = (s - t) / h
             if ask(own, S, W, R, c, WITHIN) != 0:
                 return UNREPORTED, used
         if report(s, c.y[BETWEEN], out[used], S, W) != 0:
             return UNREPORTED, used
         used += 1
-        c.count[NEXT] += 1
+        c.count.next += 1
     return 0, used
 
 
@@ -110,46 +90,46 @@ def width(c):
 
     Fixed steps are never wider, and narrower only where they end: at events, and at the end of the time.
     """
-    left = c.real[T_END] - c.real[T]
-    h = min(c.real[H], c.real[H_MAX])
+    left = c.real.t_end - c.real.t
+    h = min(c.real.h, c.real.h_max)
     if 1.000001 * h >= left:
         h = left
-    elif 2.0 * h > left and c.real[STEP] == 0.0:
+    elif 2.0 * h > left and c.real.step == 0.0:
         h = 0.5 * left
-    return 0.0 if h < 1e-14 * max(abs(c.real[T]), c.real[LARGEST]) else h
+    return 0.0 if h < 1e-14 * max(abs(c.real.t), c.real.largest) else h
 
 
 @formula
 def shorten(c, h):
     """Try a step of that width next, as the last was refused."""
-    c.count[REJECTED] += 1
-    c.real[GROW] = 1.0
-    c.real[H] = h
+    c.count.rejected += 1
+    c.real.grow = 1.0
+    c.real.h = h
 
 
 @formula
 def narrow(c, h):
     """The same after a step within which something cannot be: for steps of fixed width there is nothing to try."""
-    shorten(c, h if c.real[STEP] == 0.0 else 0.0)
+    shorten(c, h if c.real.step == 0.0 else 0.0)
 
 
 @formula
 def unclear(c, h):
     """Try a step next within which the state may be told, after one of width h in which it cannot be."""
-    narrow(c, c.real[CLEARER] if c.real[CLEARER] > 0.0 else 0.25 * h)
+    narrow(c, c.real.clearer if c.real.clearer > 0.0 else 0.25 * h)
 
 
 @formula
 def full(c):
     """Whether the buffer was full inside the step: it is taken again by the next call."""
-    return c.count[NEXT] < c.times.shape[0] and c.times[c.count[NEXT]] <= ending(c)
+    return c.count.next < c.times.shape[0] and c.times[c.count.next] <= ending(c)
 
 
 @formula
 def whole(callbacks, S, W, R, c, out, used):
     """Go on to the end of a step that is good. Returns (rows written, whether the loop returns)."""
     ask, own = callbacks[:2]
-    h = c.real[TRIED]
+    h = c.real.tried
     if c.seen.shape[1] > 0 and ask(own, S, W, R, c, OVERLOOKED) != 0:
         narrow(c, 0.5 * h)
         return used, False
@@ -171,35 +151,35 @@ def advance(callbacks, S, W, R, c, out):
     """
     ask, own, _, begun, onward = callbacks[:5]
     used = 0
-    c.count[STATUS] = RUNNING
-    if c.count[STARTED] != 1:
-        c.count[STATUS], used = start(callbacks, S, W, R, c, out)
-        if c.count[STATUS] != RUNNING:
+    c.count.status = RUNNING
+    if c.count.started != 1:
+        c.count.status, used = start(callbacks, S, W, R, c, out)
+        if c.count.status != RUNNING:
             return used
     steps = 0
-    while c.real[T] < c.real[T_END]:
-        if used == out.shape[0] or steps >= c.count[QUOTA]:
+    while c.real.t < c.real.t_end:
+        if used == out.shape[0] or steps >= c.count.quota:
             return used
-        if c.count[ACCEPTED] + c.count[REJECTED] >= c.count[LIMIT]:
-            c.count[STATUS] = TOO_MANY
+        if c.count.accepted + c.count.rejected >= c.count.limit:
+            c.count.status = TOO_MANY
             return used
-        c.real[TRIED] = width(c)
-        if c.real[TRIED] == 0.0:
-            c.count[STATUS] = STUCK
+        c.real.tried = width(c)
+        if c.real.tried == 0.0:
+            c.count.status = STUCK
             return used
         steps += 1
-        t = c.real[T]
-        c.real[CLEARER] = 0.0
-        c.count[TROUBLE] = ask(own, S, W, R, c, TRY)
-        if c.count[TROUBLE] != 0 or not c.real[ERROR] <= max(1.0, c.real[PARDON]):
+        t = c.real.t
+        c.real.clearer = 0.0
+        c.count.trouble = ask(own, S, W, R, c, TRY)
+        if c.count.trouble != 0 or not c.real.error <= max(1.0, c.real.pardon):
             if ask(own, S, W, R, c, REFUSE) != 0:
-                c.count[STATUS] = STUCK
+                c.count.status = STUCK
                 return used
-            if c.real[T] < t:  # the step before is taken back
+            if c.real.t < t:  # the step before is taken back
                 begun(callbacks, S, W, c, True)
             continue
         used, over = onward(callbacks, S, W, R, c, out, used)
         if over:
             return used
-    c.count[STATUS] = DONE
+    c.count.status = DONE
     return used

@@ -8,32 +8,21 @@ whether that is so, else the panel is halved. `glance.glance` writes the guards 
 from __future__ import annotations
 
 from ...compiler.formulas import formula
-from .clock import LARGEST, T
 from .concave import BLURRED, NOISE, ODD, bent
 from .glance import glance
 from .grains import RESOLVED, blur, corner, gone, hush, rounding
 from .watching import (
-    AWAY,
     CHECKS,
-    CUTS,
-    DONE_TO,
     END,
     FIRED,
-    FRESH,
     LEAST,
-    LOOKS,
     MARK,
     MOST,
     NODE,
     NODES,
-    PANEL,
-    PLAIN,
     SIDE,
-    SOUGHT,
     START,
-    TERMS,
     THERE,
-    WIDTH,
 )
 
 MANY = 4000  # places that are looked at before panels are taken as they are: what is not smooth then is rounding
@@ -61,16 +50,16 @@ def survey(callbacks, S, W, R, c, h, first):
     """
     a = first
     w = 1.0 - first
-    most = W.count[LOOKS] + MANY
-    W.real[DONE_TO] = 1.0
+    most = W.count.looks + MANY
+    W.real.done_to = 1.0
     while a < 1.0:
         w = min(w, 1.0 - a)
-        W.real[PANEL], W.real[WIDTH] = a, w
+        W.real.panel, W.real.width = a, w
         fill(callbacks, S, W, R, c, h, a, w)
         smooth = resolved(W)
-        if not smooth and w > NARROWEST and W.count[LOOKS] < most:
-            if W.count[PLAIN] == 0 and W.count[SOUGHT] > DEARLY and a > ALONG and W.count[CUTS] < OFTEN:
-                W.real[DONE_TO] = a
+        if not smooth and w > NARROWEST and W.count.looks < most:
+            if W.count.plain == 0 and W.count.sought > DEARLY and a > ALONG and W.count.cuts < OFTEN:
+                W.real.done_to = a
                 return -1, a, a
             w *= 0.5
             continue
@@ -97,7 +86,7 @@ def fill(callbacks, S, W, R, c, h, a, w):
         x = a + w * W.nodes[j]
         row = NODE + j
         if x <= 0.0 or x >= 1.0:
-            for i in range(W.way.shape[0] + W.count[TERMS]):
+            for i in range(W.way.shape[0] + W.count.terms):
                 W.g[row, i] = W.g[START if x <= 0.0 else END, i]
         else:
             glance(callbacks, S, W, R, c, h, x, row)
@@ -180,7 +169,7 @@ def restless(W, i):
 @formula
 def quiet(W, i):
     """What is rounding of guard i anywhere in the panel."""
-    return min(blur(W, i, W.real[PANEL]), blur(W, i, W.real[PANEL] + W.real[WIDTH]))
+    return min(blur(W, i, W.real.panel), blur(W, i, W.real.panel + W.real.width))
 
 
 @formula
@@ -252,7 +241,7 @@ def jumping(W, i):
 @formula
 def within(W, y):
     """What place in the step a place in the panel is."""
-    return W.real[PANEL] + W.real[WIDTH] * y
+    return W.real.panel + W.real.width * y
 
 
 @formula
@@ -284,9 +273,9 @@ def begin_sides(callbacks, S, W, R, c, h):
     on the side that it goes to: places closer and closer to the start tell which that is, and whether it comes back
     soon. One that has to stay above zero (W.kept) has not to go below: W.count[AWAY] says that it does.
     """
-    look, t, ng = callbacks[7], c.real[T], W.way.shape[0]
-    W.count[AWAY] = 0
-    if W.count[FRESH] == 0 and not doubtful(W):
+    look, t, ng = callbacks[7], c.real.t, W.way.shape[0]
+    W.count.away = 0
+    if W.count.fresh == 0 and not doubtful(W):
         for i in range(ng):
             W.g[SIDE, i] = W.side[i]
             W.g[MARK, i] = blur(W, i, 0.0) if W.side[i] == 0.0 and W.kept[i] == 0 else -1.0
@@ -297,7 +286,7 @@ def begin_sides(callbacks, S, W, R, c, h):
     for n in range(CLOSEST, FARTHEST - 1, -1):
         x = 0.5**n
         look(t, h, x, S, W, THERE)
-        W.count[LOOKS] += 1
+        W.count.looks += 1
         i = begun(W)
         if i >= 0:
             return i, before, x, x
@@ -321,15 +310,15 @@ def doubtful(W):
 def begins_near(callbacks, S, W, R, c, h):
     """Note in W.g[MARK] what is zero of guards that begin about there, -1 of others; whether there are any."""
     fill(callbacks, S, W, R, c, h, 0.0, 1.0)
-    first = min(1.0, max(AT_FIRST, 4.0 * RESOLVED * max(abs(c.real[T]), c.real[LARGEST]) / h))
-    callbacks[7](c.real[T], h, first, S, W, THERE)
+    first = min(1.0, max(AT_FIRST, 4.0 * RESOLVED * max(abs(c.real.t), c.real.largest) / h))
+    callbacks[7](c.real.t, h, first, S, W, THERE)
     near = False
     for i in range(W.way.shape[0]):
         low, high = extent(W, i)
-        fresh = W.count[FRESH] == 1 and (W.kept[i] == 1 or abs(W.side[i]) != 1.0)
+        fresh = W.count.fresh == 1 and (W.kept[i] == 1 or abs(W.side[i]) != 1.0)
         W.g[SIDE, i] = side_of(W.g[START, i]) if fresh else W.side[i]
         W.g[MARK, i] = -1.0
-        if not fresh and (W.count[FRESH] == 1 or not (W.kept[i] == 1 and W.side[i] <= 0.0)):
+        if not fresh and (W.count.fresh == 1 or not (W.kept[i] == 1 and W.side[i] <= 0.0)):
             continue
         size = max(abs(low), abs(high))
         now = abs(W.g[START, i])
@@ -356,7 +345,7 @@ def begun(W):
         if W.g[MARK, i] < 0.0 or W.fired[i] != 0:
             continue
         if W.kept[i] == 1 and s <= 0.0 and f < -band(W, i):
-            W.count[AWAY] = 1
+            W.count.away = 1
             return i
         if s == 0.0:
             if abs(f) > W.g[MARK, i]:

@@ -7,12 +7,12 @@ its width, until it ends on the event: what is found is as good as the integrati
 from __future__ import annotations
 
 from ...compiler.formulas import formula
-from .clock import LARGEST, TRIED, ULP, T
+from .clock import ULP
 from .glance import true_guard
 from .grains import blur, hush
 from .loop import TRY
 from .panels import fires
-from .watching import AGAIN, BEYOND, BRACKET, END, MARK, START
+from .watching import END, MARK, START
 
 GOLDEN = 0.381966011250105
 ROUNDS = 60  # evaluations in which a bracket is closed, or an extremum found
@@ -31,7 +31,7 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
     Where it only fires as it comes back to that side, it has to be on the other one in between. W.real[BEYOND] is a
     place where it has not fired yet, which the start need not be.
     """
-    W.real[BEYOND] = 0.0
+    W.real.beyond = 0.0
     first, last = a, b
     status, fa = true_guard(callbacks, S, W, R, c, h, a, i)
     wide = max(b - a, CLOSE)  # a place may be told twice
@@ -67,8 +67,8 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
         return 0, -1.0  # it gets to zero, and no farther
     begun = W.kept[i] == 0 and abs(W.g[START, i]) <= W.g[MARK, i]  # about zero, on no side
     if a > 0.0 and (begun or W.g[START, i] * fa < 0.0):
-        W.real[BEYOND] = a
-    W.real[BRACKET] = b - a
+        W.real.beyond = a
+    W.real.bracket = b - a
     status, x = bracketed(callbacks, S, W, R, c, h, i, (a, fa, b, fb))
     return status, max(x, CLOSE)  # one within rounding of the step's start is an event too
 
@@ -162,8 +162,8 @@ def bracketed(callbacks, S, W, R, c, h, i, bracket):
 def retake(callbacks, S, W, R, c, h):
     """Take the step again with width h, and note its end. Returns a status."""
     ask, own, note = callbacks[0], callbacks[1], callbacks[6]
-    W.count[AGAIN] += 1
-    c.real[TRIED] = h
+    W.count.again += 1
+    c.real.tried = h
     status = ask(own, S, W, R, c, TRY)
     if status == 0:
         note(S, W, END)
@@ -179,7 +179,7 @@ def end_on(callbacks, S, W, R, c, h, slope, i, s, between):
     the guard was on that side nowhere, or has not left it at the end: the dense output told of what did not happen.
     """
     least, most = between
-    ulp = ULP * max(abs(c.real[T]) + h, 1e-3 * c.real[LARGEST])
+    ulp = ULP * max(abs(c.real.t) + h, 1e-3 * c.real.largest)
     near = 2.0 * ulp + REACHED * h
     low, high = least, most
     bound = False  # whether a step that does not reach the event is known

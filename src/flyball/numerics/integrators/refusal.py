@@ -8,35 +8,16 @@ from __future__ import annotations
 
 from ...compiler.formulas import formula
 from .clock import (
-    ACCEPTED,
     ASIDE,
     ASIDE_RATE,
-    BACK,
-    BEFORE,
-    BEST,
-    BEST_H,
-    BLURRED_AT,
-    CALM,
-    CALM_SINCE,
-    CONTROLLED,
-    EXCESS,
-    EXCESS_AT,
     FROM,
     FROM_RATE,
-    GROW,
-    LAST,
     NEW,
     NOW,
     OLD,
     OLD_RATE,
-    PARDON,
-    RTOL,
-    STEP,
     TO,
     TO_RATE,
-    WIDE,
-    H,
-    T,
 )
 from .loop import shorten
 from .step import LARGE, attempt
@@ -53,8 +34,8 @@ SLIGHT = 10.0  # an error from rounding that is accepted before a step is taken 
 @formula
 def afresh(c):
     """No step was refused since the last accepted one."""
-    c.real[LAST] = c.real[BEST] = LARGE
-    c.real[PARDON] = 0.0
+    c.real.last = c.real.best = LARGE
+    c.real.pardon = 0.0
 
 
 @formula
@@ -68,63 +49,63 @@ def enter(R, c, t, h, error):
     for i in range(c.seen.shape[1]):
         c.seen[FROM, i] = c.seen[TO, i]
         c.seen[FROM_RATE, i] = c.seen[TO_RATE, i]
-    c.real[BEFORE] = c.real[T]
-    if error > c.real[EXCESS]:
-        c.real[EXCESS] = error
-        c.real[EXCESS_AT] = c.real[T]
-    if c.real[GROW] > 1.0:
-        c.real[WIDE] = max(h, SLOWLY * c.real[WIDE])
-    grow = c.real[GROW]
-    c.real[H] = h * (min(grow, max(0.2, SAFETY * error ** (-1.0 / R.order_i[0]))) if error > 0.0 else grow)
-    if c.real[CALM] > 0.0:
-        c.real[H] = min(c.real[H], c.real[CALM])
-        c.real[CALM] *= 1.0 + BOLDER * (c.count[ACCEPTED] + 1 - c.real[CALM_SINCE])
-    if c.real[STEP] > 0.0:
-        c.real[H] = c.real[STEP]
-    c.real[T] = t
-    c.real[GROW] = 6.0
-    c.count[ACCEPTED] += 1
+    c.real.before = c.real.t
+    if error > c.real.excess:
+        c.real.excess = error
+        c.real.excess_at = c.real.t
+    if c.real.grow > 1.0:
+        c.real.wide = max(h, SLOWLY * c.real.wide)
+    grow = c.real.grow
+    c.real.h = h * (min(grow, max(0.2, SAFETY * error ** (-1.0 / R.order_i[0]))) if error > 0.0 else grow)
+    if c.real.calm > 0.0:
+        c.real.h = min(c.real.h, c.real.calm)
+        c.real.calm *= 1.0 + BOLDER * (c.count.accepted + 1 - c.real.calm_since)
+    if c.real.step > 0.0:
+        c.real.h = c.real.step
+    c.real.t = t
+    c.real.grow = 6.0
+    c.count.accepted += 1
     afresh(c)
 
 
 @formula
 def refuse(derivative, arrive, tangent, S, W, R, c, h, status, error):
     """Choose what to try after a step with that status and error; fixed steps that fail are the end."""
-    if c.real[STEP] > 0.0:
+    if c.real.step > 0.0:
         shorten(c, 0.0)
         return
     if status != 0 or not error < LARGE:
         shorten(c, 0.25 * h)
         return
     shorten(c, h * max(0.2, SAFETY * error ** (-1.0 / R.order_i[0])))
-    first = c.real[LAST] == LARGE
-    c.real[LAST] = error
-    if error < c.real[BEST]:
-        c.real[BEST] = error
-        c.real[BEST_H] = h
-    if c.real[PARDON] > 0.0:
-        if h > c.real[BEST_H]:
-            c.real[H] = c.real[BEST_H]
+    first = c.real.last == LARGE
+    c.real.last = error
+    if error < c.real.best:
+        c.real.best = error
+        c.real.best_h = h
+    if c.real.pardon > 0.0:
+        if h > c.real.best_h:
+            c.real.h = c.real.best_h
         return
-    wide = c.real[T] - c.real[BEFORE] > 0.5 * c.real[WIDE]
-    small = c.real[BEST] * c.real[RTOL] < ROUGH
-    back = wide and small and c.real[BEST] > SLIGHT and c.real[BACK] < c.real[BEFORE]
+    wide = c.real.t - c.real.before > 0.5 * c.real.wide
+    small = c.real.best * c.real.rtol < ROUGH
+    back = wide and small and c.real.best > SLIGHT and c.real.back < c.real.before
     if first or not small or not blurred(derivative, arrive, tangent, S, W, R, c, h, error):
         return
-    c.real[BLURRED_AT] = c.real[T]
+    c.real.blurred_at = c.real.t
     if back:
         take_back(c)
     else:
-        c.real[PARDON] = max(SLIGHT, 2.0 * c.real[BEST])
-        c.real[H] = max(c.real[WIDE], c.real[BEST_H])
+        c.real.pardon = max(SLIGHT, 2.0 * c.real.best)
+        c.real.h = max(c.real.wide, c.real.best_h)
 
 
 @formula
 def take_back(c):
     """Go back to where the last accepted step began, to end it elsewhere."""
-    c.count[ACCEPTED] -= 1
-    c.real[H] = 0.5 * (c.real[T] - c.real[BEFORE])
-    c.real[T] = c.real[BACK] = c.real[BEFORE]
+    c.count.accepted -= 1
+    c.real.h = 0.5 * (c.real.t - c.real.before)
+    c.real.t = c.real.back = c.real.before
     for i in range(c.y.shape[1]):
         c.y[NOW, i] = c.y[OLD, i]
         c.K[0, i] = c.y[OLD_RATE, i]
@@ -138,9 +119,9 @@ def blurred(derivative, arrive, tangent, S, W, R, c, h, error):
     for i in range(y.shape[0]):
         kept[i] = y[i]
         c.y[ASIDE_RATE, i] = c.K[0, i]
-        if i < c.count[CONTROLLED]:
+        if i < c.count.controlled:
             y[i] += (DIGITS if i % 2 == 0 else -DIGITS) * max(abs(y[i]), 1.0)
-    status, _ = arrive(c.real[T], y, c.K[0], S, W)
+    status, _ = arrive(c.real.t, y, c.K[0], S, W)
     other = error
     if status == 0:
         status, other = attempt(derivative, arrive, tangent, S, W, R, c, h)

@@ -8,24 +8,15 @@ it first does not is found by halves.
 from __future__ import annotations
 
 from ...compiler.formulas import formula
-from .clock import EXTENDED, NEW, SPAN, T_END, TRIED, ULP, T
+from .clock import NEW, ULP
 from .glance import compare, exactly, glance, true_guard
 from .grains import hush, rounding, side_at_start
 from .panels import band, begin_sides, fires, side_of, survey
 from .pinned import crossing, end_on, retake
 from .watching import (
     ASTRAY,
-    AWAY,
-    BEYOND,
-    BRACKET,
-    CUTS,
-    DONE_TO,
     END,
-    FRESH,
-    LOST,
     MARK,
-    PLAIN,
-    SAME,
     SIDE,
     SLOPE,
     START,
@@ -52,49 +43,49 @@ def first_event(callbacks, S, W, R, c):
     Where the status is `CUT` the step is not gone on from, and the width is one to try next.
     """
     watch, look = callbacks[5], callbacks[7]
-    h = most = c.real[TRIED]
+    h = most = c.real.tried
     hit = False
     for i in range(W.fired.shape[0]):
         W.fired[i] = 0
-    W.real[SAME] = AT_ONCE * h + 8.0 * ULP * (abs(c.real[T]) + h)
-    compare(look, S, W, c.real[T], h, c.real[SPAN])
-    if W.count[PLAIN] == 0 and W.count[FRESH] == 1 and W.count[CUTS] < SHORTER and begins_at_zero(W):
+    W.real.same = AT_ONCE * h + 8.0 * ULP * (abs(c.real.t) + h)
+    compare(look, S, W, c.real.t, h, c.real.span)
+    if W.count.plain == 0 and W.count.fresh == 1 and W.count.cuts < SHORTER and begins_at_zero(W):
         return CUT, 0.25 * h, False
     for _ in range(OTHERS):
         status, i, x, s = next_event(callbacks, S, W, R, c, h)
         if status == CUT and not hit:
-            return CUT, max(W.real[DONE_TO], SKIPPED) * h, False
+            return CUT, max(W.real.done_to, SKIPPED) * h, False
         if status == LOST_SIGHT:
             return LOST_SIGHT, h, False
         if status != 0 or i < 0:
             break
-        if hit and x * h >= h - W.real[SAME]:
+        if hit and x * h >= h - W.real.same:
             W.fired[i] = 1
             continue
         for j in range(W.fired.shape[0]):
             W.fired[j] = 0
-        if W.count[AWAY] == 1:
+        if W.count.away == 1:
             status = retake(callbacks, S, W, R, c, x * h)
         else:
             slope = expected_slope(callbacks, S, W, R, c, h, x, i)
-            status, found = end_on(callbacks, S, W, R, c, x * h, slope, i, s, (W.real[BEYOND] * h, most))
-            if not found and W.count[CUTS] < HALVES:  # the dense output told of what the step does not do
+            status, found = end_on(callbacks, S, W, R, c, x * h, slope, i, s, (W.real.beyond * h, most))
+            if not found and W.count.cuts < HALVES:  # the dense output told of what the step does not do
                 return CUT, 0.5 * h, False
             if status == 0 and not found and s * W.g[END, i] > 0.0:  # nothing happened
                 break
-        h = c.real[TRIED]
+        h = c.real.tried
         if status != 0:
             return LOST_SIGHT, h, False
         hit = True
-        compare(look, S, W, c.real[T], h, c.real[SPAN])
+        compare(look, S, W, c.real.t, h, c.real.span)
         W.fired[i] = 1
-        if W.count[AWAY] == 1:
+        if W.count.away == 1:
             break
         at_once(callbacks, S, W, R, c, h, i)
-    if not hit and h == c.real[T_END] - c.real[T]:
+    if not hit and h == c.real.t_end - c.real.t:
         hit = at_the_end(callbacks, S, W, R, c, h)
-    if hit and c.count[EXTENDED] > 0:  # places within were looked at: back to the end
-        return watch(c.real[T] + h, c.y[NEW], S, W, TRUE), h, True
+    if hit and c.count.extended > 0:  # places within were looked at: back to the end
+        return watch(c.real.t + h, c.y[NEW], S, W, TRUE), h, True
     return 0, h, hit
 
 
@@ -111,9 +102,9 @@ def begins_at_zero(W):
 @formula
 def next_event(callbacks, S, W, R, c, h):
     """The first place where a guard leaves its side: (status, guard or -1, place, side)."""
-    W.real[DONE_TO] = 1.0
+    W.real.done_to = 1.0
     i, a, b, at = begin_sides(callbacks, S, W, R, c, h)
-    if i >= 0 and W.count[AWAY] == 1:
+    if i >= 0 and W.count.away == 1:
         return left(callbacks, S, W, R, c, h, i, b, band(W, i))
     if i < 0:
         i, a, b = survey(callbacks, S, W, R, c, h, at)
@@ -131,9 +122,9 @@ def next_event(callbacks, S, W, R, c, h):
         if status != 0 or i >= 0:
             return status, i, x, s
         i, a, b = survey(callbacks, S, W, R, c, h, at)
-    if W.count[LOST] == 1:
+    if W.count.lost == 1:
         return LOST_SIGHT, -1, 0.0, 0.0
-    if W.real[DONE_TO] < 1.0:
+    if W.real.done_to < 1.0:
         return CUT, -1, 0.0, 0.0
     return trespass(callbacks, S, W, R, c, h)
 
@@ -152,10 +143,10 @@ def trespass(callbacks, S, W, R, c, h):
         if W.fired[i] == 1 or not W.g[START, i] == W.g[START, i]:
             continue
         if W.g[MARK, i] < 0.0 and s * f < -hush(W, i, 1.0) and fires(W.way[i], s):
-            W.count[AWAY] = 0
+            W.count.away = 0
             status, x = crossing(callbacks, S, W, R, c, h, i, 0.0, 1.0, s)
         elif (W.kept[i] == 1 and f < -band(W, i)) or f < -W.g[ASTRAY, i]:
-            W.real[BEYOND] = 0.0
+            W.real.beyond = 0.0
             least = band(W, i) if W.kept[i] == 1 else W.g[ASTRAY, i]
             status, _, x, s = left(callbacks, S, W, R, c, h, i, 1.0, least)
         else:
@@ -163,15 +154,15 @@ def trespass(callbacks, S, W, R, c, h):
         if status != 0:
             return LOST_SIGHT, -1, 0.0, 0.0
         if 0.0 < x < at:
-            best, at, side, away = i, x, s, W.count[AWAY]
-    W.count[AWAY] = away
+            best, at, side, away = i, x, s, W.count.away
+    W.count.away = away
     return 0, best, at, side
 
 
 @formula
 def left(callbacks, S, W, R, c, h, i, b, least):
     """Where guard i, below zero at b, goes there by more than rounding, as `next_event` returns it."""
-    W.count[AWAY] = 1
+    W.count.away = 1
     a = 0.0
     for _ in range(HALVES):
         x = 0.5 * (a + b)
@@ -215,7 +206,7 @@ def expected_slope(callbacks, S, W, R, c, h, x, i):
 
     Beyond it may be another function: one that jumps, or has a corner.
     """
-    d = min(LAST, LITTLE * W.real[BRACKET], 0.25 * x)
+    d = min(LAST, LITTLE * W.real.bracket, 0.25 * x)
     if x < SOON:
         return 0.0
     glance(callbacks, S, W, R, c, h, x - 2.0 * d, THERE)
@@ -256,7 +247,7 @@ def at_once(callbacks, S, W, R, c, h, first):
             continue
         f, slope = W.g[END, i], W.g[SLOPE, i]
         came = -1.0 if slope > 0.0 else 1.0  # the side that it comes from
-        if fires(W.way[i], came) and abs(f) <= W.real[SAME] * abs(slope) and slope != 0.0:
+        if fires(W.way[i], came) and abs(f) <= W.real.same * abs(slope) and slope != 0.0:
             W.fired[i] = 1
 
 

@@ -8,20 +8,10 @@ from __future__ import annotations
 from ...compiler.formulas import formula
 from ...math.scalar import sqrt
 from .clock import (
-    ATOL,
     BETWEEN,
-    CONTROLLED,
-    H_MAX,
-    LEDGER,
     LOOSER,
     NEW,
     NOW,
-    PARDON,
-    POSITIONS,
-    RTOL,
-    SCALE,
-    STEP,
-    T,
 )
 
 BEYOND = 1e-3  # of a coordinate beyond the mechanism's size, what its tolerance still grows with
@@ -51,9 +41,9 @@ def allowed(c, i, size):
     Of the first c.count[POSITIONS] what is beyond the size of what moves counts little: that a wheel has turned a
     hundred times, or that the world's origin is far away, is no reason to be less accurate.
     """
-    if i < c.count[POSITIONS]:
-        size = max(min(size, max(1.0, c.real[SCALE])), BEYOND * size)
-    return c.real[ATOL] + c.real[RTOL] * size
+    if i < c.count.positions:
+        size = max(min(size, max(1.0, c.real.scale)), BEYOND * size)
+    return c.real.atol + c.real.rtol * size
 
 
 @formula
@@ -72,15 +62,15 @@ def first_step(derivative, S, W, R, c):
 
     A state that begins at rest near zero is small without changing fast: hence the least.
     """
-    n = c.count[CONTROLLED]
+    n = c.count.controlled
     y = c.y[NOW]
     d0 = scaled(c, y, y, n)
     d1 = scaled(c, c.K[0], y, n)
     h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
-    h0 = min(max(h0, FIRST * c.real[H_MAX]), c.real[H_MAX])
+    h0 = min(max(h0, FIRST * c.real.h_max), c.real.h_max)
     for i in range(y.shape[0]):
         c.y[NEW, i] = y[i] + h0 * c.K[0, i]
-    if derivative(c.real[T] + h0, c.y[NEW], c.K[1], S, W) != 0:
+    if derivative(c.real.t + h0, c.y[NEW], c.K[1], S, W) != 0:
         return 1e-3 * h0
     for i in range(n):
         c.y[BETWEEN, i] = (c.K[1, i] - c.K[0, i]) / h0
@@ -96,7 +86,7 @@ def attempt(derivative, arrive, tangent, S, W, R, c, h):
     y = c.y[NOW]
     new = c.y[NEW]
     stages = R.order_i[1]
-    t = c.real[T]
+    t = c.real.t
     for i in range(1, stages):
         combine(y, c.K, R.A[i], i, h, new)
         status = derivative(t + R.c[i] * h, new, c.K[i], S, W)
@@ -106,13 +96,13 @@ def attempt(derivative, arrive, tangent, S, W, R, c, h):
     status, moved = arrive(t + h, new, c.K[stages], S, W)
     if status != 0:
         return status, 0.0
-    moved /= c.real[RTOL] + c.real[ATOL] / c.real[SCALE]
+    moved /= c.real.rtol + c.real.atol / c.real.scale
     moved = max(moved, accounting_error(R, c, h))
     error = estimate(tangent, S, W, R, c, h, False)
-    if error > 1.0 and c.real[PARDON] > 0.0:
+    if error > 1.0 and c.real.pardon > 0.0:
         error = estimate(tangent, S, W, R, c, h, True)
     error = moved if error <= moved else error  # an error that is no number stays one, and is refused
-    return 0, 0.0 if c.real[STEP] > 0.0 and error < LARGE else error
+    return 0, 0.0 if c.real.step > 0.0 and error < LARGE else error
 
 
 @formula
@@ -120,14 +110,14 @@ def estimate(tangent, S, W, R, c, h, kept):
     """Error of the step in units of the tolerance; ``kept``: of what is left of it once the state is projected."""
     e5 = part(tangent, S, W, R, c, 0, kept)
     e3 = part(tangent, S, W, R, c, 1, kept)
-    return 0.0 if e5 == 0.0 and e3 == 0.0 else h * e5 / sqrt((e5 + 0.01 * e3) * max(c.count[CONTROLLED], 1))
+    return 0.0 if e5 == 0.0 and e3 == 0.0 else h * e5 / sqrt((e5 + 0.01 * e3) * max(c.count.controlled, 1))
 
 
 @formula
 def part(tangent, S, W, R, c, k, kept):
     """Sum of squares of one of the two error estimates, per second, in units of the tolerance."""
     y, new, e = c.y[NOW], c.y[NEW], c.y[BETWEEN]
-    n = c.count[CONTROLLED]
+    n = c.count.controlled
     for i in range(n):
         e[i] = 0.0
     for j in range(R.order_i[1] + 1):
@@ -146,10 +136,10 @@ def part(tangent, S, W, R, c, k, kept):
 @formula
 def accountable(c):
     """Tolerance of the accounts: relative to all that stands in them and to c.real[LEDGER]."""
-    size = c.real[LEDGER]
+    size = c.real.ledger
     for k in range(c.accounts.shape[0]):
         size += abs(c.y[NEW, c.accounts[k]])
-    return LOOSER * c.real[RTOL] * size
+    return LOOSER * c.real.rtol * size
 
 
 @formula
@@ -200,7 +190,7 @@ def astray(R, c, h):
 
     From its stages alone, which `extend` has made: no evaluation.
     """
-    n, m = c.count[CONTROLLED], c.accounts.shape[0]
+    n, m = c.count.controlled, c.accounts.shape[0]
     s = accountable(c)
     e = less = a = a_less = 0.0
     for i in range(n):
@@ -223,7 +213,7 @@ def stretch(R, c, h):
     """
     last = R.order_i[1]
     a = b = 0.0
-    for i in range(c.count[CONTROLLED]):
+    for i in range(c.count.controlled):
         size = allowed(c, i, max(abs(c.y[NOW, i]), abs(c.y[NEW, i])))
         d = 0.0
         for j in range(last):
@@ -247,7 +237,7 @@ def extend(derivative, S, W, R, c, h):
     """The stages that only dense output needs. Returns a status."""
     for k in range(R.order_i[1] + 1, R.order_i[2]):
         combine(c.y[NOW], c.K, R.A[k], k, h, c.y[BETWEEN])
-        status = derivative(c.real[T] + R.c[k] * h, c.y[BETWEEN], c.K[k], S, W)
+        status = derivative(c.real.t + R.c[k] * h, c.y[BETWEEN], c.K[k], S, W)
         if status != 0:
             return status
     return 0
@@ -259,11 +249,11 @@ def defect(derivative, S, W, R, c, h, x):
 
     Not finite if they cannot be evaluated there.
     """
-    n = c.count[CONTROLLED]
+    n = c.count.controlled
     at = c.y[BETWEEN]
     gap = c.K[R.order_i[2]]
     interpolate(R, c, x, h, at)
-    if derivative(c.real[T] + x * h, at, gap, S, W) != 0:
+    if derivative(c.real.t + x * h, at, gap, S, W) != 0:
         return 1e300
     for j in range(R.order_i[2]):
         w = 0.0

@@ -10,29 +10,23 @@ W is a `Watch`. It returns besides when a step ends on events; whoever calls cha
 from __future__ import annotations
 
 from ...compiler.formulas import formula
-from .clock import NEXT, NOW, STATUS, TRIED, ULP, WIDE, H, T
+from .clock import NOW, ULP
 from .concave import NOISE
 from .grains import hush, rounding, side_at_start, strayed
 from .loop import ENDED, ENTER, OVERLOOKED, ending, full, narrow, shorten, unclear, write
 from .panels import NEAR, side_of
 from .sought import CUT, first_event
 from .watching import (
-    CUTS,
     END,
     EVENT,
-    EVENTS,
     FIRED,
-    FRESH,
     GRAIN_END,
     GRAIN_START,
-    LATEST,
     LEAST,
     MARK,
     MOST,
     SIDE,
     START,
-    STEPS,
-    TERMS,
     UNKNOWN,
 )
 
@@ -44,7 +38,7 @@ SAME = 4.0  # units in the last place: an output time so little before an event 
 def begun(callbacks, S, W, c, back):
     """See where guards are as a stretch of the motion begins, or where a step was taken back to. Returns a status."""
     watch, note = callbacks[5], callbacks[6]
-    W.count[FRESH] = 1
+    W.count.fresh = 1
     strayed(W, c)
     if back:
         for i in range(W.side.shape[0]):
@@ -59,7 +53,7 @@ def onward(callbacks, S, W, R, c, out, used):
     Returns (rows written, whether the loop returns); a step that cannot be taken makes the next one shorter.
     """
     ask, own, note = callbacks[0], callbacks[1], callbacks[6]
-    most = c.real[TRIED]
+    most = c.real.tried
     note(S, W, END)
     strayed(W, c)
     if c.seen.shape[1] > 0 and ask(own, S, W, R, c, OVERLOOKED) != 0:
@@ -71,7 +65,7 @@ def onward(callbacks, S, W, R, c, out, used):
             ask(own, S, W, R, c, ENDED)
         status, used = write(callbacks, S, W, R, c, out, used)
     if status == CUT:
-        W.count[CUTS] += 1
+        W.count.cuts += 1
         shorten(c, h)
         return used, False
     if status != 0:  # what lies inside the step cannot be told: take a shorter one
@@ -80,20 +74,20 @@ def onward(callbacks, S, W, R, c, out, used):
     at_once = ending(c) - SAME * ULP * abs(ending(c))
     if hit and used > 0 and out[used - 1, 0] >= at_once:  # written when it is known how the motion goes on
         used -= 1
-        c.count[NEXT] -= 1
+        c.count.next -= 1
     elif full(c):
         return used, True
     ask(own, S, W, R, c, ENTER)
-    W.count[STEPS] += 1
-    W.count[CUTS] = 0
+    W.count.steps += 1
+    W.count.cuts = 0
     if hit:
-        c.real[H], c.real[WIDE] = max(c.real[H], most), max(c.real[WIDE], most)
-        if c.real[T] > W.real[LATEST]:  # as wide as it can be looked through for more that come as soon
-            c.real[H] = min(c.real[H], OFTEN * (c.real[T] - W.real[LATEST]))
-            W.real[LATEST] = c.real[T]
-        c.count[STATUS] = EVENT
-        W.count[EVENTS] += 1
-        known_sides(W, c, c.real[TRIED])
+        c.real.h, c.real.wide = max(c.real.h, most), max(c.real.wide, most)
+        if c.real.t > W.real.latest:  # as wide as it can be looked through for more that come as soon
+            c.real.h = min(c.real.h, OFTEN * (c.real.t - W.real.latest))
+            W.real.latest = c.real.t
+        c.count.status = EVENT
+        W.count.events += 1
+        known_sides(W, c, c.real.tried)
     else:
         settled(W)
     return used, hit
@@ -102,7 +96,7 @@ def onward(callbacks, S, W, R, c, out, used):
 @formula
 def see(watch, note, S, W, c):
     """Guards where the next step begins, and what they depend on. Returns a status."""
-    status = watch(c.real[T], c.y[NOW], S, W, START)
+    status = watch(c.real.t, c.y[NOW], S, W, START)
     if status == 0:
         note(S, W, START)
     for i in range(W.side.shape[0]):  # what jumped since is on no known side
@@ -136,11 +130,11 @@ def known_sides(W, c, h):
 @formula
 def settled(W):
     """The end of the step is the start of the next."""
-    W.count[FRESH] = 0
+    W.count.fresh = 0
     for i in range(W.way.shape[0]):
         W.side[i] = 0.0 if W.kept[i] == 1 and abs(W.g[END, i]) <= NOISE * W.grain[i] else W.g[SIDE, i]
         W.g[START, i], W.g[GRAIN_START, i] = W.g[END, i], W.g[GRAIN_END, i]
-    for i in range(W.way.shape[0], W.way.shape[0] + W.count[TERMS]):
+    for i in range(W.way.shape[0], W.way.shape[0] + W.count.terms):
         W.g[START, i] = W.g[END, i]
     for k in range(W.moving.shape[1]):
         for m in range(W.moving.shape[2]):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiler.layout import Float1, Float2, Float3, Int1, Int2
+from ...compiler.layout import Float1, Float2, Float3, Int1, Int2, Record
 
 # what a guard's way means: which passing of zero is an event
 FALLING, EITHER, RISING = -1, 0, 1
@@ -19,19 +19,40 @@ START, END, TRUE, THERE, SIDE, MARK, FIRED, GRAIN_START, GRAIN_END, LEAST, MOST,
 NODES, CHECKS = 8, 2
 GUARDS = NODE + NODES + CHECKS
 CHECKED = (0.131, 0.567)  # places in a panel, far from those that are the same in a half of it
-# entries of Watch.real: panel's begin and width; time within which events are at the same instant;
-# the part of the step that was looked through; where a guard that comes back is beyond zero; how far apart places are
-# between which it passes; how many grains the state may be off by (`grains`); when the last event
-# was; the fastest rate so far
-PANEL, WIDTH, SAME, DONE_TO, BEYOND, BRACKET, STRAYED, LATEST, FASTEST, REAL = range(10)
-# entries of Watch.count: calls of the right-hand side since the step began; whether the side of guards near zero is to
-# be found; steps watched; places looked at; steps taken again; events; whether what is expected within it is borne
-# out; places looked at with the equations since it was taken, and in all; whether they could not be evaluated at one;
-# times that a step was cut since it could not be looked through; whether a guard leaves the side that it has to keep;
-# terms of the last guard, that of a group: see `concave`
-STAGE, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, TERMS, COUNT = range(14)
 UNKNOWN = 2.0  # a side that follows from the value where the next step begins
 EVENT = 6  # a status beside those of the clock: the step ends on events, told in Watch.fired
+
+
+class WatchReals(Record, kind="Float"):
+    """Where guards are looked for within the step."""
+
+    panel: float  # begin of the panel
+    width: float  # its width
+    same: float  # time within which events are at the same instant
+    done_to: float  # part of the step that was looked through
+    beyond: float  # where a guard that comes back is beyond zero
+    bracket: float  # how far apart places are between which it passes
+    strayed: float  # how many roundings the state may be off by (`grains`)
+    latest: float  # when the last event was
+    fastest: float  # the fastest rate so far
+
+
+class WatchCounts(Record, kind="Int"):
+    """What was looked at."""
+
+    stage: int  # calls of the right-hand side since the step began
+    fresh: int  # whether the side of guards near zero is to be found
+    steps: int  # watched
+    looks: int  # places looked at
+    again: int  # steps taken again
+    events: int
+    plain: int  # whether what is expected within the step is borne out
+    sought: int  # places looked at with the equations since the step was taken,
+    truly: int  # and in all
+    lost: int  # whether they could not be evaluated at one
+    cuts: int  # times that a step was cut since it could not be looked through
+    away: int  # whether a guard leaves the side that it has to keep
+    terms: int  # of the last guard, that of a group: see `concave`
 
 
 class Watch(NamedTuple):
@@ -50,8 +71,8 @@ class Watch(NamedTuple):
     basis: Float2  # (NODES, NODES): powers from values at the nodes
     nodes: Float1  # (NODES + CHECKS,): places in a panel
     checks: Float2  # (CHECKS, NODES): the polynomial through the nodes where it is checked
-    real: Float1  # (REAL,)
-    count: Int1  # type: ignore[assignment]  # (COUNT,)
+    real: WatchReals  # type: ignore[assignment]
+    count: WatchCounts  # type: ignore[assignment]
     stages: Int1  # of a step, where levels are kept
     met: Int1  # of a step, at which guards are kept
     met_at: Float1  # where in the step these are
@@ -135,7 +156,8 @@ def watching(
     terms : int, optional
         Room for terms of the guard of a group.
     """
-    ng = len(way)
+    ng, real = len(way), WatchReals.blank()
+    real.latest = -np.inf
     kept, met = (np.array(x, np.int64) for x in kept_stages(c, stages))
     spots = np.asarray(spots, np.int64).reshape(-1, 2)
     g = np.full((GUARDS, ng + terms), np.nan)
@@ -154,8 +176,8 @@ def watching(
         basis=basis(),
         nodes=np.r_[nodes(), CHECKED],
         checks=checks(),
-        real=np.r_[np.zeros(LATEST), -np.inf, 0.0],
-        count=np.zeros(COUNT, np.int64),
+        real=real,
+        count=WatchCounts.blank(),
         stages=kept,
         met=met,
         met_at=c[met],

@@ -36,7 +36,7 @@ class Place:
         others = {s.data.name: 0.0 for s in (*x.z, *x.lam, *x.loads)}
         self.values: dict[str, float] = others | {name: float(y) for name, y in start.items()}
         self.probe = Probe(self.values)
-        length = float(getattr(x.system.length[0], "value", x.system.length[0]))
+        length = float(getattr(x.system.scales.length, "value", x.system.scales.length))
         units = [n.unit for n in velocity_names(x.structure)]
         self.length = length
         self.scale = np.array([1.0 if u == "m" else 1.0 / length for u in units])

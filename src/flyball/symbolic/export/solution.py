@@ -65,7 +65,7 @@ def solution(x: Traced) -> Solution:
 
 def _refined(x: Traced, once: Once, f: np.ndarray, gamma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A solution, put right by what it misses of the true equations."""
-    light = x.system.semidefinite[0] > 0.0
+    light = x.system.scales.semidefinite > 0.0
     balanced = not len(x.system.mass_entries.row) and not light  # each step fulfils M vdot = f + G^T lam then
     vdot, lam = once(f, gamma)
     for _ in range(LIGHT if light else REFINEMENTS if len(lam) else 1):
@@ -112,12 +112,12 @@ def coupled(x: Traced) -> Once:
     K = np.zeros((nv + nr, nv + nr), object)
     K[:nv, :nv] = x.M
     K[nv:, :nv] = x.G
-    lever = min(1.0, float(x.system.length[0].real)) ** 2
+    lever = min(1.0, float(x.system.scales.length.real)) ** 2
     for k in range(nr):
         size: Any = 0.0
         for d in weighed(x, k):
             size = size + (x.G[k, d] * x.G[k, d] + lever) / x.M[d, d]
-        K[nv + k, nv + k] = -x.system.regularization[0] * (1.0 if size == 0.0 else size)
+        K[nv + k, nv + k] = -x.system.scales.regularization * (1.0 if size == 0.0 else size)
     below = [(i, j) for i in range(nv + nr) for j in touched(K[i, :i])]
     i, j = np.array(below, np.int64).reshape(-1, 2).T
     P, place = analyse(nv + nr, i, j)

@@ -13,7 +13,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from ....numerics.integrators.clock import SPAN
 from ....tables.system import VALUE
 from .here import Here
 
@@ -57,7 +56,7 @@ class Counts:
             self.empty, self._since = 0, here.t
         self.empty += 1
         within = here.t - self._since
-        endless = self.empty >= EMPTY and within < NOWHERE * here.clock.real[SPAN]
+        endless = self.empty >= EMPTY and within < NOWHERE * here.clock.real.span
         return (self.empty, within) if endless else None
 
     def accumulate(self, fired: Iterable[int], until: float) -> tuple[int, int, float] | None:

@@ -16,7 +16,6 @@ from ....model.element import LawOf
 from ....model.event import Event, compared
 from ....model.event_check import coordinate_of
 from ....model.held import held_by
-from ....numerics.integrators.clock import SPAN
 from ....results.events import Happening
 from ....results.struck import summed
 from ....tables.reads import read
@@ -330,7 +329,7 @@ def _noted(here: Here, found: Found) -> Done:
 
 def _stopped(here: Here, found: Found) -> Done:
     names = " and ".join(repr(e.name) for e, _, _ in found)
-    asked = here.start.base.t + here.clock.real[SPAN]
+    asked = here.start.base.t + here.clock.real.span
     here.stopped = f"ended at {here.t:.6g} s by event {names} (asked: {asked:.6g} s)"
     return [(e, "ended the motion") for e, _, _ in found]
 

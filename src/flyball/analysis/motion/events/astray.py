@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ....equations.watched import Loop
-from ....numerics.integrators.watching import AWAY
 from ....tables.system import G_CORNER
 from .here import Here
 from .looked import DISTANCES
@@ -19,7 +18,7 @@ def astray(here: Here, loop: Loop) -> frozenset[int]:
     At the step's begin such a stop hardly moved; what did hits it. On which side a law is then, what decides says.
     """
     S, out = here.c.system, set()
-    for g in loop.fired if loop.desk.count[AWAY] else ():
+    for g in loop.fired if loop.desk.count.away else ():
         kind, s = int(S.guards.kind[g]), int(S.guards.of[g])
         if kind == G_CORNER:
             out.add(s)

@@ -18,7 +18,6 @@ from ....equations.surfaces import drifts
 from ....equations.tasks import MOTION
 from ....errors import SimulationError
 from ....laws.opcodes import BY_MOTION, BY_TIME
-from ....numerics.integrators import clock as ex
 from ....results.events import Happening
 from ....tables.system import (
     G_CORNER,
@@ -111,13 +110,13 @@ class Corners:
         h = self._ahead()
         fast = {s: abs(u - now[s][0]) / h for s, (u, _) in zip(off, self._soon(off), strict=True)}
         n.ask(MOTION)
-        late = THROWN * INSTANT * max(n.here.t, float(real[ex.SPAN]))
+        late = THROWN * INSTANT * max(n.here.t, float(real.span))
         return {s for s in off if abs(now[s][0]) > late * fast[s]}
 
     def _ahead(self) -> float:
         """How far ahead it is tried where the motion goes [s]."""
         real = self.n.here.clock.real
-        return min(AHEAD * float(real[ex.SPAN]), BIT * float(real[ex.H]) or np.inf)
+        return min(AHEAD * float(real.span), BIT * float(real.h) or np.inf)
 
     def settle(self) -> bool:
         """Decide all sides. Returns whether forces jump by that."""
@@ -313,10 +312,10 @@ class Corners:
         h = self._ahead()
         for part in (0.5, 1.0):
             n.ask(MOTION)
-            real[ex.T], n.here.y[:] = t + part * h, y + part * h * n.desk.K[0]
+            real.t, n.here.y[:] = t + part * h, y + part * h * n.desk.K[0]
         n.ask(MOTION)
         out = [self.value(s) for s in which]
-        real[ex.T], n.here.y[:] = t, y
+        real.t, n.here.y[:] = t, y
         return out
 
     def _goes_on(self, which: list[int], found: Pushed) -> None:

@@ -130,7 +130,7 @@ def refuse_sunk(n: Instant) -> None:
     """Refuse to go on from where what is open is past its bound, by more than what is closed may be."""
     for s in n.of(STOP):
         past = max(n.W.modes.lower[s] - n.x[s], n.x[s] - n.W.modes.upper[s])
-        if n.mode[s] == OFF and past > SUNK * n.unit[s] + n.W.options.position_tolerance[0]:
+        if n.mode[s] == OFF and past > SUNK * n.unit[s] + n.W.options.position_tolerance:
             raise sunk(n, s, past)
 
 

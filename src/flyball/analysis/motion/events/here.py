@@ -10,7 +10,7 @@ import numpy as np
 
 from ....equations.engine import MOTION, evaluate
 from ....equations.sharing import Sharing, sharing
-from ....numerics.integrators.clock import NOW, Clock, T
+from ....numerics.integrators.clock import NOW, Clock
 from ....tables.specs import Structure
 from ....tables.system import VALUE
 from ...compiled import Compiled
@@ -124,7 +124,7 @@ class Here:
     @property
     def t(self) -> float:
         """The instant [s]."""
-        return float(self.clock.real[T])
+        return float(self.clock.real.t)
 
     @property
     def y(self) -> np.ndarray:

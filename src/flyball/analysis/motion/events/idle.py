@@ -16,7 +16,6 @@ from ....equations.instant import FORCES, Bench
 from ....equations.tasks import MOTION
 from ....equations.watched import Loop
 from ....numerics.cone.dense.problem import EVEN, FOUND, OUT, PUSHES
-from ....numerics.integrators.clock import SPAN, H, T
 from ....tables.system import G_BACK, G_LOWER, G_UPPER
 from .here import Here
 from .instant import Instant, instant_of, slowest
@@ -60,13 +59,13 @@ def take_over(n: Instant, found: Decided) -> None:
     n.ask(MOTION)
     nq, nv = len(here.q), len(a)
     q_dot = n.desk.K[0, :nq].copy()
-    span, step = here.clock.real[SPAN], here.clock.real[H]
+    span, step = here.clock.real.span, here.clock.real.h
     first = OF_STEP * step if 0.0 < step < span else OF_SPAN * span
     open_ = set(rows)
     for part in SOON:
         later = part * first
         here.y[:nq], here.y[nq : nq + nv] = y[:nq] + later * q_dot, y[nq : nq + nv] + later * a
-        here.clock.real[T] = t + later
+        here.clock.real.t = t + later
         B, P, status = n.problem(parts)
         if status != 0 or n.balance(B, P, FORCES) != FOUND:
             break
@@ -76,7 +75,7 @@ def take_over(n: Instant, found: Decided) -> None:
                 found.parts[i] = parts[i]  # it pushes, and is watched for that
             if abs(P.u[i]) > CLEAR * P.grain[i] or found.state[i] == EVEN:
                 open_.discard(i)
-    here.y[:], here.clock.real[T] = y, t
+    here.y[:], here.clock.real.t = y, t
     n.problem(found.parts)
 
 

@@ -15,7 +15,7 @@ from ....equations.instant import AGAIN, BALANCE, BARE, IMPULSES, LOOK, Bench, D
 from ....equations.sharing import margin_kernel
 from ....equations.tasks import ARRIVE, SOLVE, WATCH, Sheet
 from ....numerics.cone.dense.problem import FREE, Dense, dense
-from ....numerics.integrators.clock import COUNTS, REALS, SPAN, STATES, Clock, T
+from ....numerics.integrators.clock import STATES, Clock, ClockCounts, ClockReals
 from ....numerics.integrators.tableaux import tableau
 from ....tables.system import (
     G_SHARED,
@@ -91,7 +91,7 @@ class Instant:
         ny, width = len(here.y), max(s.nv, len(S.rows.law), len(S.guards.kind), 1)
         none, y = np.zeros(0, np.int64), np.zeros((STATES, ny))
         seen = np.zeros((here.clock.seen.shape[0], 0))
-        self.desk = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, ny)), none, seen)
+        self.desk = Clock(ClockReals.blank(), ClockCounts.blank(), np.zeros(0), y, np.zeros((1, ny)), none, seen)
         R, self.sheet = tableau("rk45"), Sheet(np.zeros((4, width)))
         self.tables = StructBuffer(S), StructBuffer(self.W)
         self.engine = BoundKernel(
@@ -99,7 +99,7 @@ class Instant:
         )
         self.asked = StructBuffer(Desk(np.array([self.engine.address]), R, self.desk, self.sheet))
         self.units = units(s)
-        self.tempo = float(S.rate[0].real)
+        self.tempo = float(S.scales.rate.real)
         self.unit, metric = sizes(s, c.values.length), [unit == "m" for unit in self.units]
         mass, spin = S.bodies.mass.sum(), np.trace(S.bodies.inertia.reshape(-1, 3, 3).sum(axis=0))
         turning = mass * c.values.length**2 + spin
@@ -146,7 +146,7 @@ class Instant:
 
     def put(self) -> None:
         """Lay time and state of the motion on the desk."""
-        self.desk.real[T] = self.here.t
+        self.desk.real.t = self.here.t
         self.desk.y[0] = self.here.y
 
     def ask(self, task: int) -> int:
@@ -224,7 +224,7 @@ class Instant:
     def balance(self, B: Bench, P: Dense, impulses: int) -> int:
         """Solve it for forces or impulses, as `equations.instant` names them. Returns how it ended."""
         B.asks[IMPULSES] = impulses
-        self.desk.real[T] = self.here.t
+        self.desk.real.t = self.here.t
         return self.rooms[len(P.b)].do(BALANCE)
 
     def again(self, P: Dense) -> int:
@@ -260,7 +260,7 @@ def slowest(here: Here) -> float:
     That of the mechanism itself, or a change in the whole time of a motion where that is slower. A time that is short
     makes nothing small: a force of the weight of a body at rest presses, however little it would move the body.
     """
-    return min(float(here.c.system.rate[0].real), 1.0 / float(here.clock.real[SPAN]))
+    return min(float(here.c.system.scales.rate.real), 1.0 / float(here.clock.real.span))
 
 
 def instant_of(here: Here) -> Instant:

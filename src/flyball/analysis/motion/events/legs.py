@@ -54,7 +54,7 @@ class Legs:
     """
 
     def __init__(self, clock: ex.Clock, found: Breaks, until: Callable[[float], float] = lambda end: end) -> None:
-        self.clock, self.end, self.until = clock, float(clock.real[ex.T_END]), until
+        self.clock, self.end, self.until = clock, float(clock.real.t_end), until
         self.times, self.sharp = found.times, found.sharp
         self.at = 0
         self.aim()
@@ -63,22 +63,22 @@ class Legs:
         """Go on with the next one where nothing is left of this one; where that was the last, this is the end."""
         while self.over():
             if not self.next():
-                self.clock.real[ex.T] = self.goal
+                self.clock.real.t = self.goal
                 break
 
     def over(self) -> bool:
         """Whether nothing is left of this one that could be a step."""
         real = self.clock.real
-        return bool(self.goal - real[ex.T] <= SLIVER * real[ex.LARGEST])
+        return bool(self.goal - real.t <= SLIVER * real.largest)
 
     def aim(self) -> None:
         """Have the clock run to the end of the stretch, or to what it stops for before. What rounding leaves to that
         (an instant of sampling beside an event's) is no step, and is passed.
         """
         real = self.clock.real
-        real[ex.T_END] = end = self.until(self.goal)
-        if end < self.goal and 0.0 < end - real[ex.T] <= SLIVER * real[ex.LARGEST]:
-            real[ex.T] = end
+        real.t_end = end = self.until(self.goal)
+        if end < self.goal and 0.0 < end - real.t <= SLIVER * real.largest:
+            real.t = end
 
     @property
     def goal(self) -> float:
@@ -90,11 +90,11 @@ class Legs:
 
     def through(self) -> bool:
         """Whether the clock is at its end."""
-        return bool(self.clock.real[ex.T] >= self.goal)
+        return bool(self.clock.real.t >= self.goal)
 
     def whole(self) -> None:
         """Have it run to the end of the motion."""
-        self.clock.real[ex.T_END] = self.end
+        self.clock.real.t_end = self.end
 
     def ends_sharply(self) -> bool:
         """Whether forces may jump at the end of this stretch."""
@@ -107,10 +107,10 @@ class Legs:
         real, t = self.clock.real, float(self.times[self.at])
         if self.sharp[self.at]:
             behind = t + margin(t)
-            self.clock.y[ex.NOW] += (behind - real[ex.T]) * self.clock.K[0]
-            real[ex.T] = behind
-            self.clock.count[ex.STARTED] = ex.JUMPED
-            real[ex.H] = max(real[ex.H], real[ex.WIDE])  # the last one was cut short
+            self.clock.y[ex.NOW] += (behind - real.t) * self.clock.K[0]
+            real.t = behind
+            self.clock.count.started = ex.JUMPED
+            real.h = max(real.h, real.wide)  # the last one was cut short
         self.at += 1
         self.aim()
         return True

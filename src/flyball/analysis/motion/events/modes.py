@@ -179,5 +179,5 @@ def write(n: Instant, found: Decided, still: np.ndarray) -> None:
     write_slips(n, found.parts, (found.state, found.x, found.u, found.lean))
     write_group(n, found.parts, (found.state, found.A, found.gain, found.x, found.reach))
     if len(n.S.load_terms.load):
-        W.counts.load_updates[0] = FORGOTTEN
+        W.counts.load_updates = FORGOTTEN
         W.sensed[LOAD, 2 * len(n.here.structure.measured) : n.first] = 0.0  # of two solutions the one from no load

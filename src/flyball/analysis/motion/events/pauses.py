@@ -29,19 +29,19 @@ class Pauses:
 
     def happened(self) -> None:
         """Something does here and now: the part does not end."""
-        self._settled = int(self.clock.count[ex.ACCEPTED])
+        self._settled = int(self.clock.count.accepted)
         if self.part.due():
             self._share = max(0.5 * self._share, NARROWEST)
 
     def here(self) -> bool:
         """Whether the part ends here and now."""
-        return bool(self.clock.count[ex.ACCEPTED] > self._settled and self.part.over(self.clock))
+        return bool(self.clock.count.accepted > self._settled and self.part.over(self.clock))
 
     def until(self, end: float) -> float:
         """The time up to which the loop is to run where it would run to ``end``."""
         real = self.clock.real
         if self._share == 1.0 or not self.part.due():
             return end
-        t = float(real[ex.T])
-        way = min(end - t, float(real[ex.H]) or math.inf)
-        return t + self._share * way if self._share * way > TINY * real[ex.LARGEST] else end
+        t = float(real.t)
+        way = min(end - t, float(real.h) or math.inf)
+        return t + self._share * way if self._share * way > TINY * real.largest else end

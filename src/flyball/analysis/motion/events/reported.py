@@ -9,7 +9,7 @@ from ....equations.sharing import renewed_kernel, shared_kernel
 from ....equations.tasks import Sheet
 from ....equations.within import ROWS
 from ....numerics.cone.shares import OPEN
-from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock
+from ....numerics.integrators.clock import STATES, Clock, ClockCounts, ClockReals
 from ....numerics.integrators.tableaux import tableau
 from ....tables.system import assign
 from .here import Here
@@ -26,7 +26,7 @@ def share(here: Here, rows: np.ndarray) -> None:
     W.sensed[:] = here.c.work.sensed
     none, R = np.zeros(0, np.int64), tableau("rk45")
     seen, state = np.zeros((ROWS, 0)), np.zeros((STATES, ny))
-    own = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), state, np.zeros((1, ny)), none, seen)
+    own = Clock(ClockReals.blank(), ClockCounts.blank(), np.zeros(0), state, np.zeros((1, ny)), none, seen)
     sheet = Sheet(np.zeros((4, max(s.nv, len(S.rows.law), 1))))
     address = engine.address
     lam = slice(1 + ny + s.nv, 1 + ny + s.nv + len(S.rows.law))

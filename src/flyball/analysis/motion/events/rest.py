@@ -47,7 +47,7 @@ def coming_to_rest(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarr
     if not leaving:
         return over
     n.ask(MOTION)
-    nq = n.S.coordinates[0]
+    nq = n.S.sizes.coordinates
     a = n.gradients(np.array(leaving)) @ n.desk.K[0, nq : nq + n.here.structure.nv] + n.W.sensed[BIAS, n.m[leaving]]
     far = ROUNDED * np.abs(n.W.FK[:, :3]).max(initial=0.0)
     for s, acceleration in zip(leaving, a.tolist(), strict=True):

@@ -80,14 +80,14 @@ class Run:
 
     def __init__(self, here: Here, o: Integration, width: int, tell: Tell, engine: Engine) -> None:
         self.engine, self.now, self.options = engine, o.method, o
-        self.pace = here.start.pace or Pace(float(here.clock.real[ex.T_END]), o.method, str)
+        self.pace = here.start.pace or Pace(float(here.clock.real.t_end), o.method, str)
         self.here, self.method, self.width, self.tell = here, tableau(explicit(o.method)), width, tell
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
-        self.end = float(clock.real[ex.T_END])  # of the motion; the clock's own goes from leg to leg
+        self.end = float(clock.real.t_end)  # of the motion; the clock's own goes from leg to leg
         self.first, self.span = here.t, self.end - here.t or 1.0
-        self.part, self.quota = here.start.part, int(clock.count[ex.QUOTA])
+        self.part, self.quota = here.start.part, int(clock.count.quota)
         self.pauses = Pauses(self.part, clock)
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
@@ -117,7 +117,7 @@ class Run:
             return False
         before = expressions(here)
         if self.stops.sample(here.c.system, here.c.work, here.clock) != 0:
-            here.clock.count[ex.STATUS] = ex.STUCK
+            here.clock.count.status = ex.STUCK
             return True
         self.jumped(before)
         if len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
@@ -142,7 +142,7 @@ class Run:
             engine.begin(here.clock)
             self.legs = Legs(here.clock, known, self._until)
             if here.start.before is not None and self.sampled():  # that was not sampled: events may happen by it
-                here.clock.count[ex.STATUS] = ex.RUNNING
+                here.clock.count.status = ex.RUNNING
                 self.turned()
             while not here.stopped:
                 self.integrate()
@@ -153,7 +153,7 @@ class Run:
             if not self.part.paused:
                 say_never(here)
         except KeyboardInterrupt:
-            here.clock.count[ex.STATUS] = ex.RUNNING
+            here.clock.count.status = ex.RUNNING
             return np.concatenate(self.rows), True
         except FlyballError as error:
             if isinstance(error, ModelError) and not here.t > self.first:  # the description is wrong
@@ -178,9 +178,9 @@ class Run:
         self.loop = self._loop()
         if isinstance(before, Loop) and isinstance(self.loop, Loop):
             self.loop.desk.side[:], self.loop.desk.g[:] = before.desk.side, before.desk.g
-        clock.count[ex.STARTED], clock.count[ex.STATUS] = 0, ex.RUNNING
-        if to not in IMPLICIT and not clock.real[ex.STEP]:
-            clock.real[ex.H] = 0.0  # as at a start
+        clock.count.started, clock.count.status = 0, ex.RUNNING
+        if to not in IMPLICIT and not clock.real.step:
+            clock.real.h = 0.0  # as at a start
 
     def turned(self) -> bool:
         """Go on by another method where that pays, or where this one does not know what is; whether it does."""
@@ -192,12 +192,12 @@ class Run:
         elif pace.back and not corner:
             to, pace.back = pace.back, ""
             self.turn(to, "where none is any more")
-        elif implicit and pace.mixed and clock.count[ex.STATUS] in FAILED:
+        elif implicit and pace.mixed and clock.count.status in FAILED:
             self.turn(EXPLICIT, f"where {self.now} could not go on")
             pace.stays()
-        elif pace.asked and clock.count[ex.STATUS] in (ex.RUNNING, EVENT):
+        elif pace.asked and clock.count.status in (ex.RUNNING, EVENT):
             self.turn(pace.asked, STIFF if pace.asked in IMPLICIT else STRUCK)
-        elif clock.count[ex.STATUS] == ex.RUNNING and (to := pace.turns(c, clock, self.now)):
+        elif clock.count.status == ex.RUNNING and (to := pace.turns(c, clock, self.now)):
             self.turn(to, STIFF if to in IMPLICIT else NOT_STIFF)
         else:
             return False
@@ -206,7 +206,7 @@ class Run:
     def over(self) -> bool:
         """Do what the compiled loop has returned for: whether the motion is over."""
         clock, engine = self.here.clock, self.engine
-        status = clock.count[ex.STATUS]
+        status = clock.count.status
         if status == EVENT:
             self.event()
         elif status == ex.DONE:
@@ -226,12 +226,12 @@ class Run:
         """The loop ran as far as it was to: whether the motion is over."""
         clock, through = self.here.clock, self.legs.through()
         if not through and self.pauses.here():
-            clock.real[ex.H] = max(clock.real[ex.H], clock.real[ex.WIDE])  # the last step was cut short
+            clock.real.h = max(clock.real.h, clock.real.wide)  # the last step was cut short
             return True
         if self.sampled() or not through:
-            if clock.count[ex.STATUS] == ex.STUCK:
+            if clock.count.status == ex.STUCK:
                 return True
-            clock.count[ex.STATUS] = ex.RUNNING
+            clock.count.status = ex.RUNNING
             self.turned()
             self.legs.aim()
             return False
@@ -262,8 +262,8 @@ class Run:
         here, c, clock = self.here, self.here.c, self.here.clock
         before = time.perf_counter()
         weight = WEIGHT if self.now in IMPLICIT else 1.0
-        clock.count[ex.QUOTA] = self.part.most(self.pace.limited(clock, self.quota), weight)
-        steps = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
+        clock.count.quota = self.part.most(self.pace.limited(clock, self.quota), weight)
+        steps = clock.count.accepted + clock.count.rejected
         with interrupts_kept(c.structure.functions):
             if self.loop is None and self.sampling is not None:
                 used = self.sampling.go_on(c.system, c.work, clock, self.buffer)
@@ -275,10 +275,10 @@ class Run:
                 tie(here, self.loop)
                 used = self.loop.go_on(c.system, self.buffer, self.sampling)
             self.take(self.buffer[:used].copy())
-        self.tell(max(0.0, min(1.0, (clock.real[ex.T] - self.first) / self.span)))
-        done = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps)
+        self.tell(max(0.0, min(1.0, (clock.real.t - self.first) / self.span)))
+        done = int(clock.count.accepted + clock.count.rejected - steps)
         self.part.took(done * weight)
-        if clock.count[ex.STATUS] == ex.RUNNING:
+        if clock.count.status == ex.RUNNING:
             took = max(time.perf_counter() - before, 1e-6)
             self.quota = self.engine.limited(clock, max(done, 1) * SLICE / took)
 
@@ -315,7 +315,7 @@ class Run:
             self.pace.struck(self.now)
         self.part.decided()
         self.pauses.happened()
-        clock.count[ex.STARTED] = 0
+        clock.count.started = 0
         at, over = here.t, self.guarded and not here.stopped and self.legs.over()
         was = {g: x for g, x in expressions(here).items() if g not in fired} if over else {}
         self.legs.passed()
@@ -328,7 +328,7 @@ class Run:
         if self.loop is not None and here.c.scratch is not self.loop.scratch:
             self.loop = self._loop()
         if here.fresh:
-            clock.real[ex.H] = min(clock.real[ex.H], clock.real[ex.WIDE] or clock.real[ex.H])
+            clock.real.h = min(clock.real.h, clock.real.wide or clock.real.h)
             here.fresh = False
         if over and here.t > at:  # laws may jump at the same instant
             self.jumped(was)
@@ -359,17 +359,17 @@ class Run:
             return
         self.take(self.row()[None, :])
         if not part.paused:
-            clock.count[ex.STATUS] = ex.DONE
+            clock.count.status = ex.DONE
 
     def row(self) -> np.ndarray:
         """The row of output of here and now."""
         here, c = self.here, self.here.c
-        status = here.clock.count[ex.STATUS]
+        status = here.clock.count.status
         row, y = np.zeros((1, self.width)), here.y.copy()
         if motion_kernel(c.system, c.work, self.method, here.clock, row, REPORT) != 0:
             row[0, 1 + len(y) :] = np.nan  # what was found last at another state stands there
             here.doubts.append(unsolved(c, row))
-        here.y[:], here.clock.count[ex.STATUS] = y, status
+        here.y[:], here.clock.count.status = y, status
         return row[0]
 
 

@@ -63,7 +63,7 @@ def _goes_on(n: Instant, s: int) -> None:
 def _acceleration(n: Instant, s: int) -> float:
     """Second derivative of a quantity with the modes as they stand."""
     n.ask(MOTION)
-    nq = n.S.coordinates[0]
+    nq = n.S.sizes.coordinates
     vdot = n.desk.K[0, nq : nq + n.here.structure.nv]
     return float(n.gradients(np.array([s]))[0] @ vdot + n.W.sensed[BIAS, n.m[s]])
 

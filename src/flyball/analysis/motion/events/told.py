@@ -7,7 +7,6 @@ import numpy as np
 from ....constraints.modes import BY_RATE, ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....model.joint import Joint
 from ....model.touch import Touch
-from ....numerics.integrators.clock import LEDGER
 from ....results.events import Happening
 from ....results.struck import Struck
 from ....tables.system import OFF
@@ -118,7 +117,7 @@ def record(
 ) -> None:
     """Append a record."""
     t = n.over if kind == "rest" and not np.isnan(n.over) else n.here.t
-    size = max(jumped.passed, min(n.energy, n.here.clock.real[LEDGER])) if jumped else 0.0
+    size = max(jumped.passed, min(n.energy, n.here.clock.real.ledger)) if jumped else 0.0
     lost = jumped.lost if jumped and abs(jumped.lost) > NOISE * size else 0.0
     known = Struck(impulses, jumped.rows, jumped.blows) if jumped else impulses
     n.here.records.append(Happening(t, names, kind, done, lost, known, before.copy(), n.here.y.copy()))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....equations.watched import Loop
-from ....numerics.integrators.watching import END, FIRED, GRAIN_END, MARK, STRAYED, UNKNOWN
+from ....numerics.integrators.watching import END, FIRED, GRAIN_END, MARK, UNKNOWN
 from .actions import at_the_seam
 from .here import Here
 from .instant import instant_of
@@ -20,14 +20,14 @@ def as_fired(here: Here, loop: Loop) -> None:
 
 def as_grains(here: Here, loop: Loop) -> None:
     """Keep what is rounding of events' expressions where a step ended on a time at which forces jump."""
-    here.nothing = {g: float(loop.desk.real[STRAYED] * loop.desk.g[GRAIN_END, g]) for g in here.structure.events}
+    here.nothing = {g: float(loop.desk.real.strayed * loop.desk.g[GRAIN_END, g]) for g in here.structure.events}
 
 
 def as_left(here: Here, loop: Loop) -> None:
     """Keep the sides that events' expressions were on that are zero to rounding where the motion ends."""
     desk, here.sides = loop.desk, {}
     for g, e in here.structure.events.items():
-        near = abs(desk.g[END, g]) <= desk.real[STRAYED] * desk.g[GRAIN_END, g]
+        near = abs(desk.g[END, g]) <= desk.real.strayed * desk.g[GRAIN_END, g]
         if near and abs(desk.side[g]) == 1.0:
             here.sides[e.name] = float(desk.side[g])
 

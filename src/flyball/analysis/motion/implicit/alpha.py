@@ -6,7 +6,6 @@ import numpy as np
 
 from ....equations.alpha import AlphaMeans, AlphaWorkshop, alpha_steps
 from ....numerics.integrators import clock as ex
-from ....numerics.integrators.implicit import desk as ds
 from ....numerics.integrators.implicit.desk import AlphaDesk
 from ...compiled import Compiled
 from .loop import EPS, Implicit
@@ -33,8 +32,8 @@ class Alpha(Implicit):
 
     def _settle(self, real: np.ndarray, turns: bool) -> None:
         super()._settle(real, turns)
-        steps = float(self.clock.real[ex.SPAN] / self.clock.real[ex.STEP])  # what each leaves to its iteration adds up
-        real[ds.NEWTON] = max(10.0 * EPS / real[ds.RTOL], min(0.1, 1.0 / steps))
+        steps = float(self.clock.real.span / self.clock.real.step)  # what each leaves to its iteration adds up
+        real.newton = max(10.0 * EPS / real.rtol, min(0.1, 1.0 / steps))
         self.own.array("desk.rho")[0] = self.rho
 
     def _desk(self, nz: int, springy: np.ndarray) -> AlphaDesk:  # type: ignore[override]

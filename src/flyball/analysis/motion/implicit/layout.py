@@ -181,7 +181,7 @@ def layout(s: Structure, S: System, index_3: bool = False) -> Layout:
 def metric(c: Compiled, t: float, y: np.ndarray) -> np.ndarray:
     """Of each velocity the inverse of its inertia, (nv,), which is at least a small part of the largest."""
     s, S, W = c.structure, c.system, c.work
-    if S.solver[0] == SCHUR:
+    if S.sizes.solver == SCHUR:
         inertia = c.mass().diagonal()
     else:
         c.at(t, y[: s.nq].copy(), y[s.nq : s.nq + s.nv].copy(), MOTION)
@@ -199,7 +199,7 @@ def light(c: Compiled) -> np.ndarray:
     part of the body's own mass, at the mechanism's length, does.
     """
     S, out = c.system, np.zeros(c.structure.nv)
-    if S.solver[0] != SCHUR:  # moving masses are those of what hangs on each other
+    if S.sizes.solver != SCHUR:  # moving masses are those of what hangs on each other
         return out[:0]
     inertia, mass = S.bodies.inertia.reshape(-1, 3, 3), S.bodies.mass
     if c.structure.model.planar:

@@ -57,7 +57,7 @@ class Implicit:
         self.own: PooledBuffer = s.kept.get("implicit steps", key, MOST, lambda: self._mould(clock.y.shape[1])).new()
         fill(s, self._stepped(S).fields, lambda name: self.own.array(f"WC.{name}"))
         if len(s.rows):
-            self.own.array("plan.metric")[:] = metric(c, float(clock.real[ex.T]), clock.y[ex.NOW])
+            self.own.array("plan.metric")[:] = metric(c, float(clock.real.t), clock.y[ex.NOW])
         self.count = self.own.array("desk.count")
         self._settle(self.own.array("desk.real"), len(S.angles.F) > 0)
 
@@ -68,7 +68,7 @@ class Implicit:
         S = tables.fields
         if S is not self.system:  # other values of parameters: masses too, perhaps
             self.system = S
-            self.count[ds.JACOBIANS] = 0
+            self.count.jacobians = 0
         means = JoinedBuffer(self.means, self._stepped(S), self.own)
         doors[1] = residual.stepped.address
         return BoundKernel(self.door, tables, scratch, means, own, going)
@@ -80,7 +80,7 @@ class Implicit:
                  if isinstance(y, np.ndarray)]  # fmt: skip
         plan = Plan(
             x.first, x.pick, x.mass.pick, np.ones(x.nv), x.valued, x.valued.copy(), x.turns, x.pressing,
-            np.array([int(S.solver[0] == SCHUR)], np.int64), x.negative, self.light, x.own_mass,
+            np.array([int(S.sizes.solver == SCHUR)], np.int64), x.negative, self.light, x.own_mass,
         )  # fmt: skip
         springy = x.spring[self.light[x.spring[:, 0]] == 0.0] if len(self.light) else x.spring
         desk = self._desk(len(self.compiled.structure.states), springy)
@@ -95,12 +95,12 @@ class Implicit:
     @property
     def failed(self) -> SimulationError | None:
         """Why steps of fixed width do not go on; else nothing."""
-        t, step = float(self.clock.real[ex.T]), float(self.clock.real[ex.STEP])
-        if not step or self.clock.count[ex.STATUS] != ex.STUCK:
+        t, step = float(self.clock.real.t), float(self.clock.real.step)
+        if not step or self.clock.count.status != ex.STUCK:
             return None
         why = (
             f"the equations of a step of {step:g} s have no solution that Newton's method finds"
-            if self.clock.count[ex.TROUBLE] != 0
+            if self.clock.count.trouble != 0
             else f"what happens within a step of {step:g} s cannot be told: between its ends it is too far off"
         )
         if steep := self._steep():
@@ -123,19 +123,19 @@ class Implicit:
 
     def _settle(self, real: np.ndarray, turns: bool) -> None:
         """Put the tolerances of a run, and what it counts by, on its desk."""
-        x, count, step = self.layout, self.count, float(self.clock.real[ex.STEP])
+        x, count, step = self.layout, self.count, float(self.clock.real.step)
         rtol, atol = self.clock.real[[ex.RTOL, ex.ATOL]].tolist()
         own = 0.1 * rtol ** (2.0 / 3.0) if step == 0.0 else rtol
         near = min(0.03, own**0.5) if step == 0.0 else 0.01
-        real[ds.RTOL], real[ds.ATOL] = own, own * atol / rtol
-        real[ds.NEWTON] = max(10.0 * EPS / own, near)
-        real[ds.ROUGH] = max(0.1, (SMALL if step == 0.0 else LARGE) / own)
-        real[ds.SOFT] = SOFTER if len(x.pressing) else SOFT
-        real[ds.SERVES] = CHEAP if x.groups <= FEW else DEAR
-        real[ds.STAYS] = 2.0 if x.dear else 1.2  # Hairer and Wanner (1996), IV.8, of large systems and of others
-        count[ds.LEAST], count[ds.INDEX_3] = 2 if turns else 1, int(x.index_3)
-        count[ds.SHARED] = int(x.first[SIZES]) if len(x.pressing) else 0
-        count[ds.STEEP] = int(len(self._steep()) > 0)
+        real.rtol, real.atol = own, own * atol / rtol
+        real.newton = max(10.0 * EPS / own, near)
+        real.rough = max(0.1, (SMALL if step == 0.0 else LARGE) / own)
+        real.soft = SOFTER if len(x.pressing) else SOFT
+        real.serves = CHEAP if x.groups <= FEW else DEAR
+        real.stays = 2.0 if x.dear else 1.2  # Hairer and Wanner (1996), IV.8, of large systems and of others
+        count.least, count.index_3 = 2 if turns else 1, int(x.index_3)
+        count.shared = int(x.first[SIZES]) if len(x.pressing) else 0
+        count.steep = int(len(self._steep()) > 0)
 
     def _steep(self) -> list[str]:
         s = self.layout.s
@@ -146,7 +146,7 @@ class Implicit:
         x = self.layout
         nv, nr, nx, P = x.nv, x.nr, x.nx, x.P
         n = x.n
-        real, count = np.zeros(ds.REALS), np.zeros(ds.COUNTS, np.int64)
+        real, count = ds.SolverReals.blank(), ds.SolverCounts.blank()
         J = np.zeros((4, int(x.first[-1]) + 1 + len(x.negative)))
         J[:, 0], J[:, x.first[-1]] = 1.0, -1.0
         Q = x.whole_P

@@ -95,7 +95,7 @@ def unsuited(begun: Start) -> str:
         _refuse_open_loads(begun, RADAU)
     except ModelError as error:
         return str(error).removesuffix("; leave method out, or take the redundancy out")
-    if begun.assembly.compiled.values.system.semidefinite[0] > 0.0:
+    if begun.assembly.compiled.values.system.scales.semidefinite > 0.0:
         return "a body has no inertia about some axis, which method='radau' does not know"
     if not s.tree:
         return ""

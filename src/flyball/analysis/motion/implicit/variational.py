@@ -42,8 +42,8 @@ class Variational:
         self.clock = clock
         self.width = nv + 3 * nr + 3 * len(s.measured)
         turns = [w for w in (quaternion_at(S, b)[1] for b in range(len(S.tree.parent))) if w >= 0]
-        real, count = np.zeros(ds.REALS), np.zeros(ds.COUNTS, np.int64)
-        real[ds.NEWTON], real[ds.ROUGH] = TIGHT * S.length[0], CLOSED * S.length[0]
+        real, count = ds.SolverReals.blank(), ds.SolverCounts.blank()
+        real.newton, real.rough = TIGHT * S.scales.length, CLOSED * S.scales.length
         n, z = int(S.row_start[nr]), np.zeros
         self.desk = VariationalDesk(
             count, real, z((4, nv)), z((4, nv)), z((4, nv)), z((4, nr)), z(nr), z((4, nz)), z((4, nz)), z((2, nv)),
@@ -59,8 +59,8 @@ class Variational:
     @property
     def failed(self) -> SimulationError | None:
         """Why steps do not go on; else nothing."""
-        t, step = float(self.clock.real[ex.T]), float(self.clock.real[ex.STEP])
-        if self.clock.count[ex.STATUS] != ex.STUCK:
+        t, step = float(self.clock.real.t), float(self.clock.real.step)
+        if self.clock.count.status != ex.STUCK:
             return None
         return SimulationError(
             f"at t = {t:.6g} s a step of {step:g} s finds no positions on the constraints, or no forces that its "
@@ -85,7 +85,7 @@ def refuse_unknown(begun: Start) -> None:
             f"method={VARIATIONAL!r} does not know rows that restrain velocities alone ({', '.join(rolling)}); leave "
             f"method out, or give method='radau'"
         )
-    if S.semidefinite[0] > 0.0:
+    if S.scales.semidefinite > 0.0:
         thin = [
             n for n, b in s.place.items() if b >= 0 and (S.bodies.excess_mass[b] or S.bodies.excess_inertia[b].any())
         ]

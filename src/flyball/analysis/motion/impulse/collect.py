@@ -12,7 +12,6 @@ from ....model.model import Model
 from ....results.bulk import Bulk
 from ....results.contacts import Contacts
 from ....results.sides import OPEN, SLIP, STICK, Sides
-from ....stepping.joined import ASTRAY, LOST
 from ....stepping.stepper import Stepper
 from ....stepping.tables import (
     ANGLE,
@@ -69,8 +68,8 @@ class Collected:
         self.angle.append(s.free.move[:, ANGLE].copy())
         self.twist.append(s.rooms.X.v[:, :6].copy())
         sums = s.pace.real[list(SUMS)]
-        sums[SUMS.index(LOST_IMPACT)] += s.joints.real[LOST]
-        sums[SUMS.index(NUMERICAL)] += s.joints.real[ASTRAY]
+        sums[SUMS.index(LOST_IMPACT)] += s.joints.real.lost
+        sums[SUMS.index(NUMERICAL)] += s.joints.real.astray
         self.sums.append(sums)
         if self.held:
             self.held.add(s.joints, moved)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ....model.model import Model
-from ....stepping.joined import STEP, V_AFTER, V_BEFORE, Joined
+from ....stepping.joined import V_AFTER, V_BEFORE, Joined
 from ....tables.values import Values
 from ...assembly.start import Assembly
 from ..start import Start, begin
@@ -40,7 +40,7 @@ class Held:
 
     def add(self, A: Joined, moved: bool) -> None:
         """Keep where it is now, and mean accelerations and multipliers of the step that led there, if one did."""
-        h = float(A.real[STEP]) if moved else 1.0
+        h = float(A.real.step) if moved else 1.0
         self.y.append(A.clock.y[0].copy())
         self.vdot.append((A.wide[V_AFTER] - A.wide[V_BEFORE]) / h)
         self.lam.append(A.lam[0] + (A.lam[1] + A.lam[2]) / h)

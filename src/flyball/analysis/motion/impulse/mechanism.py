@@ -10,10 +10,9 @@ from ....equations.projection import STEPS
 from ....equations.slopes import DIRECTIONS, SLOPE_WIDTH
 from ....equations.tasks import Sheet
 from ....model.force import CoordinateForce, TwoPointForce
-from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock
+from ....numerics.integrators.clock import STATES, Clock, ClockCounts, ClockReals
 from ....numerics.integrators.tableaux import tableau
 from ....stepping.joined import (
-    FIRST,
     FRICTION,
     LEAST,
     MOST_AT,
@@ -22,10 +21,10 @@ from ....stepping.joined import (
     ROPE_C,
     ROPE_K,
     SHORTEST,
-    STEP,
     STOP,
-    TIME,
     Joined,
+    JoinedCounts,
+    JoinedReals,
 )
 from ....stepping.smooth import MIXED, MIXING
 from ....tables.specs import Structure
@@ -60,17 +59,17 @@ def tables(
     y[0] = start.y
     width = max(len(start.y) + 1, s.nv, len(S.rows.law), 1)
     clock = Clock(
-        np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, np.int64)
+        ClockReals.blank(), ClockCounts.blank(), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, np.int64)
     )
     slopes = np.zeros((len(s.forces), SLOPE_WIDTH))
     slopes[:, DIRECTIONS] = [directions(f) for f in s.forces]
     springs = int(slopes[:, DIRECTIONS].sum())
-    c.work.options.stabilization[0], c.work.options.deferred[0] = STEPS, 0.0
+    c.work.options.stabilization, c.work.options.deferred = STEPS, 0.0
     S = S._replace(force_parameters=S.force_parameters.copy())
     line, line_x = lines(s, S, stops or {})
     A = Joined(
         S, c.work, tableau("rk45"), clock, Sheet(np.zeros((4, width))), Sheet(slopes), np.zeros(1, np.int64),
-        real=np.zeros(8), count=np.zeros(16, np.int64),
+        real=JoinedReals.blank(), count=JoinedCounts.blank(),
         mover=np.array([(b, of[b]) for b in rows], np.int64).reshape(-1, 2),
         group=group, wide=np.zeros((8, s.nv)), lam=np.zeros((3, len(S.rows.law))),
         spring_x=np.zeros((springs, 10)), spring_J=np.zeros((springs, s.nv)), spring_Y=np.zeros((springs, s.nv)),
@@ -79,8 +78,8 @@ def tables(
         job=np.zeros((0, 3), np.int64), queue=np.zeros(len(group) - 1, np.int64),
         pose=np.zeros((len(rows), 12)),
     )  # fmt: skip
-    A.count[FIRST] = first
-    A.real[TIME], A.real[STEP] = start.assembly.t, h
+    A.count.first = first
+    A.real.time, A.real.step = start.assembly.t, h
     return A
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from ....contact import surfaces as su
 from ....contact.tables import RADIUS, Movers
 from ....model.geometry import matrix_to_quaternion
-from ....numerics.cone.problem import COULOMB, MOST_STEPS
 from ....stepping.stepper import Stepper, free_bodies
 from ....stepping.tables import (
     COUNTS,
@@ -91,6 +90,6 @@ def begin(scene: Touching, M: Movers, values: Values, o: Stepping, held: Held | 
     at, twist, margin = M.pose[:n, :3], M.twist[:n], MARGIN * size
     stepper = Stepper(scene.geometry, free, at, twist, scene.surfaces, pace, margin, o.solver, joints)
     choices = stepper.rooms.O.count
-    choices[COULOMB] = o.coulomb
-    choices[MOST_STEPS] = STEPS_USUAL if o.iterations is None else 0
+    choices.coulomb = o.coulomb
+    choices.most_steps = STEPS_USUAL if o.iterations is None else 0
     return stepper

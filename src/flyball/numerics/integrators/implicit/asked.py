@@ -15,32 +15,16 @@ from ..clock import (
     ASIDE,
     AT_END,
     AT_START,
-    BACK,
-    BEFORE,
     BETWEEN,
-    BLURRED_AT,
-    ERROR,
-    EXCESS,
-    EXTENDED,
-    GROW,
     JUMPED,
     NEW,
     NOT_FINITE,
     NOW,
-    PART,
-    SPAN,
-    STARTED,
-    STEP,
     STUCK,
-    TRIED,
-    WIDE,
-    H,
-    T,
 )
 from ..loop import BEGIN, ENDED, ENTER, OVERLOOKED, REFUSE, TRY, WITHIN, ending
 from ..refusal import afresh
-from .desk import ASKED, FRESH, LAST_ERROR, RATE, START, THETA, WIDTH
-from .desk import BEFORE as FOLLOWS
+from .desk import START
 from .step import defect
 
 SURE = 1e-3  # a rate of the iteration below which the Jacobian serves on
@@ -58,29 +42,29 @@ def begin(arrive, inspect, S, K, c):
     y = c.y[NEW]
     for i in range(y.shape[0]):
         y[i] = c.y[NOW, i]
-    status, moved = arrive(c.real[T], y, c.K[0], S, K)
+    status, moved = arrive(c.real.t, y, c.K[0], S, K)
     if status != 0 or moved > MOVED:
         return STUCK
     for i in range(y.shape[0]):
         c.y[NOW, i] = y[i]
         if not c.K[0, i] - c.K[0, i] == 0.0:
             return NOT_FINITE
-    inspect(c.real[T], 0.0, c.real[SPAN], AT_START, c.seen, S, K)
+    inspect(c.real.t, 0.0, c.real.span, AT_START, c.seen, S, K)
     for i in range(K.found.shape[0]):
         K.lam[START, i] = K.found[i]
-    K.count[FOLLOWS] = 0
-    K.real[LAST_ERROR] = 0.0
-    c.real[GROW] = WIDEST
-    if c.count[STARTED] != JUMPED:
-        K.count[FRESH] = 0
-        K.real[WIDTH] = 0.0
-        K.real[RATE], K.real[THETA] = 1.0, SURE
-        c.real[EXCESS] = 1.0
-        c.real[WIDE] = 0.0  # steps of before tell nothing of what is narrow now
-    c.real[BEFORE] = c.real[T]
-    c.real[BLURRED_AT] = c.real[BACK] = c.real[T] - c.real[SPAN]
-    if c.real[H] <= 0.0:
-        c.real[H] = FIRST * c.real[SPAN]
+    K.count.before = 0
+    K.real.last_error = 0.0
+    c.real.grow = WIDEST
+    if c.count.started != JUMPED:
+        K.count.fresh = 0
+        K.real.width = 0.0
+        K.real.rate, K.real.theta = 1.0, SURE
+        c.real.excess = 1.0
+        c.real.wide = 0.0  # steps of before tell nothing of what is narrow now
+    c.real.before = c.real.t
+    c.real.blurred_at = c.real.back = c.real.t - c.real.span
+    if c.real.h <= 0.0:
+        c.real.h = FIRST * c.real.span
     afresh(c)
     return 0
 
@@ -88,15 +72,15 @@ def begin(arrive, inspect, S, K, c):
 @formula
 def overlooked(residual, inspect, S, K, c):
     """Whether laws do something within the step that its stages have not seen, and that matters; see `explicit`."""
-    h = c.real[TRIED]
-    inspect(c.real[T], h, c.real[SPAN], AT_END, c.seen, S, K)
-    k, x, share = inspect(c.real[T], h, c.real[SPAN], 0, c.seen, S, K)
+    h = c.real.tried
+    inspect(c.real.t, h, c.real.span, AT_END, c.seen, S, K)
+    k, x, share = inspect(c.real.t, h, c.real.span, 0, c.seen, S, K)
     while k > 0:
         if share > 1.0:
             return 1
-        if c.real[STEP] == 0.0 and not defect(residual, S, K, c, h, x) * share <= 1.0:
+        if c.real.step == 0.0 and not defect(residual, S, K, c, h, x) * share <= 1.0:
             return 1
-        k, x, share = inspect(c.real[T], h, c.real[SPAN], k, c.seen, S, K)
+        k, x, share = inspect(c.real.t, h, c.real.span, k, c.seen, S, K)
     return 0
 
 
@@ -113,9 +97,9 @@ def within(between, compose, S, K, c):
     """The state at a part of the step."""
     z = c.y[ASIDE, : K.z.shape[1]]
     rates_at_begin(K, c)
-    between(K, c.real[PART], c.real[TRIED], K.d[START], K.a[START], z)
+    between(K, c.real.part, c.real.tried, K.d[START], K.a[START], z)
     compose(c.y[NOW], K.d[START], K.a[START], z, c.y[BETWEEN], S)
-    c.count[EXTENDED] = 1
+    c.count.extended = 1
     return 0
 
 
@@ -125,21 +109,21 @@ def answer(method, callbacks, S, K, c, task):
     attempt, between, enter, refuse = method
     residual, compose, arrive, inspect = callbacks[0], callbacks[2], callbacks[3], callbacks[4]
     if task == TRY:
-        c.count[EXTENDED] = 0
-        status, c.real[ERROR], K.real[ASKED] = attempt(callbacks, S, K, c, c.real[TRIED])
+        c.count.extended = 0
+        status, c.real.error, K.real.asked = attempt(callbacks, S, K, c, c.real.tried)
         return status
     if task == WITHIN:
         return within(between, compose, S, K, c)
     if task == ENTER:
-        c.real[BEFORE] = c.real[T]
-        enter(K, c, ending(c), c.real[TRIED], c.real[ERROR], K.real[ASKED])
+        c.real.before = c.real.t
+        enter(K, c, ending(c), c.real.tried, c.real.error, K.real.asked)
         return 0
     if task == REFUSE:
         return refuse(K, c)
     if task == OVERLOOKED:
         return overlooked(residual, inspect, S, K, c)
     if task == ENDED:
-        inspect(c.real[T], c.real[TRIED], c.real[SPAN], AT_END, c.seen, S, K)
+        inspect(c.real.t, c.real.tried, c.real.span, AT_END, c.seen, S, K)
         return 0
     if task == BEGIN:
         return begin(arrive, inspect, S, K, c)

@@ -12,30 +12,52 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ....compiler.layout import Complex1, Complex2, Float1, Float2, Int1, Int2
+from ....compiler.layout import Complex1, Complex2, Float1, Float2, Int1, Int2, Record
 from ...lu import Rows
 
-# entries of Desk.count: what was done; whether the Jacobian is that of the present state (1), serves (0) or not (-1);
-# whether there is a polynomial of the step before; refinements of each linear solve; iterations of a step at least;
-# iterations of all stages together; whether velocities are not held to the constraints (index 3); where the sizes of
-# rows begin in the Jacobian, if forces depend on multipliers; whether slopes of laws may be infinite (`newton.confirm`)
-ITERATIONS, JACOBIANS, FACTORS, FRESH, BEFORE, REFINE, LEAST, WHOLE, INDEX_3, SHARED, STEEP, COUNTS = range(12)
-# entries of Desk.real: tolerances as the estimate needs them; bound of the iteration; its last ratio, and its rate;
-# width that is factored for; width and error of the step before; what the last step asks for: iterations it took, or
-# the factor of its width; regularisation; size of corrections that are taken for rounding where they do not fall any
-# more; rate of the iteration up to which a Jacobian serves on; what a step could be wider by and is not, since its
-# factors serve on; size of the last correction of the iteration
-(
-    RTOL, ATOL, NEWTON, THETA, RATE, WIDTH, LAST_H, LAST_ERROR, ASKED, SOFT, ROUGH, SERVES, STAYS, CORRECTION, REALS,
-) = range(15)  # fmt: skip
 START = 3  # row of the state at which a step begins, and of the error estimate
+
+
+class SolverCounts(Record, kind="Int"):
+    """What an implicit method has done, and how it goes about it."""
+
+    iterations: int
+    jacobians: int
+    factors: int
+    fresh: int  # whether the Jacobian is that of the present state (1), serves (0) or not (-1)
+    before: int  # whether there is a polynomial of the step before
+    refine: int  # refinements of each linear solve
+    least: int  # iterations of a step at least
+    whole: int  # iterations of all stages together
+    index_3: int  # whether velocities are not held to the constraints
+    shared: int  # where the sizes of rows begin in the Jacobian, if forces depend on multipliers
+    steep: int  # whether slopes of laws may be infinite (`newton.confirm`)
+
+
+class SolverReals(Record, kind="Float"):
+    """Tolerances and rates of an implicit method."""
+
+    rtol: float  # as the error estimate needs it
+    atol: float
+    newton: float  # bound of the iteration
+    theta: float  # its last ratio
+    rate: float
+    width: float  # of the step that is factored for
+    last_h: float  # width and error of the step before
+    last_error: float
+    asked: float  # what the last step asks for: iterations it took, or the factor of its width
+    soft: float  # regularization
+    rough: float  # size of corrections that are taken for rounding where they do not fall any more
+    serves: float  # rate of the iteration up to which a Jacobian serves on
+    stays: float  # what a step could be wider by and is not, since its factors serve on
+    correction: float  # size of the last correction of the iteration
 
 
 class Desk(NamedTuple):
     """Scratch and tables of one run."""
 
-    count: Int1  # type: ignore[assignment]  # (COUNTS,)
-    real: Float1  # (REALS,)
+    count: SolverCounts  # type: ignore[assignment]
+    real: SolverReals  # type: ignore[assignment]
     d: Float2  # (4, nv): increments at the stages; last: of the estimate
     v: Float2  # (4, nv)
     dd: Float2  # (4, nv): rates of both
@@ -84,8 +106,8 @@ class Desk(NamedTuple):
 class AlphaDesk(NamedTuple):
     """Scratch and tables of one run; of the generalised-alpha method; what has the same name in `Desk` is the same."""
 
-    count: Int1  # type: ignore[assignment]
-    real: Float1
+    count: SolverCounts  # type: ignore[assignment]
+    real: SolverReals  # type: ignore[assignment]
     rho: Float1  # (1,): spectral radius at infinity
     d: Float2
     v: Float2
@@ -120,8 +142,8 @@ class AlphaDesk(NamedTuple):
 class VariationalDesk(NamedTuple):
     """Scratch of one run of the variational method; what has the same name in `Desk` is the same."""
 
-    count: Int1  # type: ignore[assignment]
-    real: Float1
+    count: SolverCounts  # type: ignore[assignment]
+    real: SolverReals  # type: ignore[assignment]
     d: Float2
     v: Float2
     a: Float2

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from ....compiler.formulas import formula
-from ..clock import ACCEPTED, GROW, NEW, NOW, STEP, TRIED, H, T
+from ..clock import NEW, NOW
 from ..loop import shorten
-from .desk import FRESH, STEEP
 
 NARROWEST = 1e-3  # part of the step below which none is tried
 GROWN = 6.0  # what tells that the last step was not refused
@@ -25,18 +24,18 @@ def enter(c, t):
     for i in range(c.y.shape[1]):
         c.y[NOW, i] = c.y[NEW, i]
         c.K[0, i] = c.K[1, i]
-    c.real[H] = c.real[STEP]
-    c.real[T] = t
-    c.real[GROW] = GROWN
-    c.count[ACCEPTED] += 1
+    c.real.h = c.real.step
+    c.real.t = t
+    c.real.grow = GROWN
+    c.count.accepted += 1
 
 
 @formula
 def refuse(K, c):
     """Try half the width where slopes of laws may be infinite. Returns 0, or that there is nothing to try."""
-    h = 0.5 * c.real[TRIED]
-    if K.count[STEEP] == 0 or h < NARROWEST * c.real[STEP]:
+    h = 0.5 * c.real.tried
+    if K.count.steep == 0 or h < NARROWEST * c.real.step:
         return 1
     shorten(c, h)
-    K.count[FRESH] = -1
+    K.count.fresh = -1
     return 0

@@ -20,22 +20,9 @@ from __future__ import annotations
 from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ...lu import lu_factor
-from ..clock import ASIDE, ASIDE_RATE, NEW, NOW, STEP, T
+from ..clock import ASIDE, ASIDE_RATE, NEW, NOW
 from .desk import (
-    BEFORE,
-    CORRECTION,
-    FACTORS,
-    FRESH,
-    ITERATIONS,
-    LAST_H,
-    LEAST,
-    NEWTON,
-    ROUGH,
     START,
-    STEEP,
-    THETA,
-    WHOLE,
-    WIDTH,
 )
 from .even import account
 from .even import enter as enter_step
@@ -67,14 +54,14 @@ def begin(callbacks, S, K, c):
     compose, arrive = callbacks[2], callbacks[6]
     nv = K.v.shape[1]
     at = c.y.shape[1] - K.z.shape[1] - nv
-    ahead = AHEAD * c.real[STEP]
+    ahead = AHEAD * c.real.step
     for i in range(nv):
         K.d[START, i] = ahead * c.y[NOW, at + i]
         K.v[START, i] = c.y[NOW, at + i] + ahead * c.K[0, at + i]
     for i in range(K.z.shape[1]):
         K.z[START, i] = c.y[NOW, at + nv + i] + (ahead * c.K[0, at + nv + i] if i < K.tol_x.shape[0] else 0.0)
     compose(c.y[NOW], K.d[START], K.v[START], K.z[START], c.y[ASIDE], S)
-    status, _ = arrive(c.real[T] + ahead, c.y[ASIDE], c.y[ASIDE_RATE], S, K)
+    status, _ = arrive(c.real.t + ahead, c.y[ASIDE], c.y[ASIDE_RATE], S, K)
     for i in range(nv + K.tol_x.shape[0]):  # x stands behind the velocities
         K.past[TRUE, i] = c.K[0, at + i]
         K.past[RATE, i] = (c.y[ASIDE_RATE, at + i] - c.K[0, at + i]) / ahead if status == 0 else 0.0
@@ -87,10 +74,10 @@ def place(K, h):
     nv = K.v.shape[1]
     for i in range(nv + K.tol_x.shape[0]):
         a = K.past[ALGORITHMIC, i]
-        if K.count[BEFORE] == 0:
+        if K.count.before == 0:
             a = K.past[TRUE, i] + (am - af) * h * K.past[RATE, i]
-        elif h != K.real[LAST_H]:
-            a = K.past[TRUE, i] + (a - K.past[TRUE, i]) * (h / K.real[LAST_H])
+        elif h != K.real.last_h:
+            a = K.past[TRUE, i] + (a - K.past[TRUE, i]) * (h / K.real.last_h)
         if i < nv:
             K.a[START, i] = a
         else:
@@ -149,11 +136,11 @@ def factor(K, h):
         A[K.put[e, 0]] += by * J[K.put[e, 1]]
     for e in range(K.part[1], K.put.shape[0]):
         A[K.put[e, 0]] += J[K.put[e, 1]] / scale
-    K.count[FACTORS] += 1
-    K.real[WIDTH] = h
+    K.count.factors += 1
+    K.real.width = h
     status = lu_factor(K.P, A, K.real_L, K.real_U, K.real_D, K.real_Y)
     if status != 0:
-        K.real[WIDTH] = 0.0
+        K.real.width = 0.0
     return status
 
 
@@ -189,7 +176,7 @@ def correct(K, h):
 def residual(callbacks, S, K, c, h):
     """The residual at the end of the step, into its row. Returns a status."""
     ends(callbacks, S, K, h)
-    return callbacks[0](c.real[T] + h, END, S, K, c)
+    return callbacks[0](c.real.t + h, END, S, K, c)
 
 
 @formula
@@ -197,7 +184,7 @@ def correct_at_end(callbacks, S, K, c, h):
     """One correction with the Jacobian of the end of the step. Returns a status, and its size."""
     if residual(callbacks, S, K, c, h) != 0:
         return DIVERGED, 0.0
-    if renew(callbacks[1], c.real[T] + h, END, S, K, c) != 0 or factor(K, h) != 0:
+    if renew(callbacks[1], c.real.t + h, END, S, K, c) != 0 or factor(K, h) != 0:
         return DIVERGED, 0.0
     return 0, correct(K, h)
 
@@ -213,17 +200,20 @@ def iterate(callbacks, S, K, c, h, whole):
         else:
             status = residual(callbacks, S, K, c, h)
             size = correct(K, h) if status == 0 else 0.0
-        K.count[WHOLE if whole else ITERATIONS] += 1
+        if whole:
+            K.count.whole += 1
+        else:
+            K.count.iterations += 1
         if status != 0 or not size < 1e300:
             return DIVERGED
-        K.real[CORRECTION] = size
+        K.real.correction = size
         rate = size / last if n > 0 else 1.0
         left = size * rate / (1.0 - rate) if rate < 1.0 else 1e300
-        if n + 1 >= K.count[LEAST] and (size <= 1e-3 * K.real[NEWTON] or left <= K.real[NEWTON]):
-            K.real[THETA] = rate if n > 0 else 0.0
+        if n + 1 >= K.count.least and (size <= 1e-3 * K.real.newton or left <= K.real.newton):
+            K.real.theta = rate if n > 0 else 0.0
             return 0
-        if n > 1 and rate > FALLS and size <= K.real[ROUGH]:  # rounding
-            K.real[THETA] = 1.0
+        if n > 1 and rate > FALLS and size <= K.real.rough:  # rounding
+            K.real.theta = 1.0
             return 0
         if n > 1 and rate > FALLS and not whole:
             return DIVERGED
@@ -235,35 +225,35 @@ def iterate(callbacks, S, K, c, h, whole):
 def attempt(callbacks, S, K, c, h):
     """One step of width h into c.y[NEW], derivatives there into c.K[1]. Returns (status, 0, 1), as `radau.attempt`."""
     _, _, compose, arrive = callbacks[:4]
-    if K.count[BEFORE] == 0:
+    if K.count.before == 0:
         begin(callbacks, S, K, c)
-        if K.real[WIDTH] == 0.0:
-            K.count[FRESH] = -1
+        if K.real.width == 0.0:
+            K.count.fresh = -1
     tolerances(c, K)
-    if K.count[FRESH] < 0:
+    if K.count.fresh < 0:
         for i in range(K.v.shape[1]):
             K.d[START, i] = 0.0
             K.a[START, i] = K.past[TRUE, i]
-        status = renew(callbacks[1], c.real[T], START, S, K, c)
+        status = renew(callbacks[1], c.real.t, START, S, K, c)
         if status != 0:
             return status, 0.0, 1.0
-        K.count[FRESH] = 1
+        K.count.fresh = 1
     place(K, h)
-    status = factor(K, h) if K.real[WIDTH] != h else 0
+    status = factor(K, h) if K.real.width != h else 0
     if status == 0:
         status = iterate(callbacks, S, K, c, h, False)
     if status != 0:
         status = iterate(callbacks, S, K, c, h, True)
-    if status == 0 and K.count[STEEP] == 1:
+    if status == 0 and K.count.steep == 1:
         status = confirm(correct_at_end, callbacks, S, K, c, h)
         if status == 0:  # the Jacobian is that of the end now: `enter` has it serve on, another try does not
-            K.count[FRESH] = -1
+            K.count.fresh = -1
     if status != 0:
         return status, 0.0, 1.0
     ends(callbacks, S, K, h)
     conclude(K)
     compose(c.y[NOW], K.d[END], K.v[END], K.z[END], c.y[NEW], S)
-    status, _ = arrive(c.real[T] + h, c.y[NEW], c.K[1], S, K)
+    status, _ = arrive(c.real.t + h, c.y[NEW], c.K[1], S, K)
     account(c, h)
     return status, 0.0, 1.0
 
@@ -288,6 +278,6 @@ def enter(K, c, t, h, error, asked):
         K.past[TRUE, nv + i] = K.xd[END, i]
     for r in range(K.lam.shape[1]):
         K.lam[START, r] = K.lam[END, r]
-    K.count[BEFORE], K.real[LAST_H] = 1, h
-    K.count[FRESH] = 0 if K.real[THETA] <= SERVES else -1
+    K.count.before, K.real.last_h = 1, h
+    K.count.fresh = 0 if K.real.theta <= SERVES else -1
     enter_step(c, t)

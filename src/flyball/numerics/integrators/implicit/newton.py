@@ -11,7 +11,7 @@ from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ...lu import lu_factor, lu_solve, times
 from .coefficients import ALPHA, BETA, GAMMA, T_INVERSE, T
-from .desk import CORRECTION, FACTORS, JACOBIANS, NEWTON, REFINE, ROUGH, START, THETA, WIDTH
+from .desk import START
 
 TI0, TI1, TI2 = T_INVERSE
 T0, T1, T2 = T
@@ -41,13 +41,13 @@ def factor(K, h):
     """Factor both matrices for steps of width h. Returns 0, or not."""
     fill(K, K.real_A, GAMMA / h)
     fill(K, K.pair_A, complex(ALPHA / h, BETA / h))
-    K.count[FACTORS] += 1
-    K.real[WIDTH] = h
+    K.count.factors += 1
+    K.real.width = h
     status = lu_factor(K.P, K.real_A, K.real_L, K.real_U, K.real_D, K.real_Y)
     if status == 0:
         status = lu_factor(K.P, K.pair_A, K.pair_L, K.pair_U, K.pair_D, K.pair_Y)
     if status != 0:
-        K.real[WIDTH] = 0.0
+        K.real.width = 0.0
     return status
 
 
@@ -60,7 +60,7 @@ def solve(K, x, A, L, U, D, scale):
     lu_solve(K.P, L, U, D, x[0])
     back = 1.0 / scale
     J = K.J[START]
-    for _ in range(K.count[REFINE]):
+    for _ in range(K.count.refine):
         times(K.P, A, x[0], x[2])
         for e in range(K.part[1], K.put.shape[0]):  # these stand on the diagonal alone
             i = K.P.Aj[K.put[e, 0]]
@@ -133,8 +133,8 @@ def renew(linearise, t, k, S, K, c):
         return DIVERGED
     for e in range(K.J.shape[1] if k != START else 0):
         K.J[START, e] = K.J[k, e]
-    K.count[JACOBIANS] += 1
-    K.real[WIDTH] = 0.0
+    K.count.jacobians += 1
+    K.real.width = 0.0
     return 0
 
 
@@ -146,14 +146,14 @@ def confirm(correct_at_end, callbacks, S, K, c, h):
     to nothing whatever the equations miss. Newton's method has converged once a correction that is small has not grown
     over the one before: from too steep a slope they grow, each with the slope of where the last one has led.
     """
-    last = K.real[CORRECTION]
+    last = K.real.correction
     for _ in range(MOST):
         status, size = correct_at_end(callbacks, S, K, c, h)
         if status != 0 or not size < 1e300:
             return DIVERGED
-        small = size <= K.real[NEWTON] or last < GROWTH * size <= GROWTH * K.real[ROUGH]
+        small = size <= K.real.newton or last < GROWTH * size <= GROWTH * K.real.rough
         if small and size <= GROWTH * last:
-            K.real[THETA] = 0.0
+            K.real.theta = 0.0
             return 0
         last = size
     return DIVERGED

@@ -8,51 +8,21 @@ from __future__ import annotations
 
 from ....compiler.formulas import formula
 from ..clock import (
-    ACCEPTED,
-    BACK,
-    BEST,
-    BEST_H,
-    BLURRED_AT,
-    ERROR,
-    EXCESS,
-    EXCESS_AT,
     FROM,
     FROM_RATE,
-    GROW,
     NEW,
     NOW,
     OLD,
     OLD_RATE,
-    PARDON,
-    STEP,
     TO,
     TO_RATE,
-    TRIED,
-    TROUBLE,
-    WIDE,
-    H,
-    T,
 )
-from ..clock import BEFORE as BEGAN
 from ..loop import shorten
 from ..refusal import afresh, take_back
 from .asked import WIDEST
 from .coefficients import C
 from .desk import (
-    ASKED,
-    BEFORE,
-    FRESH,
-    LAST_ERROR,
-    LAST_H,
-    REFINE,
-    RTOL,
-    SERVES,
-    SHARED,
     START,
-    STAYS,
-    STEEP,
-    THETA,
-    WIDTH,
 )
 from .even import refuse as narrower
 from .newton import confirm, correct, factor, renew
@@ -84,11 +54,11 @@ def rest(K, c):
 def correct_at_end(callbacks, S, K, c, h):
     """One correction of the stages with the Jacobian of the last one. Returns a status, and its size."""
     residual, linearise = callbacks
-    if renew(linearise, c.real[T] + h, STAGES - 1, S, K, c) != 0 or factor(K, h) != 0:
+    if renew(linearise, c.real.t + h, STAGES - 1, S, K, c) != 0 or factor(K, h) != 0:
         return SINGULAR, 0.0
     rates(K, h)
     for k in range(STAGES):
-        if residual(c.real[T] + C[k] * h, k, S, K, c) != 0:
+        if residual(c.real.t + C[k] * h, k, S, K, c) != 0:
             return SINGULAR, 0.0
     share(K, h)
     return 0, correct(K, h)
@@ -101,41 +71,39 @@ def attempt(callbacks, S, K, c, h):
     begin(c, K)
     rest(K, c)
     predict(K, h)
-    outdated = K.count[STEEP] == 1 or (
-        K.count[FRESH] == 0 and (c.count[TROUBLE] != 0 or K.real[THETA] > K.real[SERVES])
-    )
-    if c.real[GROW] <= 1.0 and outdated:
-        K.count[FRESH] = -1
-    if K.count[FRESH] < 1 and not (K.count[FRESH] == 0 and K.real[WIDTH] > 0.0):
-        if renew(linearise, c.real[T], START, S, K, c) != 0:
+    outdated = K.count.steep == 1 or (K.count.fresh == 0 and (c.count.trouble != 0 or K.real.theta > K.real.serves))
+    if c.real.grow <= 1.0 and outdated:
+        K.count.fresh = -1
+    if K.count.fresh < 1 and not (K.count.fresh == 0 and K.real.width > 0.0):
+        if renew(linearise, c.real.t, START, S, K, c) != 0:
             return SINGULAR, 0.0, 0.5
-        K.count[FRESH] = 1
-    if K.real[WIDTH] != h and factor(K, h) != 0:
+        K.count.fresh = 1
+    if K.real.width != h and factor(K, h) != 0:
         return SINGULAR, 0.0, 0.5
     status, asked = iterate(residual, S, K, c, h)
-    if status != 0 and K.count[FRESH] == 1:
+    if status != 0 and K.count.fresh == 1:
         predict(K, h)
         status = iterate_whole((residual, linearise), S, K, c, h)
         if status == 0:
             asked = float(MOST)
-            K.real[THETA] = 1.0
-    if status == 0 and K.count[STEEP] == 1:
+            K.real.theta = 1.0
+    if status == 0 and K.count.steep == 1:
         status = confirm(correct_at_end, (residual, linearise), S, K, c, h)
         asked = 0.5 if status != 0 else asked
         if status == 0:  # the Jacobian is that of the end now: `enter` has it serve on, another try does not
-            K.count[FRESH] = -1
+            K.count.fresh = -1
             status = account(residual, S, K, c, h)
     if status != 0:
         return status, 0.0, asked
     compose(c.y[NOW], K.d[2], K.v[2], K.z[2], c.y[NEW], S)
     error = 0.0
-    if c.real[STEP] == 0.0:
+    if c.real.step == 0.0:
         status, error = estimate(residual, S, K, c, h)
         if status != 0 or not error < 1e300:
             return SINGULAR, 0.0, 0.5
-        if error > max(1.0, c.real[PARDON]):
+        if error > max(1.0, c.real.pardon):
             return 0, error, asked
-    status, _ = arrive(c.real[T] + h, c.y[NEW], c.K[1], S, K)
+    status, _ = arrive(c.real.t + h, c.y[NEW], c.K[1], S, K)
     return status, error, asked if status == 0 else 0.5
 
 
@@ -149,23 +117,23 @@ def wider(h, error, iterations):
 @formula
 def refuse(K, c):
     """Try a narrower step, and with the Jacobian of where it begins. Returns 0, or that there is nothing to try."""
-    h, error, asked = c.real[TRIED], c.real[ERROR], K.real[ASKED]
-    if K.count[SHARED] == 0 and (c.count[TROUBLE] != 0 or c.real[GROW] <= 1.0):
-        K.count[REFINE] = REFINED
-    if c.count[TROUBLE] != 0:
-        if c.real[STEP] > 0.0 and K.count[FRESH] == 1:
+    h, error, asked = c.real.tried, c.real.error, K.real.asked
+    if K.count.shared == 0 and (c.count.trouble != 0 or c.real.grow <= 1.0):
+        K.count.refine = REFINED
+    if c.count.trouble != 0:
+        if c.real.step > 0.0 and K.count.fresh == 1:
             return narrower(K, c)
-        if c.real[STEP] > 0.0:
+        if c.real.step > 0.0:
             shorten(c, h)
             return 0
         shorten(c, asked * h)
         stranded(K, c)
         return 0
-    goes_on = K.count[BEFORE] == 1 or c.real[BACK] == c.real[T]
+    goes_on = K.count.before == 1 or c.real.back == c.real.t
     shorten(c, wider(h, error, asked)[0] if goes_on else 0.1 * h)
     if goes_on:  # what a jump excites is not followed by steps as wide as those before it
         pardon(K, c, h, error)
-        if c.real[PARDON] > 0.0:
+        if c.real.pardon > 0.0:
             stranded(K, c)
     return 0
 
@@ -177,13 +145,13 @@ def pardon(K, c, h, error):
     So it is near a singular position, where it grows as steps get narrower. What is accepted so is told
     (c.real[EXCESS]).
     """
-    if error < FALLS * c.real[BEST]:
-        c.real[BEST] = error
-        c.real[BEST_H] = h
-    elif h < NARROWER * c.real[BEST_H] and c.real[BEST] * K.real[RTOL] < ROUGH and c.real[PARDON] == 0.0:
-        c.real[PARDON] = 2.0 * c.real[BEST]
-        c.real[H] = c.real[BEST_H]
-        c.real[BLURRED_AT] = c.real[T]
+    if error < FALLS * c.real.best:
+        c.real.best = error
+        c.real.best_h = h
+    elif h < NARROWER * c.real.best_h and c.real.best * K.real.rtol < ROUGH and c.real.pardon == 0.0:
+        c.real.pardon = 2.0 * c.real.best
+        c.real.h = c.real.best_h
+        c.real.blurred_at = c.real.t
 
 
 @formula
@@ -193,16 +161,16 @@ def stranded(K, c):
     It is taken back and ends elsewhere. If that does not help, a wide step is tried, which ends beyond the place, then
     others, each somewhat narrower, with more pardoned.
     """
-    if not (c.real[H] < WALKED * c.real[WIDE] and c.real[PARDON] * K.real[RTOL] < ROUGH):
+    if not (c.real.h < WALKED * c.real.wide and c.real.pardon * K.real.rtol < ROUGH):
         return
-    if c.real[PARDON] == 0.0 and c.real[T] - c.real[BEGAN] > WALKED * c.real[WIDE] and c.real[BACK] < c.real[BEGAN]:
+    if c.real.pardon == 0.0 and c.real.t - c.real.before > WALKED * c.real.wide and c.real.back < c.real.before:
         take_back(c)
-        c.real[H] *= ELSEWHERE
-        K.count[BEFORE], K.count[FRESH] = 0, -1
+        c.real.h *= ELSEWHERE
+        K.count.before, K.count.fresh = 0, -1
         return
-    c.real[PARDON] = max(SLIGHT, SLIGHT * c.real[PARDON])
-    c.real[H] = c.real[WIDE] * (SLIGHT / c.real[PARDON]) ** 0.15
-    c.real[BLURRED_AT] = c.real[T]
+    c.real.pardon = max(SLIGHT, SLIGHT * c.real.pardon)
+    c.real.h = c.real.wide * (SLIGHT / c.real.pardon) ** 0.15
+    c.real.blurred_at = c.real.t
 
 
 @formula
@@ -222,31 +190,31 @@ def enter(K, c, t, h, error, iterations):
         for k in range(3):
             K.before_lam[k, i] = K.lam[k, i]
         K.lam[START, i] = K.lam[2, i]
-    if error > c.real[EXCESS]:
-        c.real[EXCESS] = error
-        c.real[EXCESS_AT] = c.real[T]
+    if error > c.real.excess:
+        c.real.excess = error
+        c.real.excess_at = c.real.t
     wide, safe = wider(h, error, iterations)
-    if K.real[LAST_ERROR] > 0.0 and error > 0.0:
-        f = (h / K.real[LAST_H]) * (K.real[LAST_ERROR] / (error * error)) ** 0.25 * safe
+    if K.real.last_error > 0.0 and error > 0.0:
+        f = (h / K.real.last_h) * (K.real.last_error / (error * error)) ** 0.25 * safe
         wide = min(wide, h * max(NARROWEST, min(WIDEST, f)))
-    if c.real[GROW] <= 1.0:
+    if c.real.grow <= 1.0:
         wide = min(wide, h)
     else:
-        K.count[REFINE] = 0
-    if c.real[PARDON] > 0.0:
-        wide = max(h, c.real[WIDE])
+        K.count.refine = 0
+    if c.real.pardon > 0.0:
+        wide = max(h, c.real.wide)
     afresh(c)
     for i in range(c.seen.shape[1]):
         c.seen[FROM, i] = c.seen[TO, i]
         c.seen[FROM_RATE, i] = c.seen[TO_RATE, i]
-    K.real[LAST_H] = h
-    K.real[LAST_ERROR] = max(1e-2, error)
-    K.count[BEFORE] = 1
-    K.count[FRESH] = 0 if K.real[THETA] <= K.real[SERVES] else -1
-    if K.count[FRESH] == 0 and h <= wide <= K.real[STAYS] * h:
+    K.real.last_h = h
+    K.real.last_error = max(1e-2, error)
+    K.count.before = 1
+    K.count.fresh = 0 if K.real.theta <= K.real.serves else -1
+    if K.count.fresh == 0 and h <= wide <= K.real.stays * h:
         wide = h
-    c.real[WIDE] = max(h, 0.8 * c.real[WIDE])
-    c.real[H] = wide if c.real[STEP] == 0.0 else c.real[STEP]
-    c.real[T] = t
-    c.real[GROW] = WIDEST
-    c.count[ACCEPTED] += 1
+    c.real.wide = max(h, 0.8 * c.real.wide)
+    c.real.h = wide if c.real.step == 0.0 else c.real.step
+    c.real.t = t
+    c.real.grow = WIDEST
+    c.count.accepted += 1

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from ....compiler.formulas import formula
 from ....math.scalar import sqrt
-from ..clock import LEDGER, NOW, SCALE, T
+from ..clock import NOW
 from .coefficients import BEND, BENT, BENT_MOST, ERROR, GAMMA, INVERSE, THROUGH_STAGES, THROUGH_START, A, C
-from .desk import ATOL, BEFORE, CORRECTION, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, ROUGH, RTOL, SHARED, START, THETA
+from .desk import START
 from .newton import correct, solve_real
 
 MOST = 7  # iterations
@@ -26,20 +26,20 @@ def begin(c, K):
     y = c.y[NOW]
     nv = K.v.shape[1]
     nq = y.shape[0] - nv - K.z.shape[1]
-    size = max(1.0, c.real[SCALE])
+    size = max(1.0, c.real.scale)
     for i in range(nv):
         x = 1.0
         if K.place[i] >= 0:
             x = abs(y[K.place[i]])
             x = max(min(x, size), 1e-3 * x)
-        K.tol[0, i] = K.real[ATOL] + K.real[RTOL] * x
+        K.tol[0, i] = K.real.atol + K.real.rtol * x
         K.v[START, i] = y[nq + i]
-        K.tol[1, i] = K.real[ATOL] + K.real[RTOL] * abs(y[nq + i])
+        K.tol[1, i] = K.real.atol + K.real.rtol * abs(y[nq + i])
     for i in range(K.z.shape[1]):
         K.z[START, i] = y[nq + nv + i]
         K.rate[START, i] = c.K[0, nq + nv + i]
     for i in range(K.tol_x.shape[0]):
-        K.tol_x[i] = K.real[ATOL] + K.real[RTOL] * abs(K.z[START, i])
+        K.tol_x[i] = K.real.atol + K.real.rtol * abs(K.z[START, i])
 
 
 @formula
@@ -49,10 +49,10 @@ def predict(K, h):
     for i in range(nv):
         for k in range(STAGES):
             K.v[k, i] = K.v[START, i]
-        if K.count[BEFORE] == 1:
+        if K.count.before == 1:
             b1, b2, b3 = coefficients(K.before_v, i, K.before_v[START, i])
             for k in range(STAGES):
-                x = 1.0 + C[k] * h / K.real[LAST_H]
+                x = 1.0 + C[k] * h / K.real.last_h
                 K.v[k, i] = K.before_v[START, i] + x * (b1 + x * (b2 + x * b3))
     for i in range(nv):
         for k in range(STAGES):
@@ -61,19 +61,19 @@ def predict(K, h):
         for k in range(STAGES):
             K.mu[k, i] = 0.0
             K.lam[k, i] = K.lam[START, i]
-        if K.count[BEFORE] == 1:
+        if K.count.before == 1:
             for k in range(STAGES):
-                K.lam[k, i] = at_stages(K.before_lam, i, 1.0 + C[k] * h / K.real[LAST_H])
+                K.lam[k, i] = at_stages(K.before_lam, i, 1.0 + C[k] * h / K.real.last_h)
     for i in range(K.z.shape[1]):
         for k in range(STAGES):
             K.rate[k, i] = K.rate[START, i]
     for i in range(K.tol_x.shape[0]):
         for k in range(STAGES):
             K.z[k, i] = K.z[START, i]
-        if K.count[BEFORE] == 1:
+        if K.count.before == 1:
             b1, b2, b3 = coefficients(K.before_x, i, K.before_x[START, i])
             for k in range(STAGES):
-                x = 1.0 + C[k] * h / K.real[LAST_H]
+                x = 1.0 + C[k] * h / K.real.last_h
                 K.z[k, i] = K.before_x[START, i] + x * (b1 + x * (b2 + x * b3))
 
 
@@ -126,7 +126,7 @@ def share(K, h):
 
     Rows are as soft as their regularisation: G v - nu + delta D h A (lam - led) = 0, which leaves no multiplier open.
     """
-    first = K.count[SHARED]
+    first = K.count.shared
     if first > 0:
         nv = K.v.shape[1]
         for r in range(K.lam.shape[1]):
@@ -146,10 +146,10 @@ def lead(K, pass_):
     found (proximal point: Rockafellar 1976; iterated regularisation: Hanke and Groetsch 1998) leaves of this its next
     power, and self-stress as it was.
     """
-    for r in range(K.lam.shape[1] if K.count[SHARED] > 0 else 0):
+    for r in range(K.lam.shape[1] if K.count.shared > 0 else 0):
         for k in range(STAGES):
             K.led[k, r] = K.lam[k, r] if pass_ > 0 else 0.0
-    return K.count[SHARED] > 0 and pass_ < PASSES
+    return K.count.shared > 0 and pass_ < PASSES
 
 
 @formula
@@ -158,11 +158,11 @@ def iterate(residual, S, K, c, h):
     more = lead(K, 0)
     status, asked, moved = settle(residual, S, K, c, h)
     pass_ = 0
-    while status == 0 and more and (pass_ == 0 or moved > K.real[NEWTON]):
+    while status == 0 and more and (pass_ == 0 or moved > K.real.newton):
         pass_ += 1
         more = lead(K, pass_)
         status, again, moved = settle(residual, S, K, c, h)
-        if status != 0 and not moved <= K.real[ROUGH]:
+        if status != 0 and not moved <= K.real.rough:
             return status, again
         if status != 0:  # what rounding makes of multipliers that redundant rows leave open
             status, more = 0, False
@@ -176,17 +176,17 @@ def settle(residual, S, K, c, h):
     The last is the size of the first correction in units of the tolerance.
     """
     found = 0
-    rate = max(K.real[RATE], 1e-16) ** 0.8
-    theta = abs(K.real[THETA])
+    rate = max(K.real.rate, 1e-16) ** 0.8
+    theta = abs(K.real.theta)
     before = last = moved = 0.0
     for n in range(MOST):
         rates(K, h)
         for k in range(STAGES):
-            if residual(c.real[T] + C[k] * h, k, S, K, c) != 0:
+            if residual(c.real.t + C[k] * h, k, S, K, c) != 0:
                 return DIVERGED, 0.5, moved
         share(K, h)
-        K.real[CORRECTION] = size = correct(K, h)
-        K.count[ITERATIONS] += 1
+        K.real.correction = size = correct(K, h)
+        K.count.iterations += 1
         if not size < 1e300:
             return DIVERGED, 0.5, moved
         if n == 0:
@@ -199,22 +199,22 @@ def settle(residual, S, K, c, h):
                 last = size
                 continue
             if not theta < SURE:
-                if size <= K.real[NEWTON]:  # rounding
+                if size <= K.real.newton:  # rounding
                     found = n + 1
                     break
                 return DIVERGED, 0.5, moved
             rate = theta / (1.0 - theta)
-            left = rate * size * theta ** (MOST - 2 - n) / K.real[NEWTON]
+            left = rate * size * theta ** (MOST - 2 - n) / K.real.newton
             if left >= 1.0:
                 q = max(1e-4, min(20.0, left))
                 return SLOW, 0.8 * q ** (-1.0 / (4.0 + MOST - 2 - n)), moved
         last = max(size, 1e-16)
-        if rate * size <= K.real[NEWTON] and n + 1 >= K.count[LEAST]:
+        if rate * size <= K.real.newton and n + 1 >= K.count.least:
             found = n + 1
             break
     if found == 0:
         return SLOW, 0.5, moved
-    K.real[RATE], K.real[THETA] = rate, theta
+    K.real.rate, K.real.theta = rate, theta
     return 0, float(found), moved
 
 
@@ -225,7 +225,7 @@ def account(residual, S, K, c, h):
         return 0
     rates(K, h)
     for k in range(STAGES):
-        if residual(c.real[T] + C[k] * h, k, S, K, c) != 0:
+        if residual(c.real.t + C[k] * h, k, S, K, c) != 0:
             return DIVERGED
     integrals(K, h)
     return 0
@@ -251,7 +251,7 @@ def estimate(residual, S, K, c, h):
         K.xd[START, i] = -(e * (K.z[0, i] - x0) + f * (K.z[1, i] - x0) + g * (K.z[2, i] - x0)) / h
     for i in range(K.mu.shape[1]):
         K.mu[START, i] = 0.0
-    status, size = filtered(residual, S, K, c, c.real[T], h)
+    status, size = filtered(residual, S, K, c, c.real.t, h)
     return status, max(size, accounts, springing(K, h) if status == 0 else 0.0)
 
 
@@ -316,7 +316,7 @@ def unsure(K, c, h):
     Within the step: at its end they are of a higher order, of the state too, but what lies between is told as well; and
     a fast beginning that the state forgets is not forgotten by its integrals.
     """
-    size = c.real[LEDGER]
+    size = c.real.ledger
     for n in range(c.accounts.shape[0]):
         size += abs(c.y[NOW, c.accounts[n]])
     at = c.y.shape[1] - K.z.shape[1]
@@ -324,7 +324,7 @@ def unsure(K, c, h):
     for n in range(c.accounts.shape[0]):
         e = BENT_MOST * bent(K, c.accounts[n] - at)
         s += e * e
-    return h * sqrt(s / max(c.accounts.shape[0], 1)) / (K.real[RTOL] * size + 1e-300)
+    return h * sqrt(s / max(c.accounts.shape[0], 1)) / (K.real.rtol * size + 1e-300)
 
 
 @formula
@@ -356,7 +356,7 @@ def defect(residual, S, K, c, h, x):
         K.xd[START, i] = (b1 + x * (2.0 * b2 + x * 3.0 * b3)) / h
     for r in range(K.mu.shape[1]):
         K.lam[START, r] = at_stages(K.lam, r, x)
-    status, size = filtered(residual, S, K, c, c.real[T] + x * h, h)
+    status, size = filtered(residual, S, K, c, c.real.t + x * h, h)
     back(K, c)
     return max(size, springing(K, h)) if status == 0 else 1e300
 

@@ -22,11 +22,10 @@ depend on velocities are iterated. Knows nothing of bodies: given compose, arriv
 from __future__ import annotations
 
 from ....compiler.formulas import formula
-from ..clock import AT_END, ERROR, EXTENDED, NEW, NOW, SPAN, TRIED, T
-from ..clock import BEFORE as STEP_BEFORE
+from ..clock import AT_END, NEW, NOW
 from ..loop import BEGIN, ENDED, ENTER, OVERLOOKED, REFUSE, TRY, WITHIN, ending
 from .asked import begin, within
-from .desk import BEFORE, ITERATIONS, NEWTON, ROUGH, START
+from .desk import START
 from .even import account
 from .even import enter as enter_step
 from .hermite import END, V_RATE, V_RATE_END, between
@@ -45,7 +44,7 @@ def prepare(callbacks, S, K, c):
     """Forces and rows where the method begins anew."""
     weigh, push, rows_to = callbacks[3], callbacks[6], callbacks[10]
     weigh(K.v[START], K.p[CARRIED], S)
-    push(c.real[T], c.y[NOW], K.lam[START], K.f[HERE], S)
+    push(c.real.t, c.y[NOW], K.lam[START], K.f[HERE], S)
     rows_to(K.rows[HERE], S)
 
 
@@ -56,7 +55,7 @@ def attempt(callbacks, S, K, c, h):
     at = c.y.shape[1] - nz - nv
     for i in range(nv):
         K.v[START, i] = c.y[NOW, at + i]
-    if K.count[BEFORE] == 0:
+    if K.count.before == 0:
         prepare(callbacks, S, K, c)
     for i in range(nz):
         K.z[START, i], K.rate[START, i] = c.y[NOW, at + nv + i], c.K[0, at + nv + i]
@@ -101,8 +100,8 @@ def go(callbacks, S, K, c, h):
         compose(c.y[NOW], K.d[END], K.v[START], K.z[END], c.y[NEW], S)
         if nr == 0:
             return 0
-        worst = place(c.real[T] + h, c.y[NEW], K.g, S)
-        if worst <= K.real[NEWTON] or (worst > STALLED * last and worst <= K.real[ROUGH]):
+        worst = place(c.real.t + h, c.y[NEW], K.g, S)
+        if worst <= K.real.newton or (worst > STALLED * last and worst <= K.real.rough):
             return 0
         if not worst < 1e3:
             return NOT_CLOSED
@@ -111,7 +110,7 @@ def go(callbacks, S, K, c, h):
         if not better(K.steps, at):
             return NOT_CLOSED
         pull(K.rows[HERE], K.steps[at], 1.0 / h, K.p[FREE], S)
-        K.count[ITERATIONS] += 1
+        K.count.iterations += 1
         last = worst
     return NOT_CLOSED
 
@@ -150,7 +149,7 @@ def land(callbacks, S, K, c, h):
     nv = K.v.shape[1]
     at = c.y.shape[1] - K.z.shape[1] - nv
     speed(K.p[ARRIVING], c.y[NEW, at : at + nv], S)
-    push(c.real[T] + h, c.y[NEW], K.lam[START], K.f[TRIAL], S)
+    push(c.real.t + h, c.y[NEW], K.lam[START], K.f[TRIAL], S)
     last = 1e300
     for n in range(MOST):
         size = 0.0
@@ -159,10 +158,10 @@ def land(callbacks, S, K, c, h):
             size = max(size, abs(K.p[FREE, i]), 0.5 * h * abs(K.f[TRIAL, i]))
         speed(K.p[FREE], c.y[NEW, at : at + nv], S)
         seen(K, c, 0 if n == 0 else 1)
-        status, _ = arrive(c.real[T] + h, c.y[NEW], c.K[1], S, K)
+        status, _ = arrive(c.real.t + h, c.y[NEW], c.K[1], S, K)
         if status != 0:
             return status
-        push(c.real[T] + h, c.y[NEW], K.found, K.f[THERE], S)
+        push(c.real.t + h, c.y[NEW], K.found, K.f[THERE], S)
         change = 0.0
         for i in range(nv):
             x = 0.5 * h * abs(K.f[THERE, i] - K.f[TRIAL, i])
@@ -199,8 +198,8 @@ def enter(K, c):
         K.rows[HERE, e] = K.rows[THERE, e]
     for r in range(K.lam.shape[1]):
         K.lam[START, r] = K.found[r]
-    K.count[BEFORE] = 1
-    c.real[STEP_BEFORE] = c.real[T]
+    K.count.before = 1
+    c.real.before = c.real.t
     enter_step(c, ending(c))
 
 
@@ -209,8 +208,8 @@ def answer(callbacks, S, K, c, task):
     """What the `loop` asks of the method: as `asked.answer`."""
     compose, arrive, inspect = callbacks[0], callbacks[1], callbacks[2]
     if task == TRY:
-        c.count[EXTENDED], c.real[ERROR] = 0, 0.0
-        return attempt(callbacks, S, K, c, c.real[TRIED])
+        c.count.extended, c.real.error = 0, 0.0
+        return attempt(callbacks, S, K, c, c.real.tried)
     if task == WITHIN:
         return within(between, compose, S, K, c)
     if task == ENTER:
@@ -219,7 +218,7 @@ def answer(callbacks, S, K, c, task):
     if task == REFUSE:
         return 1
     if task == OVERLOOKED or task == ENDED:
-        inspect(c.real[T], c.real[TRIED], c.real[SPAN], AT_END, c.seen, S, K)
+        inspect(c.real.t, c.real.tried, c.real.span, AT_END, c.seen, S, K)
         return 0
     if task == BEGIN:
         return begin(arrive, inspect, S, K, c)

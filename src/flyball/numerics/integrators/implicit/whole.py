@@ -9,9 +9,7 @@ from __future__ import annotations
 from ....compiler.formulas import formula
 from ....math.scalar import sqrt
 from ...lu import lu_factor, lu_solve, times
-from ..clock import T
 from .coefficients import GAMMA, INVERSE, C
-from .desk import CORRECTION, NEWTON, ROUGH, SHARED, WHOLE
 from .step import STAGES, account, lead, rates, share
 
 MOST = 12
@@ -44,7 +42,7 @@ def solve_whole(K, h):
     for i in range(n):
         x[1, i] = x[0, i]
     lu_solve(K.whole_P, K.whole_L, K.whole_U, K.whole_D, x[0])
-    for _ in range(REFINED if K.count[SHARED] == 0 else 0):
+    for _ in range(REFINED if K.count.shared == 0 else 0):
         times(K.whole_P, K.whole_A, x[0], x[2])
         for e in range(K.whole_put.shape[0]):
             if K.whole_put[e, 3] == SOFT:
@@ -95,21 +93,21 @@ def settle_whole(callbacks, S, K, c, h):
     for n in range(MOST):
         rates(K, h)
         for k in range(STAGES):
-            t = c.real[T] + C[k] * h
+            t = c.real.t + C[k] * h
             if residual(t, k, S, K, c) != 0 or linearise(t, k, S, K, c) != 0:
                 return 1, moved
         share(K, h)
         fill_whole(K, h)
         if lu_factor(K.whole_P, K.whole_A, K.whole_L, K.whole_U, K.whole_D, K.whole_Y) != 0:
             return 1, moved
-        K.real[CORRECTION] = size = correct_whole(K, h)
-        K.count[WHOLE] += 1
+        K.real.correction = size = correct_whole(K, h)
+        K.count.whole += 1
         moved = size if n == 0 else moved
         if not size < 1e300 or (n > 1 and size > AGAIN * last):
             return 1, moved
-        if size <= K.real[NEWTON] or (n > 0 and size * size / last <= K.real[NEWTON] and size < 0.1 * last):
+        if size <= K.real.newton or (n > 0 and size * size / last <= K.real.newton and size < 0.1 * last):
             return 0, moved
-        if n > 2 and 0.5 * last < size <= K.real[ROUGH]:
+        if n > 2 and 0.5 * last < size <= K.real.rough:
             return 0, moved
         last = size
     return 1, moved
@@ -121,7 +119,7 @@ def iterate_whole(callbacks, S, K, c, h):
     more = lead(K, 0)
     status, moved = settle_whole(callbacks, S, K, c, h)
     pass_ = 0
-    while status == 0 and more and (pass_ == 0 or moved > K.real[NEWTON]):
+    while status == 0 and more and (pass_ == 0 or moved > K.real.newton):
         pass_ += 1
         more = lead(K, pass_)
         status, moved = settle_whole(callbacks, S, K, c, h)
