@@ -98,7 +98,7 @@ def tables(x: Values) -> Tables:
     scaled = "scale of inverse" if X.excess_inertia.any() else "inverse"
     out |= {scaled: X.inverse_inertia, "scale of excess": X.excess_inertia}
     out |= {"scale": np.r_[X.inverse_reference_inertia, S.length], "gravity": S.gravity}
-    out |= {"places": S.frames.position, "axes": S.frames.rotation}
+    out |= {"frames": np.column_stack([S.frames.position, S.frames.rotation])}
     out |= {name: getattr(S, name) for name in ("term_parameters", "force_parameters", "const")}
     return out | {"q": x.q, "v": x.v}
 

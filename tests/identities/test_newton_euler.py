@@ -13,7 +13,6 @@ from flyball.equations.tree import column
 from flyball.math.vec import dot
 from flyball.tables.spanning import spanning
 from flyball.tables.structure import Choices, structure
-from flyball.tables.system import FRAMES, GROUND_FRAMES
 from tests.contract.zoo import CASES
 from tests.examples.test_examples import FILES, mechanism
 from tests.identities.test_joint_layer import PARTS, coupled, with_joint
@@ -147,4 +146,4 @@ def test_frames_that_are_kept_up_to_date_exist(case):
     m = MORE[case]().snapshot()
     for tree in ((), spanning(m)):
         t = structure(m, Choices(tree=tree)).tables
-        assert t["kinds"][GROUND_FRAMES] <= t["kinds"][FRAMES] <= len(t["frame_i"])
+        assert t["sizes"].ground_frames <= t["sizes"].moving_frames <= len(t["frame_body"])

@@ -78,7 +78,7 @@ class Compiled:
     def scratch(self) -> PooledBuffer:
         """The same as compiled code has it."""
         made = scratch(self.structure, self.system, self.system.const.dtype)
-        made.array("options.stabilization")[0], made.array("options.solve_tolerance")[0] = NONE, 1e-13
+        made.array("options").stabilization, made.array("options").solve_tolerance = NONE, 1e-13
         return made
 
     def array(self, name: str) -> np.ndarray:

@@ -163,7 +163,7 @@ def moved(
     sampled = sampled_laws(c, known)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o, sampled)
     later = not watched(begun) and open_until_asked(begun, o, task)
-    c.array("options.deferred")[0] = float(later)
+    c.array("options").deferred = float(later)
     here = Here(begun, clock)
     if task == INTEGRATE and (o.method in IMPLICIT or watched(begun) or len(known.times) or c.structure.sampled):
         rows, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
@@ -242,9 +242,9 @@ def clock_for(
     count.controlled, count.positions = s.nq + s.nv + len(s.controls) - len(s.sampled), s.nq
     Y = np.zeros((ex.STATES, len(y)))
     Y[0] = y
-    array("options.stabilization")[0] = STABILIZATION[o.stabilization]
-    array("options.alpha")[0], array("options.beta")[0] = o.alpha or 0.0, o.beta or 0.0
-    array("options.solve_tolerance")[0] = 1e-13
+    array("options").stabilization = STABILIZATION[o.stabilization]
+    array("options").alpha, array("options").beta = o.alpha or 0.0, o.beta or 0.0
+    array("options").solve_tolerance = 1e-13
     nothing = sampled is not None and not sampled and not breaking(a.compiled.values.system)
     seen = np.zeros((ROWS, 0)) if nothing else kept(a.compiled.values.system, sampled)
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
@@ -260,7 +260,7 @@ def size(clock: ex.Clock, base: Assembly, c: Compiled, atol: float) -> None:
     energy = energy_size(base, float(real.span))
     found = sizes(c.values.length, atol, real.rtol, energy)
     (real.atol, real.scale, real.ledger), (near, slow) = found
-    c.array("options.position_tolerance")[0], c.array("options.velocity_tolerance")[0] = near, slow
+    c.array("options").position_tolerance, c.array("options").velocity_tolerance = near, slow
 
 
 def sizes(length: float, atol: float, rtol: float, energy: float) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -170,7 +170,7 @@ class StructPool:
     def __init__(self, fields: Any, constant: Sequence[np.ndarray] = ()) -> None:
         self._new, self._shared = fields, {id(x) for x in constant}
         self._size, places = 0, list[int]()
-        self._laid: list[tuple[tuple[int, ...], Any, int]] = []
+        self._laid: list[tuple[tuple[int, ...], Any, int, type[np.ndarray]]] = []
         self._named: dict[str, int] = {}
         self._lay(fields, 0, places)
         self.places = np.array(places, np.int64)
@@ -181,7 +181,7 @@ class StructPool:
                 mine[...] = new
         buffer = StructBuffer(filled)
         self.words, self.layout = buffer.words, buffer.layout
-        self.words[self.places] = [begin for _, _, begin in self._laid]
+        self.words[self.places] = [begin for _, _, begin, _ in self._laid]
 
     def new(self) -> PooledBuffer:
         """A tuple of one's own."""
@@ -193,8 +193,8 @@ class StructPool:
 
     def named(self, name: str, block: np.ndarray) -> np.ndarray:
         """One of the tuple's own arrays in a block: see `PooledBuffer.array`."""
-        shape, dtype, begin = self._laid[self._named[name]]
-        return np.ndarray(shape, dtype, block, begin)
+        shape, dtype, begin, of = self._laid[self._named[name]]
+        return np.ndarray(shape, dtype, block, begin).view(of)
 
     def _lay(self, fields: Any, at: int, places: list[int], of: str = "") -> int:
         """Decide where arrays begin in the block, and which words hold their addresses."""
@@ -205,12 +205,12 @@ class StructPool:
             if id(x) not in self._shared:
                 self._named[of + name] = len(places)
                 places.append(at + DATA // 8)
-                self._laid.append((x.shape, x.dtype, self._size))
+                self._laid.append((x.shape, x.dtype, self._size, type(x)))
                 self._size += -(-x.nbytes // EVEN) * EVEN
             at += (HEAD + DIMENSION * x.ndim) // 8
         return at
 
-    def _filled(self, fields: Any, block: np.ndarray, laid: Iterator[tuple[tuple[int, ...], Any, int]]) -> Any:
+    def _filled(self, fields: Any, block: np.ndarray, laid: Iterator[tuple[tuple[int, ...], Any, int, type[np.ndarray]]]) -> Any:
         made: list[Any] = []
         for x in fields:
             if isinstance(x, tuple):
@@ -218,8 +218,8 @@ class StructPool:
             elif id(x) in self._shared:
                 made.append(x)
             else:
-                shape, dtype, begin = next(laid)
-                made.append(np.ndarray(shape, dtype, block, begin).view(type(x)))
+                shape, dtype, begin, of = next(laid)
+                made.append(np.ndarray(shape, dtype, block, begin).view(of))
         return type(fields)(*made)
 
 
