@@ -92,9 +92,9 @@ def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", mo
         (np.zeros((2, 2 * n)), np.zeros(0)),
     )
     real, count = ex.ClockReals.blank(), ex.ClockCounts.blank()
-    real[[ex.T_END, ex.RTOL, ex.ATOL, ex.SPAN, ex.SCALE, ex.LARGEST]] = t_end, rtol, 1e-2 * rtol, t_end, 1.0, t_end
+    real.t_end, real.rtol, real.atol, real.span, real.scale, real.largest = t_end, rtol, 1e-2 * rtol, t_end, 1.0, t_end
     real.h_max = min(h_max, t_end)
-    count[[ex.QUOTA, ex.LIMIT, ex.CONTROLLED]] = 1000, most, 2 * n
+    count.quota, count.limit, count.controlled = 1000, most, 2 * n
     Y = np.zeros((ex.STATES, 2 * n))
     Y[0] = y
     K = np.zeros((len(R.c) + 1, 2 * n))

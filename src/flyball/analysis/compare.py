@@ -358,6 +358,6 @@ def _costs(job: _Task, rows: list[Formulation], starts: Mapping[str, Start], tel
             spent[f.name].append(seconds)
             counts = start.assembly.compiled.work.counts
             f.steps, f.rejected = int(clock.count.accepted), int(clock.count.rejected)
-            f.evaluations, f.factorisations = int(counts.evaluations[0]), int(counts.factorisations[0])
-            f.exchanges = int(counts.exchanges[0])
+            f.evaluations, f.factorisations = int(counts.evaluations), int(counts.factorisations)
+            f.exchanges = int(counts.exchanges)
             f.cpu = float(np.median(spent[f.name]))

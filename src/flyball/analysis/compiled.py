@@ -81,20 +81,18 @@ class Compiled:
         made.array("options").stabilization, made.array("options").solve_tolerance = NONE, 1e-13
         return made
 
-    def array(self, name: str) -> np.ndarray:
+    def array(self, name: str) -> Any:
         """An array of the scratch, without the others."""
         return self.scratch.array(name)
 
+    @property
+    def buffers(self) -> tuple[Any, Any]:
+        """The tables and the scratch as kernels take them: a System and a Work that need not be described again."""
+        return tables(self.structure, self.system), self.scratch
+
     def bound(self, R: Tableau, clock: Clock, out: np.ndarray) -> BoundKernel:
         """The engine bound to the tables and the scratch that are its own now; as `engine.motion_kernel` else."""
-        tuples = (
-            tables(self.structure, self.system),
-            self.scratch,
-            StructBuffer(R),
-            StructBuffer(clock),
-            StructBuffer(Sheet(out)),
-        )
-        return BoundKernel(engine, *tuples)
+        return BoundKernel(engine, *self.buffers, StructBuffer(R), StructBuffer(clock), StructBuffer(Sheet(out)))
 
     @property
     def structure(self) -> Structure:
@@ -121,7 +119,7 @@ class Compiled:
         if len(q) != s.nq or len(v) != s.nv:  # compiled code would read beyond them
             raise ValueError(f"the state has {len(q)} + {len(v)} numbers; these coordinates have {s.nq} + {s.nv}")
         y = np.concatenate([q, v, self.z])
-        out = evaluate(tables(s, self.system), self.scratch, float(t), y, task)  # type: ignore[arg-type]  # as buffers
+        out = evaluate(*self.buffers, float(t), y, task)
         z = y[len(q) + len(v) :]
         if np.isfinite(z).all():
             self.z = z

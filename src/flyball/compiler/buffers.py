@@ -151,7 +151,7 @@ class PooledBuffer(StructBuffer):
         """The tuple of arrays."""
         return self._pool.fill(self._block)
 
-    def array(self, name: str) -> np.ndarray:
+    def array(self, name: str) -> Any:
         """One of its arrays, without the others; of a tuple in it ``"inner.name"``."""
         return self._pool.named(name, self._block)
 
@@ -210,7 +210,9 @@ class StructPool:
             at += (HEAD + DIMENSION * x.ndim) // 8
         return at
 
-    def _filled(self, fields: Any, block: np.ndarray, laid: Iterator[tuple[tuple[int, ...], Any, int, type[np.ndarray]]]) -> Any:
+    def _filled(
+        self, fields: Any, block: np.ndarray, laid: Iterator[tuple[tuple[int, ...], Any, int, type[np.ndarray]]]
+    ) -> Any:
         made: list[Any] = []
         for x in fields:
             if isinstance(x, tuple):

@@ -161,11 +161,11 @@ def _halfway(a: Assembly, clock: ex.Clock, known: np.ndarray, pieces: np.ndarray
     c = a.compiled
     own = ex.Clock(real.copy(), count.copy(), times, y.copy(), K.copy(), accounts, seen)
     own.y[0] = first[1 : 1 + clock.y.shape[1]]
-    own.real[[ex.T, ex.T_END]] = first[0], times[-1]
-    own.count[[ex.STARTED, ex.NEXT, ex.ACCEPTED, ex.REJECTED, ex.STATUS]] = 0
+    own.real.t, own.real.t_end = first[0], times[-1]
+    own.count.started = own.count.next = own.count.accepted = own.count.rejected = own.count.status = 0
     own.count.quota = own.count.limit = CALLS
     rows = []
     while own.count.status == ex.RUNNING:
-        used = motion_kernel(c.system, c.work, tableau("rk45"), own, out, FOLLOW)
+        used = motion_kernel(*c.buffers, tableau("rk45"), own, out, FOLLOW)
         rows.append(out[:used].copy())
     return np.concatenate(rows)[1:]

@@ -121,10 +121,10 @@ class Implicit:
             out.append(Bench(t, y, vdot, lam, steps, found))
         return out[0], out[1], out[2]
 
-    def _settle(self, real: np.ndarray, turns: bool) -> None:
+    def _settle(self, real: ds.SolverReals, turns: bool) -> None:
         """Put the tolerances of a run, and what it counts by, on its desk."""
         x, count, step = self.layout, self.count, float(self.clock.real.step)
-        rtol, atol = self.clock.real[[ex.RTOL, ex.ATOL]].tolist()
+        rtol, atol = float(self.clock.real.rtol), float(self.clock.real.atol)
         own = 0.1 * rtol ** (2.0 / 3.0) if step == 0.0 else rtol
         near = min(0.03, own**0.5) if step == 0.0 else 0.01
         real.rtol, real.atol = own, own * atol / rtol
