@@ -6,7 +6,7 @@ import numpy as np
 
 from ....equations.alpha import AlphaMeans, AlphaWorkshop, alpha_steps
 from ....numerics.integrators import clock as ex
-from ....numerics.integrators.implicit.desk import AlphaDesk
+from ....numerics.integrators.implicit.desk import AlphaDesk, SolverReals
 from ...compiled import Compiled
 from .loop import EPS, Implicit
 
