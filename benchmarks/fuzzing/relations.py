@@ -158,7 +158,8 @@ def own_error(b: Base, name: str, seed: int) -> np.ndarray:
     """By how much motions may differ that are not determined any closer, relative as in `difference`.
 
     That is anything where joints hold a structure that is all but free to move; else the difference that a tighter
-    tolerance makes to the motion, and to that by the other way. It is asked for where motions differ.
+    tolerance makes to the motion, and to that by the other way, if the same happens. It is asked for where motions
+    differ.
     """
     if firmness(b.mechanism) < HOLD / AGREE:
         return np.full(len(b.run.t), np.inf)
@@ -167,14 +168,16 @@ def own_error(b: Base, name: str, seed: int) -> np.ndarray:
     if name != "halves":
         ways.append(lambda x: RELATIONS[name](x, random.Random(f"{name} {seed}")))
     for way in ways:
-        states = []
+        runs, states = [], []
         for more in ({}, {k: v for k, v in TIGHT.items() if k not in b.options}):
             try:
                 run, m, back = way(dataclasses.replace(b, options=b.options | more))
             except fb.FlyballError:
                 break
+            runs.append(run)
             states.append(back(state(run, m)) if back else state(run, m))
-        if len(states) == 2 and all(len(v) == len(out) for x in states for v in x.values()):
+        whole = len(runs) == 2 and all(len(x.t) == len(out) for x in runs)
+        if whole and not _happened(dataclasses.replace(b, run=runs[0]), runs[1], len(out)):
             out = np.maximum(out, np.maximum.accumulate(difference(*states, size)[0]))
     return MARGIN * out
 
