@@ -166,3 +166,19 @@ def test_a_stop_that_a_force_begins_to_press_stays_closed(method):
     r = m.simulate(1.3, outputs=3, method=method, rtol=1e-9, atol=1e-11)
     assert [e.kind for e in r.events] == ["close", "open"]
     assert r.events.t == pytest.approx([1.021894743, turns], abs=1e-9)
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk45", "radau"])
+def test_a_rate_that_begins_at_zero_where_a_law_has_a_corner_passes_it_once(method):
+    """A torque of 0.01 N m turns it until the brake stops it, where 0.01 t = (2 / 9) (1 - cos 9 t).
+
+    The corner of the capacity at t = 0 makes the first step so short that angles tell nothing of rates.
+    """
+    m = fb.Mechanism("braked", gravity=(0, 0, 0))
+    m.add(fb.Body("b", mass=1, inertia=[0.02] * 3, position=(0.1, -0.35, 0.19), orientation=(-0.8, -0.37, 0.64)))
+    m.add(fb.Revolute("R", "ground", "b", at=(0.106, -0.362, 0.209), axis=(-0.54, 0.84, 0.001)))
+    m.add(fb.Motor("push", "R", torque=0.01), fb.Brake("brake", "R.angle", capacity="2*abs(sin(9*t))"))
+    m.add(fb.Event("e", "R.angle_rate", direction="either"))
+    stop = brentq(lambda t: 0.01 * t - 2 / 9 * (1 - np.cos(9 * t)), 1e-4, 1e-2, xtol=1e-15)
+    r = m.simulate(0.01, outputs=3, method=method, rtol=1e-9, atol=1e-11)
+    assert r.events["e"].t == pytest.approx([stop], abs=1e-9)

@@ -28,8 +28,8 @@ PANEL, WIDTH, SAME, DONE_TO, BEYOND, BRACKET, STRAYED, LATEST, FASTEST, REAL = r
 # be found; steps watched; places looked at; steps taken again; events; whether what is expected within it is borne
 # out; places looked at with the equations since it was taken, and in all; whether they could not be evaluated at one;
 # times that a step was cut since it could not be looked through; whether a guard leaves the side that it has to keep;
-# terms of the last guard, that of a group: see `concave`
-STAGE, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, TERMS, COUNT = range(14)
+# terms of the last guard, that of a group: see `concave`; whether the step is so short that only rates tell of rates
+STAGE, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, TERMS, BRIEF, COUNT = range(15)
 UNKNOWN = 2.0  # a side that follows from the value where the next step begins
 EVENT = 6  # a status beside those of the clock: the step ends on events, told in Watch.fired
 

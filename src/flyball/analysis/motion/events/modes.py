@@ -138,8 +138,8 @@ def solved(n: Instant, parts: list[Part], *, company: bool = False) -> Decided:
     rounding = P.grain * np.minimum(1.0 / np.maximum(P.A.diagonal(), 1e-300), n.inertia[B.which])
     sizes, least = ({p.switch: float(z) for p, z in zip(parts, of, strict=True)} for of in (terms, rounding))
     return Decided(
-        parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, least, P.A.copy(), P.gain.copy(),
-        company and bool(resting.any()),
+        parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, least, P.A.copy(),
+        P.gain.copy(), company and bool(resting.any()),
     )  # fmt: skip
 
 
