@@ -47,7 +47,7 @@ def test_what_was_found_is_right(family, seed):
 
 WAYS = [  # and the other way in which it was; none: by a judge of one motion
     *(("happenings", 200034, "coordinates"), ("happenings", 500069, "axes"), ("couplings", 500030, "rk45")),
-    *(("sticking", 300046, "axes"), ("shaken", 500066, "radau"), ("shaken", 500092, "axes")),
+    *(("happenings", 700023, "coordinates"), ("sticking", 300046, "axes"), ("shaken", 500066, "radau"), ("shaken", 500092, "axes")),
     *(("sampled", 500011, "radau"), ("parallel_cranks", 500084, "coordinates"), ("parallel_cranks", 500084, "radau")),
     *(("windows", 500008, ""), ("windows", 500086, ""), ("stiff", 500049, ""), ("stiff", 500033, ""), ("sliding", 500023, "")),
 ]  # fmt: skip
