@@ -235,7 +235,7 @@ def main() -> None:
             c = start.assembly.compiled
             c.at(0.0, start.assembly.q, start.assembly.v, MOTION)
             S, W = c.values.system, c.work
-            W.options.stabilize, W.options.tol_g, W.options.tol_v = STAGES, 1e-10, 1e-9
+            W.options.stabilization, W.options.position_tolerance, W.options.velocity_tolerance = STAGES, 1e-10, 1e-9
             nq, nv = c.structure.nq, c.structure.nv
             ns = times(S, W, start.y, nq, nv)
             bytes_ = sum(a.nbytes for T in (S, W) for a in T if hasattr(a, "nbytes")) + sum(a.nbytes for a in S.ldl)

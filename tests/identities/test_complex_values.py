@@ -327,7 +327,7 @@ def test_held_coordinates_may_be_complex():
     hold = fb.Initial("A.angle", value=0.1)
     m.add(hold)
     s = structure(m, Choices(holds=(hold,)))
-    terms = values(s, None, {"A.angle": 0.1 + 1j * STEP}).system.term_x
+    terms = values(s, None, {"A.angle": 0.1 + 1j * STEP}).system.term_parameters
     k = next(k for k, t in enumerate(s.terms) if t.element is hold)
     assert terms[k, 6] == pytest.approx(0.1 + 1j * STEP, rel=1e-12)
     assert terms[k, 6].imag == STEP

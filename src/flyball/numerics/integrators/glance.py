@@ -56,6 +56,7 @@ def compare(look, S, W, t, h, span):
     ng = W.way.shape[0]
     W.count.sought = W.count.lost = 0
     W.count.plain = 1
+    W.count.brief = 1 if h <= SHORT * span else 0
     every = ng + W.count.terms
     for i in range(every):
         W.g[LEAST, i] = min(W.g[START, i], W.g[END, i])
@@ -72,7 +73,7 @@ def compare(look, S, W, t, h, span):
             W.g[LEAST, i] = min(W.g[LEAST, i], f, g)
             W.g[MOST, i] = max(W.g[MOST, i], f, g)
             W.g[MISS, i] = max(W.g[MISS, i], abs(f - g))
-    if h <= SHORT * span:
+    if W.count.brief == 1:
         W.count.plain = 1
         return
     for i in range(ng):

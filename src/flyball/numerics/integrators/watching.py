@@ -53,6 +53,7 @@ class WatchCounts(Record, kind="Int"):
     cuts: int  # times that a step was cut since it could not be looked through
     away: int  # whether a guard leaves the side that it has to keep
     terms: int  # of the last guard, that of a group: see `concave`
+    brief: int  # whether the step is so short that only rates tell of rates
 
 
 class Watch(NamedTuple):
@@ -62,6 +63,7 @@ class Watch(NamedTuple):
     kept: Int1  # (ng,): 1 of those that are above zero by what holds now
     firm: Int1  # (ng,): 1 of those that get no farther below zero by rounding than they begin
     grain: Float1  # (ng,): what is rounding of them; of those that may be anything, the less of both ends
+    least: Float1  # (ng,): force that is rounding, of guards of forces; 0 of the rest
     tied: Float1  # (ng,): size of what those are of that others keep at zero; 0 of the rest
     still: Float1  # (nm,): size of rates that others keep at zero; 0 of the rest
     side: Float1  # (ng,): 1 where the guard is above zero, -1 below; as a segment begins 0 if it has just fired
@@ -167,6 +169,7 @@ def watching(
         kept=(np.asarray(holding) > 0).astype(np.int64),
         firm=(np.asarray(holding) > 1).astype(np.int64),
         grain=np.zeros(ng),
+        least=np.zeros(ng),
         tied=np.zeros(ng),
         still=np.zeros(measured),
         side=np.full(ng, UNKNOWN),
