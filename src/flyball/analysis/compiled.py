@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import gc
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -29,7 +31,6 @@ from ..tables.specs import Structure
 from ..tables.structure import Choices, structure
 from ..tables.system import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, System, Work
 from ..tables.values import Values, values
-from .uncollected import uncollected
 
 
 @dataclass
@@ -326,3 +327,18 @@ def places(x: Values) -> np.ndarray:
         if (name := f"{e.name}.place") in s.state_at:
             z[s.state_at[name]] = e.nearest(x.numbers[e.name], *x.poses.ends(e))[0]  # type: ignore[attr-defined, arg-type]
     return z
+
+
+# Python's collector of cycles, kept away while very many objects are made that stay.
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """No collection in here, where it would look through a large mechanism's objects time and again and free none."""
+    before = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if before:
+            gc.enable()
