@@ -3,11 +3,12 @@
 Small kernels in processes of their own; what is compiled for a whole motion is `test_added_elements`'.
 """
 
+import os
 from pathlib import Path
 
 import pytest
 
-from flyball.compiler import sources
+from flyball.compiler import sources, store
 from flyball.compiler.sources import PACKAGE, sources_of
 from flyball.equations.engine import engine
 from flyball.equations.residual import stepped
@@ -53,6 +54,20 @@ def test_stamps_see_every_way_to_import(tmp_path, monkeypatch):
     elsewhere = tmp_path.parent / "loop.py"
     elsewhere.write_text("")
     assert sources.compiled_files() < set(sources.sources_of(elsewhere))
+
+
+def test_the_files_used_longest_ago_are_removed(tmp_path, monkeypatch):
+    """Beyond so many bytes; whatever else is in the folder stays."""
+    monkeypatch.setattr(store, "MOST", 250)
+    other = tmp_path / "mine.o"
+    other.write_bytes(bytes(1000))
+    files = [tmp_path / f"kernel-{k:024x}.o" for k in range(4)]
+    for k, path in enumerate(files):
+        path.write_bytes(bytes(100))
+        os.utime(path, (k, k))
+    store.touch(files[1])
+    store.remove_oldest(tmp_path)
+    assert sorted(tmp_path.iterdir()) == [files[1], files[3], other]
 
 
 FACTOR = """

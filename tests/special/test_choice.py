@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import flyball as fb
 from flyball.analysis.motion import engines
-from flyball.analysis.motion.account import Account
+from flyball.analysis.motion.engines import Account
 from flyball.cli import app
 from flyball.special import Refused
 from flyball.tables.system import FINISH

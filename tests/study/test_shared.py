@@ -12,8 +12,7 @@ import flyball as fb
 from flyball import forces
 from flyball.analysis.motion.choice import SimulateOptions
 from flyball.analysis.runs.compute import Question, compute
-from flyball.analysis.runs.lean import Lean
-from flyball.analysis.runs.readable import of_states
+from flyball.analysis.runs.lean import Lean, of_states
 from flyball.analysis.runs.reading import readings
 from flyball.analysis.runs.runner import runner
 from flyball.analysis.runs.single import Motion

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import gc
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -29,7 +31,6 @@ from ..tables.specs import Structure
 from ..tables.structure import Choices, structure
 from ..tables.system import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, System, Work
 from ..tables.values import Values, values
-from .uncollected import uncollected
 
 
 @dataclass
@@ -87,16 +88,14 @@ class Compiled:
         """An array of the scratch, without the others."""
         return self.scratch.array(name)
 
+    @property
+    def buffers(self) -> tuple[Any, Any]:
+        """The tables and the scratch as kernels take them: a System and a Work that need not be described again."""
+        return tables(self.structure, self.system), self.scratch
+
     def bound(self, R: Tableau, clock: Clock, out: np.ndarray) -> BoundKernel:
         """The engine bound to the tables and the scratch that are its own now; as `engine.motion_kernel` else."""
-        tuples = (
-            tables(self.structure, self.system),
-            self.scratch,
-            StructBuffer(R),
-            StructBuffer(clock),
-            StructBuffer(Sheet(out)),
-        )
-        return BoundKernel(engine, *tuples)
+        return BoundKernel(engine, *self.buffers, StructBuffer(R), StructBuffer(clock), StructBuffer(Sheet(out)))
 
     @property
     def structure(self) -> Structure:
@@ -123,7 +122,7 @@ class Compiled:
         if len(q) != s.nq or len(v) != s.nv:  # compiled code would read beyond them
             raise ValueError(f"the state has {len(q)} + {len(v)} numbers; these coordinates have {s.nq} + {s.nv}")
         y = np.concatenate([q, v, self.z])
-        out = evaluate(tables(s, self.system), self.scratch, float(t), y, task)  # type: ignore[arg-type]  # as buffers
+        out = evaluate(*self.buffers, float(t), y, task)
         z = y[len(q) + len(v) :]
         if np.isfinite(z).all():
             self.z = z
@@ -328,3 +327,18 @@ def places(x: Values) -> np.ndarray:
         if (name := f"{e.name}.place") in s.state_at:
             z[s.state_at[name]] = e.nearest(x.numbers[e.name], *x.poses.ends(e))[0]  # type: ignore[attr-defined, arg-type]
     return z
+
+
+# Python's collector of cycles, kept away while very many objects are made that stay.
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """No collection in here, where it would look through a large mechanism's objects time and again and free none."""
+    before = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if before:
+            gc.enable()

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numbers
 import threading
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from ..errors import AnalysisError, ModelError
 from ..laws.evaluation import evaluate_jet
 from ..laws.functions import fault
 from ..model.body import GROUND, Frame
+from ..model.model import Model
 from ..results.records import TURN
 from ..results.result import Result
 from ..tables.names import velocity_names
@@ -27,7 +29,9 @@ from ..tables.points import points
 from ..tables.system import BODY_LAW, EFFORT, F_APPLIED, G_VALUE, LAM, NU, NV, OFFSET, PARENT, Q0, V0, X_SOLVED
 from .assembly.start import Assembly
 from .compiled import Compiled, compiled
-from .motion.start import Start
+from .motion.start import Start, begin
+from .options import Options
+from .untouched import SLIDING, refuse_contact
 
 
 class Prepared:
@@ -318,3 +322,17 @@ class Prepared:
         body = c.values.bodies[e.body if isinstance(e, Frame) else name]
         b = c.structure.place[e.body if isinstance(e, Frame) else name]
         return b, body.R.T @ (p - body.c), body.R.T @ R
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrepareOptions(Options):
+    """What `Mechanism.prepare` is asked."""
+
+    coordinates: str
+    parameters: Mapping[str, float] | None
+
+
+def prepare(model: Model, o: PrepareOptions) -> Prepared:
+    """A mechanism made ready: see `Mechanism.prepare`."""
+    refuse_contact(model, "prepare", SLIDING)
+    return Prepared(begin(model.snapshot(), 0.0, o.parameters, None, o.coordinates))

@@ -22,9 +22,10 @@ from .notice import announce, note_compiled
 from .sources import PACKAGE
 
 MARK = b"flyball object code 1\n"
+DIGITS = 24  # of the hash in the name of a file
 SHIPPED = PACKAGE / "objects"
 """Object code that came with this installation."""
-KEPT = 400  # files in the user's folder
+MOST = 500_000_000  # bytes of all files in the user's folder; those used last stay
 
 
 class Loaded(NamedTuple):
@@ -38,7 +39,10 @@ class Loaded(NamedTuple):
 def code_of(kernel: Any) -> Loaded:
     """The code of a kernel: found, or compiled now and kept."""
     for origin, folder in folders():
-        if (code := read(folder / file_name(kernel, baseline()))) is not None:
+        path = folder / file_name(kernel, baseline())
+        if (code := read(path)) is not None:
+            if origin == "cache":
+                touch(path)
             with contextlib.suppress(RuntimeError):  # LLVM's, of code that is none of this machine
                 return _loaded(code, origin)
     with announce(kernel):
@@ -103,7 +107,7 @@ def content_key(kernel: Any, cpu: str) -> str:
     """A hash of all that a kernel's code depends on."""
     layouts = ", ".join(str(x) for x in kernel.parameters)
     text = f"{kernel.name} {kernel.first_order} ({layouts}) {triple()} {cpu} {kernel.content}"
-    return hashlib.sha256(text.encode()).hexdigest()[:24]
+    return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
 
 
 def read(path: Path) -> bytes | None:
@@ -144,6 +148,21 @@ def keep(kernel: Any, code: bytes) -> None:
     except OSError as error:
         warn(f"compiled code cannot be kept in {folder}: {error.strerror}", PerformanceNotice)
         return
-    files = sorted(folder.glob("*.o"), key=lambda path: path.stat().st_mtime)
-    for path in files[:-KEPT]:
-        path.unlink(missing_ok=True)
+    remove_oldest(folder)
+
+
+def touch(path: Path) -> None:
+    """Note that a file of the user's folder is used."""
+    with contextlib.suppress(OSError):
+        path.touch()
+
+
+def remove_oldest(folder: Path) -> None:
+    """Remove the files that were used longest ago, beyond `MOST` bytes; other processes may do the same meanwhile."""
+    total = 0
+    with contextlib.suppress(OSError):
+        found = [(path.stat(), path) for path in folder.glob(f"*-{'[0-9a-f]' * DIGITS}.o")]
+        for status, path in sorted(found, key=lambda x: x[0].st_mtime, reverse=True):
+            total += status.st_size
+            if total > MOST:
+                path.unlink()

@@ -155,7 +155,7 @@ class Motions(Model):
         AssemblyError
             If the mechanism cannot be assembled.
         """
-        from ..analysis.prepare import PrepareOptions, prepare
+        from ..analysis.prepared import PrepareOptions, prepare
 
         return prepare(self, PrepareOptions.asked(locals()))
 

@@ -13,8 +13,7 @@ from ..tables.system import FORCE_F
 from .energy import gained
 from .lag import late, perhaps_late
 from .ledger import Ledger, apart, whole
-from .one_sided import pulls
-from .one_way import one_way
+from .one_sided import one_way, pulls
 from .overturned import overturned, perhaps_overturned
 from .residue import missed
 

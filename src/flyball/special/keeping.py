@@ -1,16 +1,10 @@
-"""Code that has been made: in this process, and on disk beside the engine's, for others.
-
-A file says of itself what it is: a hash of all that follows, what the code needs to know, the object code. One that is
-damaged, or of another version, is as good as none.
-"""
+"""Code that has been made: in this process, and on disk beside the engine's, for others (`compiler.store`)."""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import json
-import os
-import tempfile
 import threading
 import time
 from collections import OrderedDict
@@ -20,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.store import cache_folder
+from ..compiler.store import DIGITS, cache_folder, read, remove_oldest, touch, write
 from ..tables.system import System
 from ..tables.values import Values
 from .machine import Loaded, assembled
@@ -28,9 +22,7 @@ from .made import Made
 from .plan import GROWING, LOADING, LOOKING, MAKING, Plan
 from .trace import Entry, Refused, traced
 
-MARK = b"flyball: code made for one mechanism\n"
-IN_MEMORY, ON_DISK = 64, 200
-"""How many are kept."""
+IN_MEMORY = 64  # codes that a process keeps
 TOLD = ("scratch", "constants", "operations", "laws", "seconds", "known")
 """What a file says of its code."""
 _LOCK = threading.RLock()
@@ -110,7 +102,7 @@ def _made(p: Plan, x: Values) -> Made:
 def digest(S: System, entries: list[Entry]) -> str:
     """Hash of the values of some entries of the tables, to the last bit."""
     values = np.array([getattr(S, name).ravel()[k] for name, k in entries], float)
-    return hashlib.sha256(repr(entries).encode() + values.tobytes()).hexdigest()[:16]
+    return hashlib.sha256(repr(entries).encode() + values.tobytes()).hexdigest()[:DIGITS]
 
 
 def _in_memory(p: Plan, S: System) -> Made | None:
@@ -135,18 +127,18 @@ def _folder() -> Path | None:
 
 def _files(p: Plan) -> list[Path]:
     folder = _folder()
-    return sorted(folder.glob(f"made-{p.key}-*.bin")) if folder is not None else []
+    return sorted(folder.glob(f"made-{p.key}-*.o")) if folder is not None else []
 
 
 def _fitting(p: Plan, S: System) -> Iterator[tuple[dict[str, Any], bytes]]:
     """What files say that may serve a mechanism, and their code."""
     for path in _files(p):
-        if (read := _read(path)) is not None:
-            told, machine_code = read
+        if (data := read(path)) is not None:
+            text, _, machine_code = data.partition(b"\n")
+            told = json.loads(text)
             told["known"] = [(str(name), int(k)) for name, k in told["known"]]
             if path.stem.rpartition("-")[2] == digest(S, told["known"]):
-                with contextlib.suppress(OSError):
-                    path.touch()  # what is used stays: the oldest are pushed out
+                touch(path)
                 yield told, machine_code
 
 
@@ -159,30 +151,11 @@ def _on_disk(p: Plan, S: System) -> Made | None:
     return None
 
 
-def _read(path: Path) -> tuple[dict[str, Any], bytes] | None:
-    """What a file says, and its code; None if it is none of ours or damaged."""
-    try:
-        text = path.read_bytes()
-    except OSError:
-        return None
-    head, sum_of_rest, rest = text[: len(MARK)], text[len(MARK) : len(MARK) + 64], text[len(MARK) + 64 :]
-    if head != MARK or hashlib.sha256(rest).hexdigest().encode() != sum_of_rest:
-        return None
-    told, _, machine_code = rest.partition(b"\n")
-    return json.loads(told), machine_code
-
-
 def _write(p: Plan, of: str, told: dict[str, Any], machine_code: bytes) -> None:
     """Leave it for others; where that cannot be, nothing is lost but time."""
     folder = _folder()
     if folder is None:
         return
-    rest = json.dumps(told).encode() + b"\n" + machine_code
     with contextlib.suppress(OSError):
-        handle, name = tempfile.mkstemp(dir=folder, prefix="made-", suffix=".part")
-        with os.fdopen(handle, "wb") as file:
-            file.write(MARK + hashlib.sha256(rest).hexdigest().encode() + rest)
-        Path(name).replace(folder / f"made-{p.key}-{of}.bin")
-        files = sorted(folder.glob("made-*.bin"), key=lambda path: path.stat().st_mtime)
-        for path in files[:-ON_DISK]:
-            path.unlink()
+        write(folder / f"made-{p.key}-{of}.o", json.dumps(told).encode() + b"\n" + machine_code)
+        remove_oldest(folder)

@@ -166,6 +166,6 @@ def _halfway(a: Assembly, clock: ex.Clock, known: np.ndarray, pieces: np.ndarray
     own.count[ex.QUOTA] = own.count[ex.LIMIT] = CALLS
     rows = []
     while own.count[ex.STATUS] == ex.RUNNING:
-        used = motion_kernel(c.system, c.work, tableau("rk45"), own, out, FOLLOW)
+        used = motion_kernel(*c.buffers, tableau("rk45"), own, out, FOLLOW)
         rows.append(out[:used].copy())
     return np.concatenate(rows)[1:]

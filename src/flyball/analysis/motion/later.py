@@ -52,7 +52,7 @@ def solved(start: Start, rows: np.ndarray, health: Health) -> tuple[np.ndarray, 
     ny = s.nq + s.nv + len(s.states)
     W.option[LATER] = 0.0
     out = rows.copy()
-    if motion_kernel(c.system, W, tableau("rk45"), standing(ny), out, COMPLETE):
+    if motion_kernel(*c.buffers, tableau("rk45"), standing(ny), out, COMPLETE):
         health.remarks = (*health.remarks, unsolved(c, out))
     return np.ascontiguousarray(out[:, 1 + ny : 1 + ny + s.nv]), np.ascontiguousarray(out[:, 1 + ny + s.nv :])
 

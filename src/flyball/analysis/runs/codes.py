@@ -52,6 +52,8 @@ class Code:
         """Which of the runs it is for, (n,)."""
         out = np.ones(len(batch.runs), bool)
         for name, x in batch.base.items():
+            if name not in self.tables:
+                continue
             changed = [p for p in batch.parts if p.name == name]
             alike = np.delete(np.arange(x.size), np.concatenate([p.at for p in changed]) if changed else [])
             out &= self._agree(name, alike, x.ravel()[alike])
@@ -60,7 +62,5 @@ class Code:
         return out
 
     def _agree(self, name: str, at: np.ndarray, x: np.ndarray) -> np.ndarray:
-        if name not in self.tables:
-            return np.True_
         mine, same = (a[at] for a in self.tables[name])
-        return np.where(same, x == mine, ~np.isin(x, PLAIN)).all(axis=-1)
+        return np.asarray(np.where(same, x == mine, ~np.isin(x, PLAIN)).all(axis=-1))

@@ -136,7 +136,7 @@ class Still:
         state = np.concatenate([q, np.zeros_like(v), z], axis=1)
         base, parts = shared_and_own(t, lanes)
         n = len(lanes)
-        batch = Batch(np.arange(n), base, [*parts, Part("y", np.arange(state.shape[1]), state)], t.length, [], [])
+        batch = Batch(np.arange(n), base, [*parts, Part("y", np.arange(state.shape[1]), state)], t.length, [])
         out = np.zeros((n, 1 + len(self._told)), np.int64)
         good[self._track.run(self._track.begin(batch), self._ends, self._told, out) :] = False
         rows, nu, found = np.split(out.view(np.float64)[:, 1:], [self._nr, 2 * self._nr], axis=1)

@@ -13,8 +13,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ...errors import FlyballError
+from ...errors import FlyballError, ModelError
+from ...model.body import Body, Frame
+from ...model.joint import Joint
 from ...model.model import Model
+from ...model.quantities import quantities
+from ...model.sensor import Sensor
 from ...model.touching import nothing_touches
 from ...numerics.integrators.tableaux import TABLEAUX
 from ...results.departure import changed_velocities, not_allowed
@@ -34,7 +38,6 @@ from .compute import Answers, Question, alone
 from .desk import Desk, Done
 from .drawn import Drawn, rests_as_drawn
 from .judged import Judge, Ran
-from .readable import of_states
 from .reading import FUNCTION
 from .soft import Filling, soft
 from .spread import Spread
@@ -176,3 +179,26 @@ class Lean:
                 out.status[k] = WAITING
             else:
                 alone(self.of.question, points[k], out, k)
+
+
+# Quantities that follow from positions and velocities of a motion alone, whatever forces made it.
+
+
+OF_POINTS = ("position", "velocity", "angle", "angular_velocity")
+
+
+def of_states(model: Model, name: str) -> bool:
+    """Whether a curve of a result, by its name, is such a quantity; False where that is not known."""
+    owner, dot, what = name.partition(".")
+    try:
+        e = model[owner]
+    except ModelError:
+        return False
+    if isinstance(e, Sensor) and what in ("", "value"):
+        return isinstance(e.of, str) and e.of.partition(".")[0] != owner and of_states(model, e.of)
+    if not dot or what not in (table := quantities(model, owner)):
+        return False
+    whole = table[what].of or what
+    if isinstance(e, (Body, Frame)):
+        return whole in OF_POINTS
+    return isinstance(e, Joint) and whole.removesuffix("_rate") in e.coordinates

@@ -150,7 +150,7 @@ class Here:
 
     def evaluate(self) -> None:
         """Have kinematics, rows, forces and what is measured at the state of the instant in the scratch."""
-        evaluate(self.c.system, self.c.work, self.t, self.y.copy(), MOTION)
+        evaluate(*self.c.buffers, self.t, self.y.copy(), MOTION)
 
     def names(self) -> dict[str, float]:
         """Values of all that expressions of events may name, at the state last evaluated."""

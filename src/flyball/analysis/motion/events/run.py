@@ -40,21 +40,19 @@ from ..implicit.suited import IMPLICIT, explicit
 from ..later import unsolved
 from ..options import Integration
 from ..part import WEIGHT
+from ..samples import sampling
 from ..stiff import EXPLICIT, NOT_STIFF, STIFF, STRUCK, Pace, on_corner
 from .accumulating import Counts
 from .actions import expressions, say_never, stepped_over, true_already
-from .astray import astray
 from .failed import accumulating, endless
 from .happen import begin, happen
 from .here import Here
 from .idle import tie
 from .instant import instant_of
-from .legs import Legs, breaks
+from .legs import Legs, Pauses, breaks
 from .looked import DISTANCES, told
-from .pauses import Pauses
-from .sampling import sampling
 from .segments import Segments
-from .zeros import as_fired, as_grains, as_left, resume
+from .zeros import as_fired, as_grains, as_left, astray, resume
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events
@@ -118,7 +116,7 @@ class Run:
         if self.stops is None or not self.stops.due(here.t):
             return False
         before = expressions(here)
-        if self.stops.sample(here.c.system, here.c.work, here.clock) != 0:
+        if self.stops.sample(*here.c.buffers, here.clock) != 0:
             here.clock.count[ex.STATUS] = ex.STUCK
             return True
         self.jumped(before)
@@ -251,7 +249,7 @@ class Run:
         """What happens as the motion begins."""
         here, on = self.here, self.here.start.before is not None
         if not on and self.stops is not None and self.stops.due(here.t):
-            self.stops.sample(here.c.system, here.c.work, here.clock)
+            self.stops.sample(*here.c.buffers, here.clock)
         begin(here)
         if isinstance(self.loop, Loop) and self.guarded and on:
             resume(here, self.loop)
@@ -268,9 +266,9 @@ class Run:
         steps = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
         with interrupts_kept(c.structure.functions):
             if self.loop is None and self.sampling is not None:
-                used = self.sampling.go_on(c.system, c.work, clock, self.buffer)
+                used = self.sampling.go_on(*c.buffers, clock, self.buffer)
             elif self.loop is None:
-                used = motion_kernel(c.system, c.work, self.method, clock, self.buffer, INTEGRATE)
+                used = motion_kernel(*c.buffers, self.method, clock, self.buffer, INTEGRATE)
             elif isinstance(self.loop, Unwatched):
                 used = self.loop.go_on(self.buffer)
             else:
@@ -368,7 +366,7 @@ class Run:
         here, c = self.here, self.here.c
         status = here.clock.count[ex.STATUS]
         row, y = np.zeros((1, self.width)), here.y.copy()
-        if motion_kernel(c.system, c.work, self.method, here.clock, row, REPORT) != 0:
+        if motion_kernel(*c.buffers, self.method, here.clock, row, REPORT) != 0:
             row[0, 1 + len(y) :] = np.nan  # what was found last at another state stands there
             here.doubts.append(unsolved(c, row))
         here.y[:], here.clock.count[ex.STATUS] = y, status
