@@ -3,8 +3,9 @@
 A force is a class with `element` above it that derives from one of the base classes. Its formula is a static method:
 ``wrench(par, F, M, laws, values)`` of a `BodyForce`, `TwoPointForce` or `TwoFrameForce`, ``effort(par, x, rate, laws,
 load)`` of a `CoordinateForce` or `JointForce`. A joint derives from `Joint` and names its `blocks`: constraint rows of
-flyball, or a `ConstraintRow` with a formula ``row(par, F, M)``. `flyball.math.vec` and `flyball.math.scalar` hold the
-functions that formulas may use. ``flyball.testing`` tests an element.
+flyball, or a `ConstraintRow` with a formula ``row(par, F, M)``. A shape derives from `ConvexSolid` and has a support
+function ``support(par, d)``. `flyball.math.vec` and `flyball.math.scalar` hold the functions that formulas may use.
+``flyball.testing`` tests an element.
 """
 
 from __future__ import annotations
@@ -43,3 +44,4 @@ from .model.force import TwoFrameForce as TwoFrameForce
 from .model.force import TwoPointForce as TwoPointForce
 from .model.joint import Coordinate as Coordinate
 from .model.joint import Joint as Joint
+from .model.shapes import ConvexSolid as ConvexSolid

@@ -74,7 +74,7 @@ ALLOWED = {  # room -> rooms that it may import when it is imported
     "methods": set(),
     "mechanism": {"methods", "model"},
     "files": {"mechanism"},
-    "testing": {*LIBRARY, *ELEMENTS, "graph", "tables", "mechanism", "files"},
+    "testing": {*LIBRARY, *ELEMENTS, "contact", "graph", "tables", "mechanism", "files"},
     "cli": {"methods"},
     "__init__": set(),
     "__main__": {"cli"},

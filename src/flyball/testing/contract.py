@@ -12,14 +12,17 @@ import numpy as np
 
 from ..compiler.by_address import CodeTable
 from ..constraints.blocks import ConstraintRow
+from ..contact.narrow.shapes.solid import SIGNATURES as SUPPORT
 from ..errors import FlyballError, ModelError, StartWarning
 from ..forces import SIGNATURES
 from ..mechanism import Mechanism
+from ..model.element import resolve
 from ..model.force import CoordinateForce, Force
 from ..model.joint import Joint, WorldFrame
+from ..model.shapes.solid import ConvexSolid
 from ..tables.structure import structure
 from ..tables.values import values
-from . import formulas, motions
+from . import formulas, motions, shapes
 from .sample import sample_mechanism
 from .states import ROWS, State, force_states, row_states
 
@@ -75,9 +78,10 @@ _MOTIONS: Checks = {
     "turned": motions.turned,
     "linear": motions.linear,
 }
-CHECKS: dict[str, Checks] = {
+CHECKS: dict[str, dict[str, Callable[..., str]]] = {
     "forces": {**_NUMBERS, "inputs": formulas.rates, "energy": formulas.energy, **_INVARIANCE, **_MOTIONS},
     "joints": {**_NUMBERS, "gradient": formulas.gradient, "bias": formulas.bias, **_INVARIANCE, **_MOTIONS},
+    "shapes": shapes.CHECKS,
 }
 """The parts of the contract for each category of elements, in the order in which they are checked.
 
@@ -85,25 +89,25 @@ Each returns what is wrong; "" if nothing is."""
 
 
 def check_element(
-    element: Force | Joint,
+    element: Force | Joint | ConvexSolid,
     *,
     mechanism: Mechanism | None = None,
     parameters: Mapping[str, Any] | None = None,
     skip: Collection[str] = (),
 ) -> list[str]:
-    """Check a force or a joint, of flyball or of a user's own, in every way that analyses use it.
+    """Check a force or a joint, of flyball or of a user's own, or a convex shape, in every way that analyses use it.
 
-    Its formulas are evaluated at random states, and the element acts in a mechanism that is simulated for a moment.
+    Its formulas are evaluated at random states. A force or a joint acts in a mechanism that is simulated for a moment.
 
     Parameters
     ----------
-    element : Force or Joint
+    element : Force, Joint or ConvexSolid
         An instance with ordinary numbers. Of a joint the formulas of its `ConstraintRow` are checked.
     mechanism : Mechanism, optional
         A mechanism in which the element can be added, if it needs more than the bodies and joints that it names: for
         instance sensors that its laws depend on. Not given: these bodies, about 1 kg and 1 m, tumbling.
     parameters : mapping, optional
-        Parameters of the mechanism that the element names, where none is given.
+        Parameters that the element names, where no mechanism is given.
     skip : collection of str
         Parts of the contract that do not hold for good reasons:
 
@@ -126,8 +130,8 @@ def check_element(
     ModelError
         If the element cannot be described, or a name in ``skip`` is no part of the contract.
     """
-    if not isinstance(element, Force | Joint):
-        raise ModelError(f"{type(element).__name__} is no force and no joint; check_element is for these")
+    if not isinstance(element, Force | Joint | ConvexSolid):
+        raise ModelError(f"{type(element).__name__} is no force, joint or ConvexSolid; check_element is for these")
     checks = CHECKS[element.category]
     if unknown := set(skip) - set(checks):
         raise ModelError(f"{sorted(unknown)} is no part of the contract; its parts are {', '.join(checks)}")
@@ -146,9 +150,11 @@ def check_element(
     return [name for name in checks if name not in skip]
 
 
-def _refuse_incomplete(e: Force | Joint) -> None:
+def _refuse_incomplete(e: Force | Joint | ConvexSolid) -> None:
     """Refuse classes whose formulas are missing or are no static methods."""
     owners: list[tuple[type, Any, Any]] = [(type(r), ROWS, ROWS) for r in _own_rows(e)]
+    if isinstance(e, ConvexSolid):
+        owners = [(type(e), SUPPORT, SUPPORT)]
     if isinstance(e, Force):
         needed = SIGNATURES[2:3] if isinstance(e, CoordinateForce) else SIGNATURES[:2]
         owners = [(type(e), SIGNATURES, needed)]
@@ -159,11 +165,18 @@ def _refuse_incomplete(e: Force | Joint) -> None:
         CodeTable(cls, signatures)
 
 
-def _own_rows(e: Force | Joint) -> list[ConstraintRow]:
+def _own_rows(e: Any) -> list[ConstraintRow]:
     return [r for r in e.blocks if isinstance(r, ConstraintRow)] if isinstance(e, Joint) else []
 
 
-def _subject(e: Force | Joint, given: Mechanism | None, parameters: Mapping[str, Any] | None) -> Subject:
+def _subject(
+    e: Force | Joint | ConvexSolid, given: Mechanism | None, parameters: Mapping[str, Any] | None
+) -> Subject | shapes.Shape:
+    if isinstance(e, ConvexSolid):
+        n = resolve(e, Mechanism("sample", parameters=dict(parameters or {})).environment())
+        e.check(n)
+        return shapes.Shape(e, n, e.par(n))
+
     def make(Q: np.ndarray | None = None, d: np.ndarray | None = None) -> Mechanism:
         if given is None:
             return sample_mechanism(e, parameters, Q, d)
