@@ -244,8 +244,8 @@ class ConvexSolid(Solid):
             x = error
         if not isinstance(x, tuple) or len(x) != 3 or not np.isfinite(x).all():
             raise ModelError(
-                f"{self.title}: {type(self).__name__}.support gives {x!r} for the direction {d} and par = {par}; it must "
-                f"give a point, a tuple of three finite numbers, for every direction"
+                f"{self.title}: {type(self).__name__}.support gives {x!r} for the direction {d} and par = {par}; it "
+                f"must give a point, a tuple of three finite numbers, for every direction"
             )
         return x
 
