@@ -5,7 +5,7 @@ A force is a class with `element` above it that derives from one of the base cla
 load)`` of a `CoordinateForce` or `JointForce`. A joint derives from `Joint` and names its `blocks`: constraint rows of
 flyball, or a `ConstraintRow` with a formula ``row(par, F, M)``. A shape derives from `ConvexSolid` and has a support
 function ``support(par, d)``. `flyball.math.vec` and `flyball.math.scalar` hold the functions that formulas may use.
-``flyball.testing`` tests an element.
+``flyball.testing`` tests an element. `runge_kutta` defines a method of integration.
 """
 
 from __future__ import annotations
@@ -45,3 +45,4 @@ from .model.force import TwoPointForce as TwoPointForce
 from .model.joint import Coordinate as Coordinate
 from .model.joint import Joint as Joint
 from .model.shapes import ConvexSolid as ConvexSolid
+from .numerics.integrators.runge_kutta import runge_kutta as runge_kutta

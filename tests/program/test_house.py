@@ -44,7 +44,7 @@ ALLOWED = {  # room -> rooms that it may import when it is imported
     "joints": {*LIBRARY, "constraints", "model"},
     "forces": {*LIBRARY, "constraints", "model"},
     "control": {*LIBRARY, "model"},
-    "elements": {*LIBRARY, "constraints", "model"},
+    "elements": {*LIBRARY, "constraints", "model", "numerics"},
     "contact": LIBRARY,
     "laws": {*LIBRARY, "model"},
     "tables": {*LIBRARY, *ELEMENTS, "numerics", "laws", "contact"},
