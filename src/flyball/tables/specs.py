@@ -119,9 +119,9 @@ class Structure:
         """Number of velocities."""
         return int(self.tables["body_i"][:, 5].sum())
 
-    @property
+    @cached_property
     def code_tables(self) -> set[CodeTable]:
-        """Those of all classes of a user's own."""
+        """Code tables of all classes of a user's own in it."""
         return {x for x in (*self.force_code, *self.term_code) if x is not None}
 
     @property
