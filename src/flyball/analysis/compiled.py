@@ -13,7 +13,6 @@ import numpy as np
 
 from ..compiler.buffers import PooledBuffer, StructBuffer
 from ..compiler.kernels import BoundKernel
-from ..constraints.registry import KINDS
 from ..equations.engine import POSITION, engine, evaluate
 from ..equations.projection import NONE
 from ..equations.scratch import scratch, tables, work
@@ -145,12 +144,12 @@ class Compiled:
     @cached_property
     def has_curves(self) -> bool:
         """Whether a term leans on a place on a curve."""
-        return any(KINDS[t.formula.kind].place for t in self.structure.terms)
+        return any(t.formula.of_kind.place for t in self.structure.terms)
 
     def find_places(self) -> None:
         """Take for the places on curves those nearest of all at the poses last evaluated, wherever one was before."""
         for t in self.structure.terms:
-            if KINDS[t.formula.kind].place:
+            if t.formula.of_kind.place:
                 F, M = ((x[:3], x[3:12].reshape(3, 3)) for x in self.work.FK[[t.F, t.M]])
                 self.z[t.hint] = t.element.nearest(self.values.numbers[t.element.name], F, M)[0]  # type: ignore[attr-defined]
 

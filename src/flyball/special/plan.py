@@ -74,8 +74,8 @@ def estimate(S: System) -> int:
 def _structure(s: Structure, S: System) -> bytes:
     """Hash of what parameters cannot change, of sources and processor."""
     digest = hashlib.sha256(machine().encode() + sources())
-    digest.update(" ".join("" if x is None else x.content for x in s.own).encode())
-    for name, x in S._replace(own=S.own != 0)._asdict().items():
+    digest.update(" ".join("" if x is None else x.content for x in (*s.force_code, *s.term_code)).encode())
+    for name, x in S._replace(force_code=S.force_code != 0, term_code=S.term_code != 0)._asdict().items():
         arrays = x if isinstance(x, tuple) else (x,)
         for a in arrays:
             told = name in TABLES

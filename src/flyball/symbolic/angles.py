@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.registry import KINDS
 from ..equations.tree import column
 from ..graph.node import Graph, Node
 from ..graph.operations import ADD, MULTIPLY, NUMBER
@@ -42,7 +41,7 @@ def counted(x: Values, S: System) -> tuple[System, list[int]]:
     row_i[:, ROW_WRAP] = 0
     more: list[int] = []
     for k, t in enumerate(s.terms):
-        if KINDS[t.formula.kind].turns and term_i[k, TERM_HINT] < 0:
+        if t.formula.of_kind.turns and term_i[k, TERM_HINT] < 0:
             term_i[k, TERM_HINT] = len(s.states) + len(more)
             term_x[k, 0] = 1.0
             more.append(k)

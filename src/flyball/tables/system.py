@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from ..compiler.layout import COMPLEX, CodeTables1, Float1, Int1, Int2, Number1, Number2
-from ..constraints.registry import KINDS
+from ..constraints.registry import BY_ADDRESS
 from ..numerics.ldl import Pattern
 
 # columns of System.body_i
@@ -33,7 +33,7 @@ MIX_ROW, MIX_SLOT, MIX_TO, MIX_FROM, MIX_COUNT = range(5)
 # columns of System.force_i; forces along a measured quantity have its slot in place of frame F
 BETWEEN, ALONG, SLIDING = range(3)  # families of forces: FORCE_ALONG
 FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD, FORCE_KIND, FORCE_ALONG, FORCE_SWITCH = 0, 1, 2, 5, 6, 7, 8, 9
-OWN = 1000  # the kind of forces that have a code table: no built-in element's number
+FORCE_BY_ADDRESS = 1000  # the kind of forces that have a code table: no built-in element's number
 # columns of System.switch_i, and of switch_x; kinds of switches: see `model/switch.py`
 SWITCH_ROW, SWITCH_MEASURED, SWITCH_KIND, SWITCH_FORCE, SWITCH_LAW, SWITCH_OTHER = range(6)
 SWITCH_PARTNER = SWITCH_LAW  # of a slip: that along the other tangent, or -1
@@ -85,7 +85,7 @@ REGULARISE, SEMIDEFINITE, LENGTH = 3, 4, 5
 # radian)
 TEMPO, UNIT = 6, 7
 
-TERM_KINDS = len(KINDS)
+TERM_KINDS = BY_ADDRESS + 1
 
 
 class System(NamedTuple):
@@ -97,6 +97,7 @@ class System(NamedTuple):
     frame_x: Number2  # (nf, 12): position from the body's centre of mass and rotation, in body axes
     term_i: Int2  # (nt, 6): row (measured quantities after the rows), frame F, M, segments, state it leans on
     term_x: Number2  # (nt, 8): parameters of the formula, the last one the coefficient in the row
+    term_code: CodeTables1  # (nt,): code table of a row of a user's own (`ConstraintRow`); 0 of others
     seg_i: Int2  # (ns, 3): body, side (+1 M, -1 F), first entry in Work.G
     row_i: Int2  # (nr, 3): law or -1, wrapped angle or not, work state or -1
     row_p: Int1  # (nr + nm + 1,): first entry of each row, then of each measured quantity, in Work.G
@@ -104,7 +105,7 @@ class System(NamedTuple):
     mix_i: Int2  # (nx, 5): drivers that follow sensors: row, slot, entries of G to and from, count
     force_i: Int2  # (nk, 10): F, M, three laws, state of its work, its load (or -1), kind, family, switch or -1
     force_x: Number2  # (nk, 16): parameters of the formula
-    own: CodeTables1  # (nk,): code table of a force whose class is not flyball's; 0 of others
+    force_code: CodeTables1  # (nk,): code table of a force of a user's own; 0 of others
     angle_i: Int2  # (na, 3): frame F, frame M, state that counts its turns
     load_i: Int2  # (nj, 2): terms that make up the reaction behind a load: load, term; see `reads` too
     switch_i: Int2  # (nw, 6): rows with modes: row, measured quantity, kind, force that slides, law, another

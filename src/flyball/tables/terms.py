@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.blocks import ANGLE, Row, point_coordinate
-from ..constraints.registry import KINDS
+from ..compiler.by_address import CodeTable, code_table
+from ..constraints.blocks import ANGLE, ConstraintRow, Row, point_coordinate
+from ..constraints.registry import SIGNATURES
 from ..model.body import Driver, Initial
 from ..model.element import Element, LawOf
 from ..model.event import Event
@@ -48,7 +49,7 @@ def _joint_rows(s: Structure, joint: Joint) -> None:
             continue
         used = row.far if s.far and row.far is not None else row
         term = TermSpec(len(s.rows), F, M, used, 1.0, joint)
-        if KINDS[used.kind].place:
+        if used.of_kind.place:
             term.hint = s.state(f"{joint.name}.place")
         s.terms.append(term)
         for what in row.plus:
@@ -84,7 +85,7 @@ def _told_row(s: Structure, e: Driver | Initial, text: str, law: int) -> RowSpec
     """The row of a coordinate that follows a law."""
     first = len(s.rows)
     term = coordinate_term(s, text, e, first)
-    s.rows.append(RowSpec(e, text, law, wrap=KINDS[term.formula.kind].turns))
+    s.rows.append(RowSpec(e, text, law, wrap=term.formula.of_kind.turns))
     s.slices[e.name] = slice(first, first + 1)
     return s.rows[-1]
 
@@ -108,7 +109,7 @@ def coordinate_term(
         F, M, sign = 0, frame(s, owner, "M"), 1.0
         formula = ANGLE if what == "angle" else point_coordinate(what)
     term = TermSpec(row, F, M, formula, sign, e, owner, what, measured)
-    if KINDS[formula.kind].turns and (counted or measured):
+    if formula.of_kind.turns and (counted or measured):
         term.hint = count(s, owner, what, F, M)
     s.terms.append(term)
     return term
@@ -132,14 +133,14 @@ def _turning(s: Structure) -> None:
     for joint in s.model.joints:
         for what, c in joint.measured(s.model.planar).items():
             needed = not s.model.planar or f"{joint.name}.{what}" in told
-            if KINDS[c.row.kind].turns and needed and step_of(s, joint.name, what) is None:
+            if c.row.of_kind.turns and needed and step_of(s, joint.name, what) is None:
                 count(s, joint, what, *coordinate_frames(s, joint, what)[:2])
 
 
 def measured_term(s: Structure, m: int, F: int, M: int, formula: Row, sign: float, e: Element) -> None:
     """Add a term to a measured quantity."""
     s.terms.append(TermSpec(m, F, M, formula, sign, e, measured=True))
-    if KINDS[formula.kind].place:
+    if formula.of_kind.place:
         s.terms[-1].hint = s.state(f"{e.name}.place")
 
 
@@ -161,6 +162,7 @@ def sort(s: Structure) -> None:
     new[order] = np.arange(len(order))
     s.frames = [s.frames[k] for k in order]
     s.terms.sort(key=lambda t: t.formula.kind)
+    s.term_code = [_code(t.formula) for t in s.terms]
     for t in s.terms:
         t.F, t.M = int(new[t.F]), int(new[t.M])
         if t.measured:
@@ -183,6 +185,11 @@ def sort(s: Structure) -> None:
     moving = ground + sum(s.frames[new[k]].body >= 0 for k in used)
     s.tables["kinds"] = np.r_[terms, solver, s.nq, moving, ground].astype(np.int64)
     _force_frames(s, new)
+
+
+def _code(row: Row) -> CodeTable | None:
+    """The formula of a row of a user's own."""
+    return code_table(type(row), SIGNATURES, SIGNATURES) if isinstance(row, ConstraintRow) else None
 
 
 def frame_columns(e: Force) -> tuple[int, ...]:

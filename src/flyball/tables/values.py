@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.registry import KINDS
+from ..compiler.by_address import addresses
 from ..errors import ModelError
 from ..math.lanes import has_lanes, over_lanes
 from ..math.scalar import real_parts, sqrt
@@ -25,7 +25,6 @@ from ..model.kept import Kept, bits
 from . import switches
 from .afresh import Afresh
 from .coordinates import BodyState, free_velocities, positions
-from .forces import addresses
 from .hinges import tree_frames
 from .masses import mass_table
 from .numbers import Numbers, kind_of, numbers
@@ -77,7 +76,9 @@ class Values:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """In another process code has other addresses."""
         vars(self).update(state)
-        self.system = self.system._replace(own=addresses(self.structure))
+        self.system = self.system._replace(
+            force_code=addresses(self.structure.force_code), term_code=addresses(self.structure.term_code)
+        )
 
 
 def values(
@@ -133,9 +134,9 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     glob = np.array([*gravity, REGULARISATION, semidefinite, length, pace, *_units(s, length)], dtype)
     t = s.tables
     system = System(
-        t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
-        t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], force_x, addresses(s), t["angle_i"], t["load_i"],
-        t["switch_i"], switch_x, t["guard_i"], t["control_i"],
+        t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, addresses(s.term_code), t["seg_i"],
+        t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], force_x, addresses(s.force_code), t["angle_i"],
+        t["load_i"], t["switch_i"], switch_x, t["guard_i"], t["control_i"],
          t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl, np.zeros(FLAT, np.int64),
     )  # fmt: skip
     typical = length if has_lanes([length]) else float(length.real)
@@ -234,11 +235,11 @@ def _term_x(
         x[k, 7] = t.sign * t.formula.par[7]
         e = t.element
         n = numbers[e.name]
-        if t.hint >= 0 and KINDS[t.formula.kind].turns:
+        if t.hint >= 0 and t.formula.of_kind.turns:
             x[k, 0] = 1.0
         if isinstance(e, Joint) and t.owner is None:
-            x[k, :7] = e.constants(n, t.formula, *pose.ends(e))
-            if KINDS[t.formula.kind].place:
+            x[k, :7] = e.row_parameters(n, t.formula, *pose.ends(e))
+            if t.formula.of_kind.place:
                 at = curve_at[e.name]
                 x[k, 1:3] = at, at + len(e.curves(n)[0])
         elif isinstance(e, Joint):

@@ -23,7 +23,8 @@ def along(x: Formulated) -> list[tuple[str, np.ndarray]]:
     if any(c != 0.0 for c in S.glob[:3]):
         out.append(("Weight", _gathered(S, W, None) - turning))
     for k, e in enumerate(T.structure.forces):
-        one = S._replace(force_i=S.force_i[k : k + 1], force_x=S.force_x[k : k + 1], own=S.own[k : k + 1])
+        rows = {name: getattr(S, name)[k : k + 1] for name in ("force_i", "force_x", "force_code")}
+        one = S._replace(**rows)
         out.append((f"{e.name} ({type(e).__name__})", _gathered(one, W, T.t)))
     return [(title, x.cleaned(f)) for title, f in out]
 
