@@ -16,6 +16,7 @@ from .poses import Array, Motion, Z, spatial
 EXACT = 1e-9  # of what is computed twice from the same poses, relative to its terms
 HELD = 1e-6  # gaps relative to the mechanism's size; rates of slip to its fastest point
 BALANCED = 1e-6  # force = mass x acceleration, relative to the largest force or torque
+DIGITS = 1e-15  # of the mechanism's size, or a radian: last digits of positions, from which stiff springs make forces
 DRIFT = 3e-6  # energies and momenta over a motion at rtol 1e-9, relative to what moved
 SLOW = 1e-3  # of the size, or of a radian, over the whole motion: no speed that is compared with is less
 
@@ -184,11 +185,12 @@ def newton_euler(x: Motion) -> Iterator[Finding]:
     out = loads(x)
     size = x_size(x)
     largest = max(out.size.values(), default=0.0)
+    stiff = DIGITS * stiffest(x)
     for name, (mass, inertia) in x.masses.items():
         if name in out.unknown or name not in out.force:
             continue
         a = x.at_centre(name)[2]
-        allowed = BALANCED * (np.abs(mass * a).max() + largest) + 1e-12
+        allowed = BALANCED * (np.abs(mass * a).max() + largest) + stiff / size + 1e-12
         bad = np.abs(out.force[name] - mass * a).max()
         if not bad <= allowed:
             yield Finding("force = mass x acceleration", name, float(bad), allowed)
@@ -202,10 +204,22 @@ def newton_euler(x: Motion) -> Iterator[Finding]:
             want, got = want[:, 2:], out.torque[name][:, 2:]
         else:
             got = out.torque[name]
-        allowed = BALANCED * (np.abs(want).max() + largest * max(1.0, size)) + 1e-12
+        allowed = BALANCED * (np.abs(want).max() + largest * max(1.0, size)) + stiff + 1e-12
         bad = np.abs(got - want).max()
         if not bad <= allowed:
             yield Finding("Euler's equation", name, float(bad), allowed)
+
+
+def stiffest(x: Motion) -> float:
+    """Stiffness of the stiffest spring times its size squared, or a radian's, which is one [J]."""
+    out, size = 0.0, x_size(x)
+    for e in (*x.m.forces, *x.m.limits):
+        turns = str(getattr(e, "coordinate", "")).endswith("angle") or isinstance(e, fb.TorsionalSpringDamper)
+        for name, by in (("stiffness", 1.0 if turns else size**2), ("torsional_stiffness", 1.0)):
+            k = getattr(e, name, None)
+            if k is not None and not isinstance(k, str):
+                out = max(out, float(np.abs(k).max()) * by)
+    return out
 
 
 def x_size(x: Motion) -> float:

@@ -147,7 +147,7 @@ def turn(motion: Motion, i: str, j: str, axis: Any) -> Array:
     w = np.einsum(
         "ni,ni->n", motion.of(j, "angular_velocity") - motion.of(i, "angular_velocity"), motion.direction(i, a)
     )
-    if np.abs(w).max() * np.diff(motion.t).max(initial=0.0) > 1.5:
+    if (np.maximum(np.abs(w[1:]), np.abs(w[:-1])) * np.diff(motion.t)).max(initial=0.0) > 1.5:
         raise Uncounted(f"{i} and {j}")
     return _unwrapped(raw, w, motion.t)
 

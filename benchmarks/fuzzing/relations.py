@@ -18,8 +18,9 @@ import numpy as np
 import flyball as fb
 
 from . import changes
+from .gaps import JOINTS, _common
 from .physics import Finding
-from .poses import matrix
+from .poses import matrix, spatial
 from .scaling import Scale, Unsupported, scaled
 
 RTOL, ATOL = 1e-9, 1e-11
@@ -27,8 +28,12 @@ NUDGE = 1e-7  # relative change of masses, gravity and speeds by which the motio
 GROWTH = 1e3  # beyond this growth of a change nothing is compared: 1e-12 would come to 1e-9
 AGREE = 3e-6  # of the motion's size, times the growth: what runs at RTOL may differ by
 AGREE_STEPS = 1e-4  # of motions by impulses, whose solver stops at a residual
-SLOW = 0.1  # of its reach, or of a radian, over the whole motion: speeds are compared with no less
 STEPS = 20_000
+SLOW = 0.1  # of its reach, or of a radian, over the whole motion: speeds are compared with no less
+HOLD = 1e-12  # of the mechanism's reach, or its speed: joints' points are held together to
+NONE = 1e-14  # of the largest singular value: one that is none
+TIGHT = {"rtol": 1e-2 * RTOL, "atol": 1e-2 * ATOL, "max_steps": 10 * STEPS}  # of a run that tells what tolerances do
+MARGIN = 10.0  # times what that differs by: other ways may
 COARSE, COARSER = 1e-6, 1e3  # a common relative tolerance, and how much more a run at it may differ by
 
 Simulated = Callable[..., fb.Result]
@@ -124,6 +129,57 @@ def nudged(m: fb.Mechanism) -> fb.Mechanism:
         return type(e)(**own)
 
     return changes.again(m, of, gravity=by(tuple(m.gravity)))
+
+
+def firmness(m: fb.Mechanism) -> float:
+    """How firmly joints' points hold what they do not leave free, as drawn: the least singular value that is not none.
+
+    Of the rates at which these points part, by velocities and by rates of turning about the bodies' origins over the
+    mechanism's reach; relative to the largest.
+    """
+    joints = [e for e in m.joints if _common in JOINTS.get(type(e).__name__, ()) and np.ndim(e.at) == 1]
+    number = {b.name: k for k, b in enumerate(m.bodies)}
+    n, turns = (2, 1) if m.planar else (3, 3)
+    reach = max((np.abs(np.asarray(e.at, float)).max() for e in joints), default=0.0) or 1.0
+    J = np.zeros((n * len(joints), (n + turns) * len(number)))
+    for k, e in enumerate(joints):
+        for name, sign in ((e.body_i, -1.0), (e.body_j, 1.0)):
+            if name not in number:
+                continue
+            x, y, z = spatial(np.subtract(e.at, m[name].position[:n])) / reach
+            turning = np.array([[-y], [x]]) if m.planar else np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
+            at = (n + turns) * number[name]
+            J[n * k : n * k + n, at : at + n + turns] = sign * np.hstack([np.eye(n), turning])
+    values = np.linalg.svd(J, compute_uv=False) if J.size else np.ones(1)
+    return float(min(values[values > NONE * values.max()] / values.max(), default=1.0))
+
+
+def own_error(b: Base, name: str, seed: int) -> np.ndarray:
+    """By how much motions may differ that are not determined any closer, relative as in `difference`.
+
+    That is anything where joints hold a structure that is all but free to move; else the difference that a tighter
+    tolerance makes to the motion, and to that by the other way, if the same happens. It is asked for where motions
+    differ.
+    """
+    if firmness(b.mechanism) < HOLD / AGREE:
+        return np.full(len(b.run.t), np.inf)
+    size, out = sizes(state(b.run, b.mechanism), b.t_end), np.zeros(len(b.run.t))
+    ways: list[Callable[[Base], tuple]] = [lambda x: _again(x, x.mechanism)]
+    if name != "halves":
+        ways.append(lambda x: RELATIONS[name](x, random.Random(f"{name} {seed}")))
+    for way in ways:
+        runs, states = [], []
+        for more in ({}, {k: v for k, v in TIGHT.items() if k not in b.options}):
+            try:
+                run, m, back = way(dataclasses.replace(b, options=b.options | more))
+            except fb.FlyballError:
+                break
+            runs.append(run)
+            states.append(back(state(run, m)) if back else state(run, m))
+        whole = len(runs) == 2 and all(len(x.t) == len(out) for x in runs)
+        if whole and not _happened(dataclasses.replace(b, run=runs[0]), runs[1], len(out)):
+            out = np.maximum(out, np.maximum.accumulate(difference(*states, size)[0]))
+    return MARGIN * out
 
 
 def base(m: fb.Mechanism, t_end: float, options: dict[str, Any], outputs: int) -> Base:
@@ -335,18 +391,23 @@ def compared(b: Base, chosen: list[str], seed: int) -> Iterator[tuple[str, str, 
             yield name, "unsupported", None
             continue
         except fb.FlyballError as error:
+            reached = int(np.searchsorted(b.run.t, getattr(error, "t", 0.0)))
+            if own_error(b, name, seed)[:reached].max(initial=0.0) > AGREE:
+                yield name, "beyond", None
+                continue
             yield name, "refused", Finding(name, f"{type(error).__name__}: {str(error)[:300]}", np.nan, 0.0)
             continue
         except Exception as error:
             yield name, "raised", Finding(name, f"raised {type(error).__name__}: {str(error)[:300]}", np.nan, 0.0)
             continue
-        yield name, *_outcome(b, run, m, back, name, now, size, h)
+        yield name, *_outcome(b, run, m, back, name, now, size, h, seed)
 
 
 SAME_EVENTS = ("coordinates", "dop853", "rk45", "radau", "axes", "order", "parameters", "file")
 HOLDS = ("close", "stick", "lock", "latch", "taut", "touch", "rest")
 SWITCHED = (*HOLDS, "open", "slip", "overrun", "unlatch", "slack", "part", "impact")
 NOTED = 1e-4  # of the whole time: instants may differ by
+STILL, LOOKS = 10.0, 21  # times that, if nothing moves between them; times at which that is seen
 
 
 def _happened(b: Base, run: Any, h: int) -> str:
@@ -369,12 +430,26 @@ def _happened(b: Base, run: Any, h: int) -> str:
             left = [[k in HOLDS for n, k, s in every if n == name and abs(t - s) <= near] for every in (one, two)]
             alike = alike or (all(left) and left[0][-1] == left[1][-1] and kind in SWITCHED)
             alike = alike or (kind in HOLDS and t <= near)
+            alike = alike or any(
+                (name, kind) == (n, k) and near < abs(t - s) <= STILL * near and _stands(b, t, s) for n, k, s in two
+            )
             if t < b.run.t[h - 1] - 10 * near and not alike:
                 return f"{' '.join(name)} {kind} at {t:.6g} s {which}"
     return ""
 
 
-def _outcome(b: Base, run: Any, m: fb.Mechanism, back: Any, name: str, now: dict, size: dict, h: int) -> tuple:
+def _stands(b: Base, t: float, s: float) -> bool:
+    """Whether nothing moves between two instants by more than motions may differ by, which cannot tell them apart."""
+    between = np.linspace(min(t, s), max(t, s), LOOKS)
+    run = simulated(b.mechanism, b.t_end, np.unique(np.r_[0.0, between, b.t_end]), b.options)
+    now = {k: v[np.isin(run.t, between)] for k, v in state(run, b.mechanism).items()}
+    first = {k: np.broadcast_to(v[:1], v.shape) for k, v in now.items()}
+    return bool(difference(now, first, sizes(state(b.run, b.mechanism), b.t_end))[0].max() <= AGREE)
+
+
+def _outcome(
+    b: Base, run: Any, m: fb.Mechanism, back: Any, name: str, now: dict, size: dict, h: int, seed: int
+) -> tuple:
     if len(run.t) != len(b.run.t):
         return "differs", Finding(name, f"ends after {len(run.t)} of {len(b.run.t)} outputs", np.nan, 0.0)
     other = run.states if isinstance(run, _Joined) else state(run, m)
@@ -383,6 +458,8 @@ def _outcome(b: Base, run: Any, m: fb.Mechanism, back: Any, name: str, now: dict
     steps = isinstance(b.options.get("method"), fb.Stepping)
     allowed = (AGREE_STEPS if steps else AGREE) * np.maximum(1.0, b.growth[:h])
     allowed *= COARSER if name == "tolerance" else 1.0
+    if not (d <= allowed).all():
+        allowed = np.maximum(allowed, own_error(b, name, seed)[:h])
     ratio = d / allowed
     k = int(np.nanargmax(np.where(np.isfinite(ratio), ratio, np.inf)))
     if np.isfinite(ratio).all() and ratio.max() <= 1.0:

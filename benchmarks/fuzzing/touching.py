@@ -194,7 +194,7 @@ def balances(x: Motion) -> Iterator[Finding]:
     for name, (mass, inertia) in x.masses.items():
         if name in joined or c is None:
             continue
-        force, torque = _sums(x, name)
+        force, torque, terms = _sums(x, name)
         centre, v, a = x.at_centre(name)
         del centre
         if by_steps(x):
@@ -210,23 +210,21 @@ def balances(x: Motion) -> Iterator[Finding]:
             what = "force = mass x acceleration"
             quiet = ~np.isin(np.round(x.t, 12), np.round(_impacts(x), 12))
             want, got, torque = want[quiet], got[quiet], torque[quiet]
-            yield from _euler(x, name, inertia, torque, quiet)
+            yield from _euler(x, name, inertia, (torque, terms), quiet)
         bad = float(np.abs(want - got).max(initial=0.0))
         if not bad <= allowed:
             yield Finding(what, name, bad, float(allowed))
 
 
-def _euler(x: Motion, name: str, inertia: Array, torque: Array, quiet: Array) -> Iterator[Finding]:
+def _euler(x: Motion, name: str, inertia: Array, sums: tuple[Array, float], quiet: Array) -> Iterator[Finding]:
+    """``sums``: the sum of torques, and how large they are together that it is the difference of."""
+    torque, terms = sums
     R, w, al = (x.of(name, k)[quiet] for k in ("rotation", "angular_velocity", "angular_acceleration"))
     tensor = np.einsum("nij,jk,nlk->nil", R, inertia, R)
     want = np.einsum("nij,nj->ni", tensor, al) + np.cross(w, np.einsum("nij,nj->ni", tensor, w))
     if x.m.planar:
         want, torque = want[:, 2:], torque[:, 2:]
-    size = (
-        np.abs(want).max(initial=0.0)
-        + np.abs(torque).max(initial=0.0)
-        + np.abs(tensor).max(initial=0.0) * np.abs(w).max(initial=0.0) ** 2
-    )
+    size = np.abs(want).max(initial=0.0) + terms + np.abs(tensor).max(initial=0.0) * np.abs(w).max(initial=0.0) ** 2
     bad = np.abs(want - torque).max(initial=0.0)
     if bad > 1e-6 * size + 1e-11:
         yield Finding("Euler's equation", name, float(bad), 1e-6 * float(size))
@@ -241,10 +239,13 @@ def _on(f: Any) -> list[str]:
     return [getattr(f, k) for k in ("body_i", "body_j", "body") if hasattr(f, k)]
 
 
-def _sums(x: Motion, name: str) -> tuple[Array, Array]:
-    """Sum of contact forces on a body, and of their torques about its mass centre, from the table of contacts."""
+def _sums(x: Motion, name: str) -> tuple[Array, Array, float]:
+    """Sum of contact forces on a body, and of their torques about its mass centre, from the table of contacts.
+
+    Last the largest sum of the sizes of these torques.
+    """
     c = x.run.contacts
-    force, torque = np.zeros((x.n, 3)), np.zeros((x.n, 3))
+    force, torque, terms = np.zeros((x.n, 3)), np.zeros((x.n, 3)), np.zeros(x.n)
     centre = x.at_centre(name)[0]
     for k, (a, b) in enumerate(c.names()):
         sign = 1.0 if b == name else -1.0 if a == name else 0.0
@@ -252,8 +253,10 @@ def _sums(x: Motion, name: str) -> tuple[Array, Array]:
             F = sign * np.asarray(c.force[k])
             i = int(c.when[k])
             force[i] += F
-            torque[i] += np.cross(np.asarray(c.point[k]) - centre[i], F)
-    return force, torque
+            one = np.cross(np.asarray(c.point[k]) - centre[i], F)
+            torque[i] += one
+            terms[i] += np.abs(one).max()
+    return force, torque, float(terms.max(initial=0.0))
 
 
 def losses(x: Motion) -> Iterator[Finding]:

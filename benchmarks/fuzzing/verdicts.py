@@ -21,6 +21,8 @@ KINDS = ("agrees", "refused", "warned", "uneven", "wrong")
 ALL = {**content.FAMILIES, **scenes.SCENES}
 FOR_CONTACT = ("coordinates", "units", "axes", "names", "order", "halves", "parameters", "file")
 OUTPUTS = 41
+OF_ANGLES = ("energy by formula", "law of a force")  # judges that count turns between outputs
+TURNED, CLOSEST = 1.0, 4000  # rad between two outputs at most, and at most so many outputs, where turns are counted
 
 
 @dataclass
@@ -65,6 +67,8 @@ def _judged(family: str, seed: int, count: int, only: list[str] | None) -> Verdi
         found = touching.findings(b.run, b.mechanism, family) if scene else physics.findings(b.run, b.mechanism)
         if any(f.relation == "derivative" for f in found):
             found = [f for f in found if f.relation != "derivative"] + _closer(b)
+        if not scene and any(f.relation in OF_ANGLES for f in found):
+            found = [f for f in found if f.relation not in OF_ANGLES] + _counted(b)
     except Exception as error:
         found = [Finding("judges", f"raised {type(error).__name__}: {error}"[:300], np.nan, 0.0)]
     if family in content.KNOWN and count:
@@ -93,6 +97,25 @@ def _closer(b: relations.Base) -> list[Finding]:
     times = np.linspace(b.run.t[0], b.run.t[-1], 40 * len(b.run.t))
     run = relations.simulated(b.mechanism, b.t_end, times, b.options)
     return list(physics.derivatives(physics.Motion(run, b.mechanism)))
+
+
+def _counted(b: relations.Base) -> list[Finding]:
+    """What is said of angles once more, by outputs between which no body turns far by its speed and acceleration."""
+    run, times = b.run, b.times
+    while True:
+        h, far = np.diff(run.t), np.zeros(len(run.t) - 1)
+        for body in b.mechanism.bodies:
+            w, a = (
+                np.linalg.norm(np.asarray(x).reshape(len(run.t), -1), axis=1)
+                for x in (run[body.name].angular_velocity, run[body.name].angular_acceleration)
+            )
+            far = np.maximum(far, np.maximum(w[1:], w[:-1]) * h + 0.5 * np.maximum(a[1:], a[:-1]) * h**2)
+        wide = np.flatnonzero(far > TURNED)
+        if not len(wide) or len(times) + len(wide) > CLOSEST:
+            break
+        times = np.sort(np.r_[times, 0.5 * (run.t[wide] + run.t[wide + 1])])
+        run = relations.simulated(b.mechanism, b.t_end, times, b.options)
+    return [f for f in physics.findings(run, b.mechanism) if f.relation in OF_ANGLES]
 
 
 def _options(case: Case) -> dict[str, Any]:

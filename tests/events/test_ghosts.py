@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import flyball as fb
 from tests.layers import both_layers
@@ -111,3 +112,73 @@ def test_what_lies_and_is_lifted_has_passed_zero_once(direction, many, kw):
     r = m.simulate(2.0, outputs=2, **kw)
     assert r["b.y"][-1] == pytest.approx(2.5, abs=1e-5)
     assert len(r.events["e"]) <= many
+
+
+def at_rest() -> fb.Mechanism:
+    """An elastic rope and a spring, both drawn at their free lengths; friction and an event on a rate."""
+    m = fb.Mechanism("at rest", planar=True, gravity=(0, 0))
+    m.add(fb.Body("a", mass=0.93, inertia=0.037, position=(0.688, 0.331)))
+    m.add(fb.Body("b", mass=0.73, inertia=0.029, position=(-0.345, 0.033)))
+    m.add(fb.Revolute("R", "ground", "a", at=(0.375, 0.338)))
+    m.add(fb.Prismatic("P", "ground", "b", at=(-0.333, 0.041), axis=(0.67, 0.74)))
+    over = [(0.748, 0.7), (-0.018, 0.404), (0.462, 0.462)]
+    m.add(fb.Rope("rope", bodies=["a", "b", "ground"], at=over, stiffness=1e4, damping=5))
+    m.add(fb.SpringDamper("pull", "ground", "a", at=((0.802, 0.608), (0.688, 0.331)), stiffness=77))
+    m.add(fb.JointFriction("dry", "P", static=0.16, kinetic=0.1))
+    m.add(fb.Event("e", "P.displacement_rate", direction="falling", do=[fb.Impulse("b", (0.66, -1.8))]))
+    return m
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk45", "radau"])
+@pytest.mark.parametrize("rtol", [1e-7, 1e-9, 1e-11])
+def test_friction_that_carries_nothing_does_not_slip_by_rounding(method, rtol):
+    """Nothing acts, so nothing happens, and no steps are spent on it; later it moves by what the tolerance allows."""
+    r = at_rest().simulate(1.0, outputs=3, method=method, rtol=rtol, atol=rtol / 100)
+    assert len(r.events) == 0, str(r.events)
+    assert r.health.steps < 12
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk45", "radau"])
+@pytest.mark.parametrize("rtol", [1e-7, 1e-9])
+def test_friction_whose_load_vanishes_as_all_comes_to_rest_does_not_slip(method, rtol):
+    """Two links that friction holds together turn about the ground, and a brake of 2 N m stops them after I w / 2."""
+    m = fb.Mechanism("stopped", planar=True, gravity=(0, 0))
+    m.add(fb.Body("a", mass=1.3, inertia=0.1, position=(0.31, 0.12), angular_velocity=2.0))
+    m.add(fb.Body("b", mass=0.7, inertia=0.01, position=(0.625, 0.24), angular_velocity=2.0))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(0.61, 0.23)))
+    m.add(fb.Brake("brake", "A.angle", capacity=2.0), fb.JointFriction("dry", "B", static=0.8, radius=0.1))
+    r = m.simulate(3.0, outputs=3, method=method, rtol=rtol, atol=rtol / 100)
+    stop = 0.11 + 1.3 * (0.31**2 + 0.12**2) + 0.7 * (0.625**2 + 0.24**2)
+    assert [(e.name, e.kind) for e in r.events] == [("brake", "stick")]
+    assert r.events.t == pytest.approx([stop], abs=100 * rtol)
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk45", "radau"])
+def test_a_stop_that_a_force_begins_to_press_stays_closed(method):
+    """The force begins as the square of time, and turns round where its slow factor passes zero."""
+    factor = "0.55156 + 1.89745*sin(4.222972*t + 3.755868) + 2.712994*cos(8.199426*t + 0.265272)"
+    m = fb.Mechanism("pressed", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("b", mass=1.447660, inertia=0.2), fb.Prismatic("P", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Actuator("push", "P.displacement", force=f"({factor})*step(t, 1.021894743, 0, 1.734124731, 1)"))
+    m.add(fb.Limit("stop", "P.displacement", lower=-0.41, upper=0, restitution=0.5))
+    known = {"sin": np.sin, "cos": np.cos}
+    turns = brentq(lambda t: eval(factor, known | {"t": t}), 1.03, 1.1, xtol=1e-14)
+    r = m.simulate(1.3, outputs=3, method=method, rtol=1e-9, atol=1e-11)
+    assert [e.kind for e in r.events] == ["close", "open"]
+    assert r.events.t == pytest.approx([1.021894743, turns], abs=1e-9)
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk45", "radau"])
+def test_a_rate_that_begins_at_zero_where_a_law_has_a_corner_passes_it_once(method):
+    """A torque of 0.01 N m turns it until the brake stops it, where 0.01 t = (2 / 9) (1 - cos 9 t).
+
+    The corner of the capacity at t = 0 makes the first step so short that angles tell nothing of rates.
+    """
+    m = fb.Mechanism("braked", gravity=(0, 0, 0))
+    m.add(fb.Body("b", mass=1, inertia=[0.02] * 3, position=(0.1, -0.35, 0.19), orientation=(-0.8, -0.37, 0.64)))
+    m.add(fb.Revolute("R", "ground", "b", at=(0.106, -0.362, 0.209), axis=(-0.54, 0.84, 0.001)))
+    m.add(fb.Motor("push", "R", torque=0.01), fb.Brake("brake", "R.angle", capacity="2*abs(sin(9*t))"))
+    m.add(fb.Event("e", "R.angle_rate", direction="either"))
+    stop = brentq(lambda t: 0.01 * t - 2 / 9 * (1 - np.cos(9 * t)), 1e-4, 1e-2, xtol=1e-15)
+    r = m.simulate(0.01, outputs=3, method=method, rtol=1e-9, atol=1e-11)
+    assert r.events["e"].t == pytest.approx([stop], abs=1e-9)

@@ -12,6 +12,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
 from fuzzing import content, physics, poses, relations, scenes, touching, verdicts
 
+import flyball as fb
+from flyball.results.doubts import energy_moved
+
+from . import verdict
+
 pytestmark = pytest.mark.filterwarnings(
     "ignore::flyball.errors.StartWarning", "ignore::flyball.errors.PerformanceNotice"
 )
@@ -38,6 +43,42 @@ def test_what_was_found_is_right(family, seed):
     """Once wrong, or taken for it, as by rounding that stands for nothing."""
     verdict = verdicts.judged(family, seed, 3)
     assert verdict.kind in ("agrees", "refused", "warned"), [str(f) for f in verdict.findings]
+
+
+WAYS = [  # and the other way in which it was; none: by a judge of one motion
+    *(("happenings", 200034, "coordinates"), ("happenings", 500069, "axes"), ("couplings", 500030, "rk45")),
+    *(("happenings", 700023, "coordinates"), ("sticking", 300046, "axes"), ("shaken", 500066, "radau"), ("shaken", 500092, "axes")),
+    *(("sampled", 500011, "radau"), ("parallel_cranks", 500084, "coordinates"), ("parallel_cranks", 500084, "radau")),
+    *(("windows", 500008, ""), ("windows", 500086, ""), ("stiff", 500049, ""), ("stiff", 500033, ""), ("sliding", 500023, "")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("family", "seed", "way"), WAYS)
+def test_what_was_found_is_right_by_the_way_that_found_it(family, seed, way):
+    found = verdicts.judged(family, seed, 1, [way or "order"])
+    assert found.kind == "agrees", [str(f) for f in found.findings]
+
+
+def test_energy_that_is_off_at_any_tolerance_is_seen(monkeypatch):
+    """What the tolerance makes of it falls with the tolerance: of a window at rtol = 1e-4, by singular positions."""
+    case = content.made("windows", 500008)
+    assert verdict.judge(case).kind == "healthy"
+    monkeypatch.setattr(verdict, "energy_moved", lambda r: 1e-4 * energy_moved(r))  # as if it were off by that more
+    assert "energy off" in verdict.judge(case).text
+
+
+@pytest.mark.parametrize(("angle", "firm"), [(0.0, 1.0), (1e-3, 1e-3), (1e-9, 1e-9)])
+def test_firmness_of_a_structure_that_is_all_but_free(angle, firm):
+    """Two bars on one line, of which one point in the middle is off by an angle: that holds it, by the angle's sine."""
+    m = fb.Mechanism("m", planar=True)
+    m.add(fb.Body("a", mass=1, inertia=1), fb.Body("b", mass=1, inertia=1))
+    m.add(
+        fb.Revolute("A", "ground", "a", at=(-1, 0)),
+        fb.Revolute("B", "a", "b", at=(0, angle)),
+        fb.Revolute("C", "ground", "b", at=(1, 0)),
+    )
+    found = relations.firmness(m)
+    assert found > 0.1 if firm == 1.0 else 0.1 * firm < found < firm
 
 
 def _latching(*happened):

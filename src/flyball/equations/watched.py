@@ -135,6 +135,7 @@ def note(A, K, row):
     if S.guard_i[last, GUARD_KIND] == G_SHARED:
         K.g[grain, last] = GRAIN * A[GROUP].size[0]
     for i in range(K.grain.shape[0]):
+        K.g[grain, i] = max(K.g[grain, i], K.least[i])
         K.grain[i] = K.g[grain, i] if K.kept[i] == 1 else min(K.g[GRAIN_START, i], K.g[grain, i])
 
 

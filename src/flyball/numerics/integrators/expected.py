@@ -1,12 +1,14 @@
 """What guards depend on, between the ends of a step, without evaluating the equations there.
 
-Measured quantities are the polynomials of degree five through their values, rates and accelerations at the ends; what
-has no known rate (multipliers, loads) is the polynomial through the ends and what late stages of the step have seen.
+Measured quantities are the polynomials of degree five through their values, rates and accelerations at the ends. In a
+step so short that values differ by rounding, rates are cubics and values the integrals of these. What has no known rate
+(multipliers, loads) is the polynomial through the ends and what late stages of the step have seen.
 """
 
 from __future__ import annotations
 
 from ...compiler.formulas import formula
+from .watching import BRIEF
 
 
 @formula
@@ -14,7 +16,7 @@ def expect(W, x, h):
     """What is measured at a part x of the step, and its rates, to W.sensed; multipliers to W.lam."""
     n = W.moving.shape[2]
     for m in range(n):
-        value, rate = quintic(W.moving, m, x, h)
+        value, rate = quintic(W.moving, m, x, h, W.count[BRIEF] == 1)
         W.sensed[0, m], W.sensed[1, m], W.sensed[0, n + m] = value, rate, rate
     rows = W.rows.shape[0]
     count = W.places.shape[0]
@@ -45,13 +47,13 @@ def got(W, m, rows):
 
 
 @formula
-def quintic(ends, m, x, h):
+def quintic(ends, m, x, h, brief):
     """Value and rate at a part x of the step of what has values, rates and accelerations ``ends[end, :, m]``."""
     f, u, a = ends[0, 0, m], h * ends[0, 1, m], h * h * ends[0, 2, m]
-    last = ends[1, 0, m]
-    if f == 0.0 and last == 0.0:  # a velocity that is no rate of anything: the integral of its own cubic
-        last = 0.5 * (u + h * ends[1, 1, m]) + (a - h * h * ends[1, 2, m]) / 12.0
-    d0 = last - f - u - 0.5 * a
+    change = ends[1, 0, m] - f
+    if brief or (f == 0.0 and ends[1, 0, m] == 0.0):  # the integral of the rate's own cubic; some are rates of nothing
+        change = 0.5 * (u + h * ends[1, 1, m]) + (a - h * h * ends[1, 2, m]) / 12.0
+    d0 = change - u - 0.5 * a
     d1 = h * ends[1, 1, m] - u - a
     d2 = h * h * ends[1, 2, m] - a
     c3 = 10.0 * d0 - 4.0 * d1 + 0.5 * d2

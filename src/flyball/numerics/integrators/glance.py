@@ -11,7 +11,7 @@ from .clock import BETWEEN, PART, T
 from .concave import BLURRED, FAR, ODD, borne_out
 from .grains import blur
 from .loop import WITHIN
-from .watching import END, LEAST, LOOKS, LOST, MISS, MOST, PLAIN, SOUGHT, START, TERMS, THERE, TRUE, TRULY
+from .watching import BRIEF, END, LEAST, LOOKS, LOST, MISS, MOST, PLAIN, SOUGHT, START, TERMS, THERE, TRUE, TRULY
 
 SHORT = 1e-7  # part of the time span: in steps so short there is nothing but rounding to be found
 
@@ -56,6 +56,7 @@ def compare(look, S, W, t, h, span):
     ng = W.way.shape[0]
     W.count[SOUGHT] = W.count[LOST] = 0
     W.count[PLAIN] = 1
+    W.count[BRIEF] = 1 if h <= SHORT * span else 0
     every = ng + W.count[TERMS]
     for i in range(every):
         W.g[LEAST, i] = min(W.g[START, i], W.g[END, i])
@@ -72,7 +73,7 @@ def compare(look, S, W, t, h, span):
             W.g[LEAST, i] = min(W.g[LEAST, i], f, g)
             W.g[MOST, i] = max(W.g[MOST, i], f, g)
             W.g[MISS, i] = max(W.g[MISS, i], abs(f - g))
-    if h <= SHORT * span:
+    if W.count[BRIEF] == 1:
         W.count[PLAIN] = 1
         return
     for i in range(ng):

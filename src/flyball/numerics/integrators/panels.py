@@ -10,7 +10,7 @@ from __future__ import annotations
 from ...compiler.formulas import formula
 from .clock import LARGEST, T
 from .concave import BLURRED, NOISE, ODD, bent
-from .glance import glance
+from .glance import glance, true_guard
 from .grains import RESOLVED, blur, corner, gone, hush, rounding
 from .watching import (
     AWAY,
@@ -298,7 +298,13 @@ def begin_sides(callbacks, S, W, R, c, h):
         x = 0.5**n
         look(t, h, x, S, W, THERE)
         W.count[LOOKS] += 1
-        i = begun(W)
+        i = begun(W, 0)
+        while i >= 0 and W.count[AWAY] == 1:  # the equations tell whether it is: interpolation is less exact
+            status, f = true_guard(callbacks, S, W, R, c, h, x, i)
+            if status != 0 or not f >= -band(W, i):
+                break
+            W.count[AWAY] = 0
+            i = begun(W, i + 1)
         if i >= 0:
             return i, before, x, x
         before = x
@@ -348,9 +354,9 @@ def begins_near(callbacks, S, W, R, c, h):
 
 
 @formula
-def begun(W):
-    """A guard that leaves at once the side that it first went to, or has to keep, as W.g[THERE] has it; or -1."""
-    for i in range(W.way.shape[0]):
+def begun(W, first):
+    """A guard from ``first`` on that leaves at once the side that it went to, or has to keep, by W.g[THERE]; or -1."""
+    for i in range(first, W.way.shape[0]):
         f = W.g[THERE, i]
         s = W.g[SIDE, i]
         if W.g[MARK, i] < 0.0 or W.fired[i] != 0:

@@ -29,8 +29,8 @@ PANEL, WIDTH, SAME, DONE_TO, BEYOND, BRACKET, STRAYED, LATEST, FASTEST, REAL = r
 # be found; steps watched; places looked at; steps taken again; events; whether what is expected within it is borne
 # out; places looked at with the equations since it was taken, and in all; whether they could not be evaluated at one;
 # times that a step was cut since it could not be looked through; whether a guard leaves the side that it has to keep;
-# terms of the last guard, that of a group: see `concave`
-STAGE, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, TERMS, COUNT = range(14)
+# terms of the last guard, that of a group: see `concave`; whether the step is so short that only rates tell of rates
+STAGE, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, TERMS, BRIEF, COUNT = range(15)
 UNKNOWN = 2.0  # a side that follows from the value where the next step begins
 EVENT = 6  # a status beside those of the clock: the step ends on events, told in Watch.fired
 
@@ -42,6 +42,7 @@ class Watch(NamedTuple):
     kept: Int1  # (ng,): 1 of those that are above zero by what holds now
     firm: Int1  # (ng,): 1 of those that get no farther below zero by rounding than they begin
     grain: Float1  # (ng,): what is rounding of them; of those that may be anything, the less of both ends
+    least: Float1  # (ng,): force that is rounding, of guards of forces; 0 of the rest
     tied: Float1  # (ng,): size of what those are of that others keep at zero; 0 of the rest
     still: Float1  # (nm,): size of rates that others keep at zero; 0 of the rest
     side: Float1  # (ng,): 1 where the guard is above zero, -1 below; as a segment begins 0 if it has just fired
@@ -159,6 +160,7 @@ def watching(
         kept=(np.asarray(holding) > 0).astype(np.int64),
         firm=(np.asarray(holding) > 1).astype(np.int64),
         grain=np.zeros(ng),
+        least=np.zeros(ng),
         tied=np.zeros(ng),
         still=np.zeros(measured),
         side=np.full(ng, UNKNOWN),

@@ -259,7 +259,7 @@ def broken(n: Instant, found: Decided, guards: np.ndarray) -> list[int]:
     out = [
         k
         for k, (kind, s, _) in enumerate(n.guarded)
-        if kind in (G_PULL, G_HOLDS, G_CONE) and s in found.sizes and guards[k] < -BROKEN * found.sizes[s]
+        if kind in HOLDING and s in found.sizes and guards[k] < -BROKEN * found.sizes[s] - found.least[s]
     ]
     last = len(guards) - 1
     if n.shares and guards[last] < -BROKEN * n.here.group.size[0]:

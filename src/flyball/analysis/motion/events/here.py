@@ -76,6 +76,8 @@ class Here:
         What holds together and shares its forces (`equations.sharing`).
     tied : frozenset of tuple
         Guards (kind, switch) of what is at its end and is kept there by others (`events.idle`).
+    least : dict
+        Switch -> force that is rounding, of what takes part in the modes decided last.
     still : tuple of int
         Measured quantities whose rates what holds keeps at zero (`events.still`).
     seen : Segments, optional
@@ -99,6 +101,7 @@ class Here:
     bounces: dict[int, Any] = field(default_factory=dict)
     swings: dict[int, list[float]] = field(default_factory=dict)
     tied: frozenset[tuple[int, int]] = frozenset()
+    least: dict[int, float] = field(default_factory=dict)
     still: tuple[int, ...] = ()
     seen: Any = None
     sharing: Any = None

@@ -17,7 +17,7 @@ from ....equations.tasks import MOTION
 from ....equations.watched import Loop
 from ....numerics.cone.dense.problem import EVEN, FOUND, OUT, PUSHES
 from ....numerics.integrators.clock import SPAN, H, T
-from ....tables.system import BODY_LAW, G_BACK, G_LOWER, G_UPPER, ROW_WORK, UNIT, V0
+from ....tables.system import BODY_LAW, G_BACK, G_CONE, G_HOLDS, G_LOWER, G_PULL, G_UPPER, ROW_WORK, UNIT, V0
 from .here import Here
 from .instant import Instant, instant_of, slowest
 
@@ -30,6 +30,7 @@ SOON = (1.0, 1e2, 1e4)  # moments later, in parts of the first
 OF_STEP, OF_SPAN = 1e-6, 1e-9  # the first: part of the step before, of the time of the motion
 SAME = 1e-11  # of a row's own response: it moves with others
 ONE_SIDED = (STOP, RATCHET, ONE_WAY)
+FORCES_HELD = (G_PULL, G_HOLDS, G_CONE)  # guards of forces of what holds
 
 
 def idle(n: Instant, found: Decided) -> list[int]:
@@ -111,13 +112,18 @@ def _driven(n: Instant, B: Bench, i: int, others: tuple[list[int], np.ndarray]) 
 
 
 def tie(here: Here, loop: Loop) -> None:
-    """Have the loop know what is kept at its end by others: a rate is none by which nothing gets anywhere."""
-    loop.desk.tied[:] = loop.desk.still[:] = 0.0
+    """Have the loop know which forces are rounding, and what is kept at its end by others.
+
+    Of the latter a rate is none by which nothing gets anywhere.
+    """
+    loop.desk.tied[:] = loop.desk.still[:] = loop.desk.least[:] = 0.0
     if here.still:
         at = list(here.still)
         loop.desk.still[at] = here.c.system.glob[UNIT : UNIT + len(loop.desk.still)][at] * slowest(here)
-    if here.tied:
+    if here.tied or here.least:
         n = instant_of(here)
         for g, (kind, s, _) in enumerate(n.guarded):
+            if kind in FORCES_HELD:
+                loop.desk.least[g] = here.least.get(s, 0.0)
             if (kind, s) in here.tied:
                 loop.desk.tied[g] = n.unit[s] * (n.pace if kind == G_BACK else 1.0)

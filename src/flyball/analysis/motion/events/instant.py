@@ -13,11 +13,12 @@ from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....equations.engine import engine
 from ....equations.instant import AGAIN, BALANCE, BARE, IMPULSES, LOOK, Bench, Desk, bench, instant
 from ....equations.sharing import margin_kernel
-from ....equations.tasks import ARRIVE, SOLVE, WATCH, Sheet
+from ....equations.tasks import ARRIVE, MOTION, SOLVE, WATCH, Sheet
 from ....numerics.cone.dense.problem import FREE, Dense, dense
 from ....numerics.integrators.clock import COUNTS, REALS, SPAN, STATES, Clock, T
 from ....numerics.integrators.tableaux import tableau
 from ....tables.system import (
+    BIAS,
     EFFORT,
     FORCE_LOAD,
     G_SHARED,
@@ -33,6 +34,7 @@ from ....tables.system import (
     SWITCH_MEASURED,
     TEMPO,
     VALUE,
+    X_SOLVED,
 )
 from .bounds import sizes, units
 from .here import Here
@@ -41,10 +43,11 @@ from .holding import GONE
 NEAR = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
 REST = 1e-12  # of the length of the mechanism (or a radian) at the rate `slowest`: the same where all is at rest
 NO_KIND = -1  # of what was released: it takes no part
-IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
+IMMOVABLE = 1e-10  # of all mass: what moves less by a force is moved by drivers only; redundant rows leave 1e-11 of it
 STOPS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
 MOTIONLESS = 1e-9  # of how gravity accelerates: what nothing moves and has no more than that stands still
 FAINT = 1e-5  # of that: an acceleration that is none, whatever it is the difference of
+DIGITS = 2e-15  # of the mechanism's length, or of a radian: last digits of positions
 DECIDED = (*STOPS, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes follow from the small problem
 
 
@@ -127,6 +130,7 @@ class Instant:
         self.all.B.which[:] = np.arange(len(self.m))
         self.rooms.clear()
         self.begin()
+        self.blurred = self._blurred()
 
     def begin(self) -> None:
         """At another instant, where other elements may have been released."""
@@ -134,6 +138,30 @@ class Instant:
         self.kind = np.where(self.W.switch[SPARE] == GONE, NO_KIND, self.S.switch_i[:, SWITCH_KIND])
         self.kinds = self.kind.tolist()
         self.decided = [s for s in self.of(*DECIDED) if self.m[s] >= 0]
+
+    def _blurred(self) -> np.ndarray:
+        """How the last digits of positions change the accelerations of switches' quantities, (ns,).
+
+        That is rounding of forces, as of stiff springs near their free lengths. Everything that is decided is off.
+        """
+        c, nq, nv = self.here.c, len(self.here.q), self.here.structure.nv
+        which, modes = np.flatnonzero(self.m >= 0), self.W.switch[MODE].copy()
+        self.bared()
+        self.put()
+        self.desk.y[0, nq : nq + nv] = c.sizes * (1.5 + np.cos(np.arange(nv)))  # a way that no symmetry has
+        self.engine(MOTION)
+        q_dot, out, before = self.desk.K[0, :nq].copy(), np.zeros(len(self.m)), np.zeros(0)
+        for step in (0.0, DIGITS, -DIGITS):
+            self.put()
+            self.desk.y[0, :nq] += step * q_dot
+            if self.engine(MOTION) != 0:
+                break
+            a = self.gradients(which) @ self.W.vel[X_SOLVED, :nv] + self.W.sensed[BIAS, self.m[which]]
+            before = a if step == 0.0 else before
+            out[which] = np.fmax(out[which], np.abs(a - before))
+        self.W.switch[MODE] = modes
+        self.ask(MOTION)
+        return out
 
     def of(self, *kinds: int) -> list[int]:
         """Switches of these kinds."""
@@ -225,7 +253,7 @@ class Instant:
         self.slide(parts)
         self.put()
         status = room.do(BARE)
-        P.grain[:] += FAINT * self.tiny[B.which]
+        P.grain[:] += FAINT * self.tiny[B.which] + self.blurred[B.which]
         for i in np.flatnonzero(P.A.diagonal() * self.inertia[B.which] < IMMOVABLE).tolist():
             P.A[i] = P.A[:, i] = 0.0
             if abs(P.b[i]) <= self.tiny[B.which[i]]:

@@ -31,7 +31,7 @@ class Decided:
     """Modes at an instant: rows that took part, and the problem as it was solved.
 
     ``sizes`` has of each switch the forces that its own is the difference of; ``taken_up``: all of them hold, by shares
-    that are clearly within their bounds.
+    that are clearly within their bounds; ``least``: of each switch the force that rounding of accelerations makes.
     """
 
     parts: list[Part]
@@ -42,6 +42,7 @@ class Decided:
     lean: np.ndarray
     reach: np.ndarray
     sizes: dict[int, float]
+    least: dict[int, float]
     A: np.ndarray
     gain: np.ndarray
     taken_up: bool = False
@@ -70,18 +71,19 @@ def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fire
         let_go = {i: p for i, p in let_go.items() if i not in back} if back else {}
     if found.ended == FOUND:
         take_over(n, found)
-        n.here.tied, n.here.still = tied(n, found), kept_still(n, found)
+        n.here.tied, n.here.still, n.here.least = tied(n, found), kept_still(n, found), found.least
         write(n, found, still)
     return found
 
 
 def _loose(n: Instant, found: Decided, fired: np.ndarray) -> dict[int, Part]:
-    """Rows that hold and whose guards fired, as they are when they do not."""
+    """Rows that hold and whose guards fired, as they are when they do not; friction that carries nothing holds on."""
     ends = {s: kind for kind, s, _ in (n.guarded[g] for g in fired) if kind in (G_PULL, G_HOLDS)}
     out = loose(n, found.parts, (found.x, found.state, found.reach, np.full(len(found.x), np.inf)), fired)
     asked = {(G_PULL, PUSHES), (G_HOLDS, GRIPS)}
     for i, p in enumerate(found.parts):
-        if found.state[i] == EVEN and (ends.get(p.switch, -1), p.rule) in asked:
+        idle = p.rule == GRIPS and max(abs(found.x[i]), found.reach[i]) <= found.least[p.switch]
+        if found.state[i] == EVEN and (ends.get(p.switch, -1), p.rule) in asked and not idle:
             out[i] = _let_go(p, found.x[i])
     return out
 
@@ -133,10 +135,11 @@ def solved(n: Instant, parts: list[Part], *, company: bool = False) -> Decided:
             B.way[i] = P.lean[i] if parts[i].way != 0.0 else 0.0
     x = P.x.copy()
     terms = (np.abs(P.b) + np.abs(P.A) @ np.abs(x)) / np.maximum(P.A.diagonal(), 1e-300)
-    sizes = {p.switch: float(z) for p, z in zip(parts, terms, strict=True)}
+    rounding = P.grain * np.minimum(1.0 / np.maximum(P.A.diagonal(), 1e-300), n.inertia[B.which])
+    sizes, least = ({p.switch: float(z) for p, z in zip(parts, of, strict=True)} for of in (terms, rounding))
     return Decided(
-        parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, P.A.copy(), P.gain.copy(),
-        company and bool(resting.any()),
+        parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, least, P.A.copy(),
+        P.gain.copy(), company and bool(resting.any()),
     )  # fmt: skip
 
 
