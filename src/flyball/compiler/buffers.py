@@ -91,9 +91,7 @@ def _describe(fields: Any, layout: Struct, known: dict[int, StructBuffer], words
         _describe_one(x, of, name, layout, known, words)
 
 
-def _describe_one(
-    x: Any, of: Any, name: str, layout: Struct, known: dict[int, StructBuffer], words: list[int]
-) -> None:
+def _describe_one(x: Any, of: Any, name: str, layout: Struct, known: dict[int, StructBuffer], words: list[int]) -> None:
     if not isinstance(x, tuple):
         words += described(x, of, f"{layout.of.__name__}.{name}")
         if isinstance(of, CodeTables) and x.any():

@@ -109,7 +109,7 @@ def values(
 
 def values_of(s: Structure, n: Numbers, holds: Mapping[str, complex] | None = None) -> Values:
     """The same from the numbers of its elements."""
-    if kind_of([*n.env.values(), *(holds or {}).values()]) is not float:
+    if n.dtype is not float or (holds and kind_of(holds.values()) is not float):
         return _filled(s, n, holds or {})
     return s.kept.get("values", (n.key, bits(holds or {})), MOST, lambda: _filled(s, n, holds or {}))
 
@@ -148,7 +148,7 @@ def _forced(s: Structure, given: Numbers, new: Afresh) -> Values | None:
 
 def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afresh) -> Values:
     model, env, numbers, bodies = s.model, given.env, given.of, given.bodies
-    dtype = kind_of([*given.env.values(), *holds.values()])
+    dtype = kind_of([*given.env.values(), *holds.values()]) if holds else given.dtype
     pose = Poses(s, given)
     frame_x = _frame_x(s, pose, new.table("frame_x", (len(s.frames), 12), dtype), new)
     length = _length(s, frame_x, bodies)
@@ -177,9 +177,8 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
 
 
 def _frame_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
-    for k, f in enumerate(s.frames):
-        if new.asks(f.element):
-            x[k] = pose.row(f)
+    for k in new.rows(s, "frames"):
+        x[k] = pose.row(s.frames[k])
     return x
 
 
@@ -257,9 +256,8 @@ def _term_x(
     numbers = pose.numbers
     factors = {c.name: np.array(c.factors(numbers[c.name], s.model, pose.axis)) for c in s.model.couplings}
     factors = {name: f / f[0] for name, f in factors.items()}
-    for k, t in enumerate(s.terms):
-        if not new.asks(t.element, t.owner):
-            continue
+    for k in new.rows(s, "terms"):
+        t = s.terms[k]
         x[k] = t.formula.par
         x[k, 7] = t.sign * t.formula.par[7]
         e = t.element
@@ -299,9 +297,8 @@ def _coupled(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
 
 
 def _force_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
-    for k, e in enumerate(s.forces):
-        if not new.asks(e):
-            continue
+    for k in new.rows(s, "forces"):
+        e = s.forces[k]
         par = e.parameters(pose.numbers[e.name], pose.apart(e))
         if len(par) > x.shape[1]:
             raise ModelError(f"{e.title}: parameters() gives {len(par)} numbers; a force has up to {x.shape[1]}")

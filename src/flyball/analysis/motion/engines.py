@@ -107,8 +107,9 @@ class Engine:
             if wish == AUTO:
                 self.due = FIRST
                 self._kind, self._each = kind(c.structure)
-            if special.ready() and special.known(plan := special.plan(c.values), c.values) == "memory":
-                self._take(plan)
+            made = special.in_memory(special.plan(c.values), c.values) if special.ready() else None
+            if made is not None:
+                self._take(made, "kept in this process")
 
     def begin(self, clock: ex.Clock) -> None:
         """The motion begins there."""
@@ -164,7 +165,7 @@ class Engine:
         try:
             if without:
                 raise special.Refused(without)
-            self._take(special.plan(self.c.values))
+            self._take(*special.code(special.plan(self.c.values), self.c.values))
         except special.Refused as error:
             raise ModelError(f"specialize=True: {error}; leave it out") from None
 
@@ -179,7 +180,7 @@ class Engine:
                 raise special.Refused(why)
             there = special.known(plan, x)
             if there or self._pays(left + SPENT.of(self._kind) / MANY, special.price(plan, there)):
-                self._take(plan)
+                self._take(*special.code(plan, x))
         except special.Refused as error:
             self.told, self.due = f"{TABLES}: {error}", math.inf
 
@@ -187,7 +188,6 @@ class Engine:
         """Whether code is worth a price (both [ns])."""
         return computing * (1.0 - 1.0 / GAIN) >= MARGIN * price
 
-    def _take(self, plan: special.Plan) -> None:
-        made, how = special.code(plan, self.c.values)
+    def _take(self, made: special.Made, how: str) -> None:
         self.c.run_on(made)
         self.told, self.due = f"{MADE}: {how}", math.inf

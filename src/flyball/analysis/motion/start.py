@@ -21,7 +21,7 @@ from ...tables.specs import Structure
 from ...tables.structure import outdated
 from ...tables.switches import declared
 from ...tables.system import HOLD, MODE, Q0, SEMIDEFINITE, VALUE
-from ...tables.values import values
+from ...tables.values import values_of
 from ..assemble import assemble
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
@@ -191,7 +191,7 @@ def begin_at(
         a = found.assembly.again()
     else:
         c = found.assembly.compiled
-        own = Compiled(values(c.structure, parameters), c.z, dict(parameters or {}))
+        own = Compiled(values_of(c.structure, x.given), c.z, dict(parameters or {}))
         a = replace(found.assembly.again(), compiled=own.again())
     if before is None:
         return Start(base, a, a.y, found.coordinates, dict(found.wound))
