@@ -5,9 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..compiler.kernels import kernel
-from ..compiler.layout import Float2, Float3
-from ..tables.system import System
+from ..compiler.layout import Float2, Float3, Int2
 from .tree import motion, pose
+
+
+class Bodies(NamedTuple):
+    """What of `System` it is computed from."""
+
+    body_i: Int2
+    body_x: Float2
 
 
 class AtOnce(NamedTuple):
@@ -27,7 +33,7 @@ class OverTime(NamedTuple):
 
 
 @kernel
-def kinematics_over_time(S: System, W: AtOnce, q: Float2, v: Float2, out: OverTime) -> int:
+def kinematics_over_time(S: Bodies, W: AtOnce, q: Float2, v: Float2, out: OverTime) -> int:
     """Poses, velocities and bias accelerations at the coordinates q (n, nq) and velocities v (n, nv)."""
     for i in range(q.shape[0]):
         for b in range(S.body_i.shape[0]):

@@ -108,7 +108,9 @@ def assembled(
 def _own_places(c: Compiled) -> bool:
     """Whether turns and places as drawn are others than those of the values that differ in forces alone."""
     x, n = c.values, len(c.structure.controls)
-    return x.alike is None or not np.array_equal(places(x)[n:], places(x.alike)[n:])
+    if (other := x.alike) is None:
+        return True
+    return not np.array_equal(c.z[n:], other.kept.get("places", None, 1, lambda: places(other))[n:])
 
 
 def _found(
