@@ -120,7 +120,8 @@ def _filled(s: Structure, given: Numbers, holds: Mapping[str, Any]) -> Values:
         return _refilled(s, given, holds, Afresh())
     first = s.kept.known("filled first")
     new = Afresh.since(first, given, s.model)
-    x = (_forced(s, given, new) if new.only_acts else None) or _refilled(s, given, holds, new)
+    x = _forced(s, given, new) if new.only_acts and given.dtype is float else None
+    x = x or _refilled(s, given, holds, new)
     if first is None and given.dtype is float:
         s.kept.get("filled first", None, 1, lambda: x)
     return x
