@@ -88,7 +88,7 @@ class Records:
         """Record of body b's centre of mass."""
         return load(self.W.BK, b)
 
-    def bodies(self, b: Sequence[int]) -> Record:
+    def bodies(self, b: Sequence[int] | np.ndarray) -> Record:
         """Records of several bodies' centres of mass: arrays (bodies, n)."""
         return load(self.W.BK[b].swapaxes(0, 1)[None], 0)
 
