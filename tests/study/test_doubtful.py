@@ -10,9 +10,6 @@ import pytest
 import xarray as xr
 
 import flyball as fb
-from flyball.analysis.runs.compute import compute
-from flyball.analysis.runs.runner import runner
-from tests.study.test_shared import question
 
 ROUGH = {"t_end": 10, "method": "rk45", "rtol": 0.1}
 OF = {
@@ -62,23 +59,6 @@ def test_steps_of_a_fixed_width():
     s = m.study({"k": [1.0, 1.5]}, ["end(a.y)"], **(ROUGH | {"method": "generalised-alpha", "step": 0.2}))
     assert s.doubtful == single(m, s)
     assert s.doubtful
-
-
-def test_judged_at_once_or_one_by_one_is_the_same(monkeypatch):
-    m = pendulum()
-    q = question(m, ("J", "k"), ["a.y"], t_end=8.0, method="rk45", rtol=3e-3, outputs=np.linspace(0, 8, 40))
-    q = type(q)(q.model, q.single, q.options, q.names, q.asked, np.linspace(0, 8, 40))
-    points = np.random.default_rng(1).uniform(0.5, 2.0, (30, 2))
-    run = runner(q, points)
-    lean = run.__self__
-    a, b = run(points, lambda: False), compute(q, points)
-    assert a.doubtful == b.doubtful
-    assert 0 < len(a.doubtful) < 30
-    sound = lean.judge.sound
-    assert [yes for _, yes in sound.values()] == [True]
-    for k in list(sound):
-        sound[k] = sound[k][0], False
-    assert run(points, lambda: False).doubtful == a.doubtful
 
 
 def test_files_and_labelled_data_have_the_mark(tmp_path):

@@ -232,7 +232,7 @@ class Compiled:
     def mass_entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows, columns and entries of the mass matrix of absolute coordinates."""
         x = self.values
-        return x.kept.get("mass", None, 1, lambda: self._entries(INERTIA, x.system.body_x[:, MASS]))
+        return x.unforced.kept.get("mass", None, 1, lambda: self._entries(INERTIA, x.system.body_x[:, MASS]))
 
     def inverse_mass_root(self, movable: np.ndarray, dense: bool = False):
         """R, sparse if not told, with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.

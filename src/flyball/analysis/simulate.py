@@ -277,7 +277,7 @@ def energy_size(a: Assembly, span: float) -> float:
     much in the time there is, besides what it has.
     """
     x = a.compiled.values
-    weight = x.kept.get("weight", None, 1, lambda: _weight(x.system))
+    weight = x.unforced.kept.get("weight", None, 1, lambda: _weight(x.system))
     return lifted(weight, x.length, span) + a.compiled.kinetic_energy(a.v)
 
 

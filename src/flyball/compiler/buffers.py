@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator, Sequence
+from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -68,18 +69,37 @@ class StructBuffer:
         self.words = np.array(words, np.int64)
         self.address = address_of(self.words)
 
+    def of(self, fields: Any) -> StructBuffer:
+        """That of another tuple of this kind, most of whose arrays are the same."""
+        if layout_of(fields) != self.layout:
+            return StructBuffer(fields)
+        other = copy(self)
+        other.fields, other.words = fields, self.words.copy()
+        other.address = address_of(other.words)
+        at = 0
+        for old, new, (name, layout) in zip(self.fields, fields, self.layout.fields, strict=True):
+            if new is not old:
+                words: list[int] = []
+                _describe_one(new, layout, name, self.layout, {}, words)
+                other.words[at : at + len(words)] = words
+            at += layout.size // 8
+        return other
+
 
 def _describe(fields: Any, layout: Struct, known: dict[int, StructBuffer], words: list[int]) -> None:
     for x, (name, of) in zip(fields, layout.fields, strict=True):
-        if isinstance(x, tuple):
-            if (there := known.get(id(x))) is not None:
-                words += there.words.tolist()
-            else:
-                _describe(x, of, known, words)
-        else:
-            words += described(x, of, f"{layout.of.__name__}.{name}")
-            if isinstance(of, CodeTables) and x.any():
-                make_ready(x, layout.complex)
+        _describe_one(x, of, name, layout, known, words)
+
+
+def _describe_one(x: Any, of: Any, name: str, layout: Struct, known: dict[int, StructBuffer], words: list[int]) -> None:
+    if not isinstance(x, tuple):
+        words += described(x, of, f"{layout.of.__name__}.{name}")
+        if isinstance(of, CodeTables) and x.any():
+            make_ready(x, layout.complex)
+    elif (there := known.get(id(x))) is not None:
+        words += there.words.tolist()
+    else:
+        _describe(x, of, known, words)
 
 
 def described(x: np.ndarray, of: Array, name: str) -> tuple[int, ...]:

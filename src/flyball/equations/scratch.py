@@ -55,13 +55,19 @@ def fill(s: Structure, system: System, array: Callable[[str], np.ndarray]) -> No
         switch = array("switch")
         switch[LOWER], switch[UPPER] = system.switch_x[:, SWITCH_LOWER], system.switch_x[:, SWITCH_UPPER]
     if n := system.kinds[GROUND_FRAMES]:
-        _, at_rest = s.kept.get("ground", id(system), MOST, lambda: (system, on_ground(system)))  # told by its address
+        frames = system.frame_x  # told by their address
+        _, at_rest = s.kept.get("ground", id(frames), MOST, lambda: (frames, on_ground(system)))
         array("FK")[:n] = at_rest
 
 
 def tables(s: Structure, system: System) -> StructBuffer:
     """The tables as compiled code has them."""
-    return s.kept.get("written", id(system), MOST, lambda: StructBuffer(system))  # whose address it keeps from others
+    return s.kept.get("written", id(system), MOST, lambda: _described(s, system))  # whose address it keeps from others
+
+
+def _described(s: Structure, system: System) -> StructBuffer:
+    first = s.kept.get("written first", None, 1, lambda: StructBuffer(system))
+    return first.of(system)
 
 
 def on_ground(system: System) -> np.ndarray:

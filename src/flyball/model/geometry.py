@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
-from ..math.lanes import per_lane
 from ..math.products import product
 from ..math.scalar import real_parts
 from ..math.turns import turn
@@ -39,7 +38,6 @@ def vector(values: Any, planar: bool, what: str, direction: bool = False) -> np.
     return a / size
 
 
-@per_lane
 def triad(z: np.ndarray) -> np.ndarray:
     """Right-handed axes (columns) with the given unit vector as z; the world's axes where z is vertical.
 
@@ -66,7 +64,6 @@ def quaternion_to_matrix(e: np.ndarray) -> np.ndarray:
     return np.array(quaternion_matrix(*e)).reshape(3, 3)
 
 
-@per_lane
 def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
     """Unit quaternion, scalar first and not negative, of a rotation matrix; of many, (..., 3, 3), in one call."""
     return quaternion_of(R)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
-from ..math.lanes import per_lane
 from ..math.products import inner, product
 from ..math.scalar import real_parts
 from .element import positive
@@ -209,12 +208,10 @@ def _check(body: Body, n: SimpleNamespace, found: MassProperties) -> None:
         )
 
 
-@per_lane
 def _symmetric(J: np.ndarray) -> bool:
     return all(np.abs(A - A.T).max() <= 1e-12 * np.abs(A).max() for A in (real_parts(J), J.imag))
 
 
-@per_lane
 def _moments(J: np.ndarray) -> np.ndarray:
     """Principal moments, ascending."""
     return np.linalg.eigvalsh(real_parts(J))

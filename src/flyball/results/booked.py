@@ -88,14 +88,23 @@ def added(result: Any) -> dict[str, np.ndarray]:
 
 def _first(result: Any, name: str) -> Any:
     """Stored in a force at the start, and the work of that before it [J]; at the first output if nobody said."""
-    if result.begun.y is None:
-        return result[name].energy[:1].sum()  # complex where derivatives are asked for
+    if result.begun.y is None or _at_start(result):
+        stored = result[name].energy[:1].sum()  # complex where derivatives are asked for
+        return stored + result.begun.done.get(name, 0.0)
     known = result.__dict__.setdefault("_at_first", {})
     if not known:
         every = result.stretches.all if result.stretches is not None else ()
         by = (every[0].values, every[0].switch) if every else (result.values, None)
         known.update(_stored(result, by, result.begun.y))
     return known.get(name, 0.0) + result.begun.done.get(name, 0.0)
+
+
+def _at_start(result: Any) -> bool:
+    """Whether the first output is the state that the motion began with, and no event changed anything since."""
+    if result.stretches is not None or not len(result.t):
+        return False
+    first = np.concatenate([x[0] for x in (result.q, result.v, result.hints)])
+    return np.array_equal(first, result.begun.y)
 
 
 def _over(result: Any, each: list[float]) -> np.ndarray:

@@ -11,10 +11,10 @@ from ..equations.loads import wide
 from ..tables.reads import read
 from ..tables.system import FORCE_F
 from .energy import gained
-from .lag import late, perhaps_late
+from .lag import late
 from .ledger import Ledger, apart, whole
 from .one_sided import one_way, pulls
-from .overturned import overturned, perhaps_overturned
+from .overturned import overturned
 from .residue import missed
 
 if TYPE_CHECKING:
@@ -32,8 +32,6 @@ ROUGHEST = 2e-2  # part of the energy moved that no tolerance excuses
 DISSIPATED = 0.1  # part of what impacts and friction dissipate, beside which a numerical loss changes a motion little
 SLIGHT = 1e-6  # part of the energy that lifts all bodies by one's size, which the residuals of solves may take at rest
 PIECES, ROWS = 64, 4  # stretches that the balance is judged by at most, and rows of output in each at least
-NEARLY = 0.99  # part of what is to be expected from which on a motion among many is looked at by itself
-LOOSE = 1e-5  # rtol above which each of many is
 SEEN = 0.1  # part of the energy that accelerations tell of; where less stands in rows they miss the motion
 OPEN = 1e-6  # part of the mechanism's length above which violated constraints are
 UNSOLVED = 1e-6  # part of the accelerations by which they may miss the constraints
@@ -59,7 +57,8 @@ def warnings(result: Result) -> tuple[str, ...]:
 
 def doubtful(result: Result) -> tuple[str, ...]:
     """Reasons to think that a motion is not what its tolerance asks for; none for a sound one."""
-    balance = _balance(result) or late(whole(result))
+    ledger = whole(result)
+    balance = _balance(ledger) or late(ledger)
     return tuple(text for text in (balance, overturned(result), missed(result), _violation(result)) if text)
 
 
@@ -95,7 +94,7 @@ def warnings_of_impulses(result: Result) -> tuple[str, ...]:
     return (*result.health.remarks, *result.health.doubtful, *pulls(result))
 
 
-def balanced(result: Result) -> Any:
+def balanced(result: Result) -> float:
     """Part of the energy moved by which the balance of a sound motion may be off.
 
     Errors of steps add up: a motion of few steps comes out to some units of its tolerance, one of ten thousand to a
@@ -106,8 +105,8 @@ def balanced(result: Result) -> Any:
     rtol = o.get("rtol")
     if rtol is None or o.get("step"):
         return UNBALANCED
-    expected = np.maximum(FINE * rtol**0.5, rtol * (FEW + EACH * result.health.steps))
-    return np.minimum(expected, max(MOST, min(ROUGH * rtol, ROUGHEST)))
+    expected = max(FINE * rtol**0.5, rtol * (FEW + EACH * result.health.steps))
+    return float(min(expected, max(MOST, min(ROUGH * rtol, ROUGHEST))))
 
 
 def energy_moved(result: Result) -> float:
@@ -118,30 +117,9 @@ def energy_moved(result: Result) -> float:
     return float(whole(result).moved(0, len(result.t)))
 
 
-def suspected(result: Result, runs: int) -> np.ndarray:
-    """Which of several motions may have a balance that is off, (runs,): of these more is to be looked at.
-
-    Parameters
-    ----------
-    result : Result
-        Motions with the same output times, one after the other, nothing exchanged at instants; the steps that its
-        health tells, and the length in its values, are theirs, (runs,).
-    runs : int
-        How many they are.
-    """
-    rtol = result.health.options.get("rtol")
-    ledgers = [whole(result), *(apart(result) if rtol is not None else [])]
-    found = np.full(runs, rtol is not None and rtol > LOOSE) | perhaps_late(ledgers[0].of_runs(runs))
-    found |= perhaps_overturned(result, runs)
-    for x in ledgers:
-        for _, _, lost, _, allowed in _excesses(x.of_runs(runs), len(result.t) // runs):
-            found |= ~(lost <= NEARLY * allowed)
-    return found
-
-
-def _balance(result: Result) -> str:
+def _balance(x: Ledger) -> str:
     """What is said of all of it; or else of the part whose balance is worst, of those that nothing connects."""
-    found = _off(whole(result))
+    found, result = _off(x), x.result
     if not found and result.health.options.get("rtol") is not None:
         found = max((_off(x) for piece in result.pieces or (result,) for x in apart(piece)), default=())
     return found[1] if found else ""
@@ -153,41 +131,44 @@ def _off(x: Ledger) -> tuple[float, str] | tuple[()]:
     What moves together is as accurate as the energy of all of it, and what nothing connects with others as its own.
     """
     rows, t = len(x.result.t), x.result.t
-    for begin, end, lost, there, allowed in _excesses(x, rows):
+    if all(lost <= allowed for _, _, lost, _, allowed in _excesses(x, rows, np.zeros(rows), 0.0)):
+        return ()  # what stands in no row, and rounding, only allow for more
+    for begin, end, lost, there, allowed in _excesses(x, rows, _unseen(x), _rest(x)):
         if lost > allowed and x.known(begin, end):
             when = "" if end - begin == rows else f" between t = {t[begin]:.6g} and {t[end - 1]:.6g} s"
-            return _told(x, when, float(lost), float(there), float(allowed))
+            return _told(x, when, lost, there, allowed)
     return ()
 
 
-def _excesses(x: Ledger, rows: int) -> Iterator[tuple[int, int, Any, Any, Any]]:
-    """First row and last (not counted), what is lost there, moved and to be expected [J] (each (runs,) of several).
+def _excesses(x: Ledger, rows: int, unseen: np.ndarray, least: float) -> Iterator[tuple[int, int, float, float, float]]:
+    """First row and last (not counted), what is lost there, moved and to be expected [J].
 
-    Of all rows, then of the stretches where more may be lost than that.
+    ``unseen`` and ``least``: see `_unseen` and `_rest`. Of all rows, then of the stretches where more may be lost than
+    that.
     """
-    unseen = _unseen(x)
-    part, moved, least = balanced(x.result), x.moved(0, rows) + unseen.max(axis=-1, initial=0.0), _rest(x)
-    yield 0, rows, np.abs(x.balance).max(axis=-1, initial=0.0), moved, part * moved + least
+    part, moved = balanced(x.result), x.moved(0, rows) + float(unseen.max(initial=0.0))
+    yield 0, rows, float(np.abs(x.balance).max(initial=0.0)), moved, part * moved + least
     for begin, end in _suspects(x, rows, x.kinetic + unseen, (part, moved, least)):
         # velocities v are as far off as those of what moves most, u: by m v du
-        lost = np.ptp(x.balance[..., begin:end], axis=-1)
-        there = x.moved(begin, end) + unseen[..., begin:end].max(axis=-1)
+        lost = float(np.ptp(x.balance[begin:end]))
+        there = x.moved(begin, end) + float(unseen[begin:end].max())
         yield begin, end, lost, there, part * (moved * there) ** 0.5 + least
 
 
-def _suspects(x: Ledger, rows: int, kinetic: np.ndarray, known: tuple[Any, Any, Any]) -> Iterator[tuple[int, int]]:
+def _suspects(
+    x: Ledger, rows: int, kinetic: np.ndarray, known: tuple[float, float, float]
+) -> Iterator[tuple[int, int]]:
     """Stretches in which more may be lost than is to be expected, by the kinetic energy there alone."""
-    part, moved, least = (np.asarray(a)[..., None] for a in known)
+    part, moved, least = known
     for edges in _stretches(x.result, rows):
         begins, ends = edges[:-1], edges[1:] + 1
         at = np.stack([begins, ends], axis=1).ravel()[:-1]  # each stretch, and what is between its end and the next
         high, low, most = (
-            f.reduceat(a, at, axis=-1)[..., ::2]
-            for f, a in ((np.maximum, x.balance), (np.minimum, x.balance), (np.maximum, kinetic))
+            f.reduceat(a, at)[::2] for f, a in ((np.maximum, x.balance), (np.minimum, x.balance), (np.maximum, kinetic))
         )
         lost = high - low
         fine = (lost <= least) | (lost <= part * (moved * most) ** 0.5)
-        for k in np.flatnonzero(~fine.reshape(-1, len(begins)).all(axis=0)):
+        for k in np.flatnonzero(~fine):
             yield int(begins[k]), int(ends[k])
 
 
@@ -212,18 +193,17 @@ def _stretches(result: Result, rows: int) -> Iterator[np.ndarray]:
 def _unseen(x: Ledger) -> np.ndarray:
     """Kinetic energy [J] that is moved about every output time and stands in none: rows once a turn see bodies at rest.
 
-    What accelerations make of them within a step, where steps outnumber rows and that is much more than rows have. Of
-    several motions, which are looked at one by one where they need this: nothing.
+    What accelerations make of them within a step, where steps outnumber rows and that is much more than rows have.
     """
     r = x.result
     none = np.zeros_like(x.kinetic)
-    if x.runs or not len(r.t) or r.health.steps <= len(r.t) or r.health.options.get("step"):
+    if not len(r.t) or r.health.steps <= len(r.t) or r.health.options.get("step"):
         return none
     found = gained(r, x.bodies.tolist(), float(np.ptp(r.t)) / r.health.steps)
     return found if SEEN * found.max(initial=0.0) > x.moved(0, len(r.t)) else none
 
 
-def _rest(x: Ledger) -> Any:
+def _rest(x: Ledger) -> float:
     """Energy [J] below which nothing is said to move: rounding of the potential energy, and a creep of all bodies.
 
     The potential energy is that stored and that of the weight at the mechanism's length: where it is counted from is
@@ -232,15 +212,13 @@ def _rest(x: Ledger) -> Any:
     Where works are done, some of it perhaps between two rows, also what moves all bodies in the time there is to where
     rows have them.
     """
-    rounding = 1e-12 * np.abs(x.stored[0] + x.stored[1]).max(axis=-1, initial=0.0)
-    rounding = rounding + 1e-12 * x.weight * x.result.values.length
-    t = x.result.t
-    least = rounding + sum(x.mass) * (AT_REST * x.result.values.length) ** 2
+    length, t = x.result.values.length, x.result.t
+    rounding = 1e-12 * (float(np.abs(x.stored[0] + x.stored[1]).max(initial=0.0)) + x.weight * length)
+    least = rounding + float(x.mass.sum()) * (AT_REST * length) ** 2
     span = float(np.ptp(t)) if len(t) else 0.0
     if not x.works or not span > 0.0:
         return least
-    went = sum(m * way for m, way in zip(x.mass, x.went, strict=True))
-    return least + balanced(x.result) * went / max(span, 1e-150) ** 2
+    return least + balanced(x.result) * float(x.mass @ x.went) / max(span, 1e-150) ** 2
 
 
 def _violation(result: Result) -> str:

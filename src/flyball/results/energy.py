@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ..math.vec import dot, load9, mtv, mv
+from ..math.vec import dot, mtv, mv
 from ..model.force import Force
 from ..model.quantities import ENERGY, Quantity, quantities
 from ..model.touch import Touch
@@ -29,35 +29,28 @@ STORED = "contact_elastic"
 """Energy stored in contacts that give way, among what contacts exchange."""
 
 
-def kinetic(result: Result, bodies: Iterable[int]) -> np.ndarray:
+def kinetic(result: Result, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
     """Sum of m v^2 / 2 + w . I w / 2 over rows of the body table [J]."""
-    return _of_speeds(result, bodies, (2, 3))
+    _, R, w, v, _, _ = result.motions.bodies(bodies)
+    return _of_speeds(result, bodies, R, w, v)
 
 
-def gained(result: Result, bodies: Iterable[int], time: float) -> np.ndarray:
+def gained(result: Result, bodies: Sequence[int] | np.ndarray, time: float) -> np.ndarray:
     """Kinetic energy [J] that the accelerations at every output time give bodies at rest in a time [s]."""
-    return time**2 * _of_speeds(result, bodies, (4, 5))
+    _, R, _, _, alpha, a = result.records.bodies(bodies)
+    return time**2 * _of_speeds(result, bodies, R, alpha, a)
 
 
-def _of_speeds(result: Result, bodies: Iterable[int], of: tuple[int, int]) -> np.ndarray:
-    """The same of what stands at these two places of a body's record: its velocities, or its accelerations."""
-    r, S = result.records, result.values.system
-    total = r.zeros()
-    for b in bodies:
-        record = r.body(b)
-        w, v = (record[k] for k in of)
-        w_B = mtv(record[1], w)
-        total += 0.5 * S.body_x[b, MASS] * dot(v, v) + 0.5 * dot(w_B, mv(load9(S.body_x, b, INERTIA), w_B))
-    return total
+def _of_speeds(result: Result, bodies: Sequence[int] | np.ndarray, R: tuple, w: tuple, v: tuple) -> np.ndarray:
+    rows = result.values.system.body_x[bodies]
+    w_B, inertia = mtv(R, w), tuple(rows[:, INERTIA : INERTIA + 9].T[..., None])
+    return (0.5 * rows[:, MASS, None] * dot(v, v) + 0.5 * dot(w_B, mv(inertia, w_B))).sum(axis=0)
 
 
-def gravity(result: Result, bodies: Iterable[int]) -> np.ndarray:
+def gravity(result: Result, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
     """Potential energy of gravity of rows of the body table [J]."""
-    r, S = result.records, result.values.system
-    total = r.zeros()
-    for b in bodies:
-        total -= S.body_x[b, MASS] * dot(tuple(S.glob[:3]), r.body(b)[0])
-    return total
+    S = result.values.system
+    return -(S.body_x[bodies, MASS][:, None] * dot(tuple(S.glob[:3]), result.motions.bodies(bodies)[0])).sum(axis=0)
 
 
 class Energy(Named):
@@ -129,8 +122,8 @@ class Energy(Named):
             if name.endswith(".work"):
                 element = r[name.removesuffix(".work")]
                 own = element.element
-                stored = element.energy - basis(r, own.name) if isinstance(own, Force) else 0.0
-                out[own.name] = element.work + stored
+                stores = isinstance(own, Force) and own.energy is not None
+                out[own.name] = element.work + (element.energy - basis(r, own.name) if stores else 0.0)
         return out
 
     def _of_pieces(self, name: str) -> np.ndarray:
@@ -140,7 +133,7 @@ class Energy(Named):
     def exchanged(self, name: str) -> np.ndarray:
         """Energy since the start that contacts and events lost or gave, by its name; zeros where there are none."""
         found = self._result.exchanged.get(name)
-        return self._result.records.zeros() if found is None else found
+        return self._result.motions.zeros() if found is None else found
 
     def _friction_loss(self) -> np.ndarray:
         """Lost in friction of contacts since the start: that of places is a work, integrated with the motion."""
@@ -157,7 +150,7 @@ class Energy(Named):
         """Total energy less all work put in less the total at the start: zero for an exact motion."""
         if not len(self._result.t):
             return np.zeros(0)
-        put_in = sum(self.work.values(), self._result.records.zeros())
+        put_in = sum(self.work.values(), self._result.motions.zeros())
         put_in = sum((sign * self.exchanged(k) for k, sign in (*EXCHANGED.items(), (GIVEN, 1.0))), put_in)
         residue = self.total - put_in
         return residue - residue[0]

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from .ledger import Ledger
 
 LATE = 0.05  # part of the longest way of a body by which one may be off
-SOON = 0.25  # of the time between two rows: what several motions are looked at for
 STILL = 1e-6  # part of the mechanism's length that is no way
 TURNING = 0.1  # part of the largest kinetic energy below which a motion that comes back is at its turning point
 
@@ -36,7 +35,7 @@ def late(x: Ledger) -> str:
     for body, b in r.values.structure.place.items():
         if b < 0:
             continue
-        p, _, _, v, _, _ = r.records.body(b)
+        p, _, _, v, _, _ = r.motions.body(b)
         way = max(way, float(np.linalg.norm(np.ptp(p, axis=1))))
         off, name = max((off, name), (float((np.abs(lag) * np.linalg.norm(v, axis=0)).max()), body))
     if not off > LATE * way or r.health.freedoms != 1:
@@ -47,19 +46,6 @@ def late(x: Ledger) -> str:
         f"that alone the motion comes to be {np.abs(lag).max():.2g} s early or late, and {name!r} off by about "
         f"{off:.2g} m; a {finer} may tell whether it can be trusted"
     )
-
-
-def perhaps_late(x: Ledger) -> np.ndarray:
-    """Which of several motions may be late, (runs,): by a part of the time between two rows, at turning points too.
-
-    In that time, which a step may take, it may go some of its ways.
-    """
-    if x.works or x.result.exchanged or x.result.bulk:
-        return np.zeros(len(x.kinetic), bool)
-    width = np.diff(x.result.t[: x.kinetic.shape[-1]])
-    faster = np.abs(_faster(x))
-    lag = (0.5 * (faster[:, 1:] + faster[:, :-1]) * width).sum(axis=-1)
-    return lag > SOON * LATE * width.mean() if len(width) else lag > 0.0
 
 
 def _faster(x: Ledger) -> np.ndarray:

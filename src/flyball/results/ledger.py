@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -32,9 +32,6 @@ class Ledger:
     works : tuple of ndarray (n,)
     foreign : ndarray (n,)
         What impacts, contacts and events exchanged that the balance does not know of: it holds where this is constant.
-    runs : int
-        Of how many motions with the same output times, one after the other, the result is; the arrays are then
-        (runs, n). 0: of one.
     """
 
     result: Result
@@ -44,43 +41,23 @@ class Ledger:
     stored: tuple[np.ndarray, np.ndarray]
     works: tuple[np.ndarray, ...]
     foreign: np.ndarray
-    runs: int = 0
 
     @property
-    def mass(self) -> list[Any]:
-        """Of each of the bodies [kg]; where runs differ (runs,)."""
-        every = self.result.values.system.body_x[self.bodies, MASS].tolist()
-        return [self._rows(m)[..., 0] if isinstance(m, np.ndarray) else m for m in every]
+    def mass(self) -> np.ndarray:
+        """Of each of the bodies [kg]."""
+        return self.result.values.system.body_x[self.bodies, MASS]
 
     @property
-    def weight(self) -> Any:
+    def weight(self) -> float:
         """Of all of the bodies [N]."""
-        g = [
-            self._rows(a)[..., 0] if isinstance(a, np.ndarray) else a
-            for a in self.result.values.system.glob[:3].tolist()
-        ]
-        return sum(self.mass) * sum(a * a for a in g) ** 0.5
+        return float(self.mass.sum() * np.linalg.norm(self.result.values.system.glob[:3]))
 
     @property
-    def went(self) -> list[Any]:
+    def went(self) -> np.ndarray:
         """Square of how far each of the bodies came about [m^2]."""
-        r = self.result.records
-        return [sum(np.ptp(self._rows(p), axis=-1) ** 2 for p in r.body(b)[0]) for b in self.bodies.tolist()]
-
-    def of_runs(self, runs: int) -> Ledger:
-        """That of so many motions, one after the other."""
-        x = replace(self, runs=runs)
-        balance = x._rows(self.balance)
-        return replace(
-            x,
-            kinetic=x._rows(self.kinetic),
-            balance=balance - balance[:, :1],
-            stored=(x._rows(self.stored[0]), x._rows(self.stored[1])),
-            works=tuple(map(x._rows, self.works)),
-        )
-
-    def _rows(self, a: np.ndarray) -> np.ndarray:
-        return a.reshape(self.runs, -1) if self.runs else a
+        r = self.result.motions
+        x, y, z = (np.ptp(p, axis=1) for p in r.bodies(self.bodies)[0])
+        return x**2 + y**2 + z**2
 
     def known(self, begin: int, end: int) -> bool:
         """Whether the balance holds between two rows, the last not counted."""
@@ -97,22 +74,22 @@ class Ledger:
         others = f" and the {more} bodies" if more > 1 else " and the body"
         return f" of {name!r}" + (f"{others} connected with it" if more else "")
 
-    def moved(self, begin: int, end: int) -> Any:
-        """How much energy was shifted about between two rows, the last not counted [J]; (runs,) of several.
+    def moved(self, begin: int, end: int) -> float:
+        """How much energy was shifted about between two rows, the last not counted [J].
 
         The largest kinetic energy, and the ranges of gravity's and the springs' energies and of every work.
         """
         if end <= begin:
             return 0.0
-        ranges = sum(np.ptp(x[..., begin:end], axis=-1) for x in (*self.stored, *self.works))
-        return self.kinetic[..., begin:end].max(axis=-1) + ranges
+        ranges = sum(np.ptp(x[begin:end]) for x in (*self.stored, *self.works))
+        return float(self.kinetic[begin:end].max() + ranges)
 
 
 def whole(result: Result) -> Ledger:
     """That of everything."""
     e = result.energy
     every = np.arange(len(result.values.system.body_i))
-    none = result.records.zeros()
+    none = result.motions.zeros()
     return Ledger(result, every, e.kinetic, e.balance, (e.gravity, e.elastic), tuple(e.work.values()), none)
 
 
@@ -127,7 +104,7 @@ def apart(result: Result) -> list[Ledger]:
     if many < 2 or result.bulk or not len(result.t):
         return []
     of = [np.flatnonzero(part == p) for p in range(many)]
-    elastic = [result.records.zeros() for _ in of]
+    elastic = [result.motions.zeros() for _ in of]
     works: list[list[np.ndarray]] = [[] for _ in of]
     for f in result.model.acting():
         at = _part_of(result, f, part)
@@ -140,7 +117,7 @@ def apart(result: Result) -> list[Ledger]:
     out, foreign = [], _exchanged(result)
     for p, bodies in enumerate(of):
         moving, weight = kinetic(result, bodies), gravity(result, bodies)
-        residue = moving + weight + elastic[p] - sum(works[p], result.records.zeros())
+        residue = moving + weight + elastic[p] - sum(works[p], result.motions.zeros())
         out.append(Ledger(result, bodies, moving, residue - residue[0], (weight, elastic[p]), tuple(works[p]), foreign))
     return out
 
@@ -191,4 +168,4 @@ def _part_of(result: Result, e: Any, part: np.ndarray) -> int:
 def _exchanged(result: Result) -> np.ndarray:
     """What impacts, contacts and events took or gave since the start, (n,) [J]."""
     e = result.energy
-    return sum((np.abs(e.exchanged(k)) for k in (*EXCHANGED, GIVEN)), result.records.zeros())
+    return sum((np.abs(e.exchanged(k)) for k in (*EXCHANGED, GIVEN)), result.motions.zeros())

@@ -39,7 +39,7 @@ class Measured:
         return out
 
     def _found(self, m: int) -> tuple[np.ndarray, np.ndarray]:
-        value, rate = self._result.records.zeros(), self._result.records.zeros()
+        value, rate = self._result.motions.zeros(), self._result.motions.zeros()
         for k in self._terms[m]:
             F, M, (g, f, tM, tF, _) = term(self._result, k)
             c = coefficient(self._result, k)
@@ -55,7 +55,7 @@ class Measured:
         s = self._result.values.structure
         n, switches = len(s.measured), len(s.switches)
         first = 2 * n + len(s.loads) + width(s)
-        out = self._result.records.zeros(3, first + len(s.controls) + switches)
+        out = self._result.motions.zeros(3, first + len(s.controls) + switches)
         if s.controls:
             out[0, first : first + len(s.controls)] = self._result.states[:, : len(s.controls)].T
         if s.slots or switches:

@@ -37,7 +37,7 @@ def overturned(result: Result) -> str:
         if i < 0:
             continue
         pieces = result.pieces or (result,)
-        size = sum(float(_off(x, i, 1)[0]) for x in pieces)
+        size = sum(_off(x, i) for x in pieces)
         fastest = max(float(np.linalg.norm(x.v[:, i : i + 3], axis=1).max(initial=0.0)) for x in pieces)
         off, name, turn = max((off, name, turn), (size, body, fastest * result.health.options["step"]))
     if not off > FAR:
@@ -49,31 +49,20 @@ def overturned(result: Result) -> str:
     )
 
 
-def perhaps_overturned(result: Result, runs: int) -> np.ndarray:
-    """Which of several motions, one after the other, are (runs,)."""
-    out = np.zeros(runs, bool)
-    S = result.values.system
-    for b in range(len(S.body_i) if _known(result) else 0):
-        i = quaternion_at(S, b)[1]
-        if i >= 0:
-            out |= _off(result, i, runs) > FAR
-    return out
-
-
 def _known(result: Result) -> bool:
     o = result.health.options
     return bool(o.get("step")) and (o.get("method") in TABLEAUX or o.get("method") == "radau") and len(result.t) > 1
 
 
-def _off(result: Result, i: int, runs: int) -> np.ndarray:
-    """Largest angle [rad] by which a body is turned wrongly, (runs,); i: first of its angular velocities."""
-    o, n = result.health.options, len(result.t) // runs
-    h, w = o["step"], result.v[:, i : i + 3].reshape(runs, n, 3)
+def _off(result: Result, i: int) -> float:
+    """Largest angle [rad] by which a body is turned wrongly; i: first of its angular velocities."""
+    o, w = result.health.options, result.v[:, i : i + 3]
+    h = o["step"]
     turn, error = _errors(o["method"])
-    size = np.linalg.norm(w, axis=-1)
-    rate = w * (np.interp(size * h, turn, error) / (h * np.maximum(size, 1e-300)))[..., None]
-    ways = 0.5 * (rate[:, 1:] + rate[:, :-1]) * np.diff(result.t[:n])[:, None]
-    return np.linalg.norm(np.cumsum(ways, axis=1), axis=-1).max(axis=1, initial=0.0)
+    size = np.linalg.norm(w, axis=1)
+    rate = w * (np.interp(size * h, turn, error) / (h * np.maximum(size, 1e-300)))[:, None]
+    ways = 0.5 * (rate[1:] + rate[:-1]) * np.diff(result.t)[:, None]
+    return float(np.linalg.norm(np.cumsum(ways, axis=0), axis=1).max(initial=0.0))
 
 
 @lru_cache

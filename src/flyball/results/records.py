@@ -1,18 +1,17 @@
-"""Kinematic records over time: the loops of the house, run in plain Python on arrays of all output times at once."""
+"""Kinematic records over time: of floats compiled, of complex numbers by the same formulas on arrays in Python."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from ..equations.over_time import AtOnce, Bodies, OverTime, kinematics_over_time
 from ..equations.records import at_rest, carried, load
 from ..equations.tree import column, motion, pose
 from ..equations.velocities import turned_angles
-from ..math.lanes import over_time
 from ..math.products import product
 from ..math.vec import add, cross, load3, load9, mm, put3, scale, sub
 from ..model.body import Frame
@@ -38,12 +37,17 @@ class Records:
         self.n = len(q)
         S = x.system
         nb, nv = len(S.body_i), v.shape[1]
-        numbers = [x for x in (S.body_x, S.frame_x, S.const) if x.dtype != object]  # objects: arrays over time
-        self.dtype = np.result_type(q, v, *([] if vdot is None else [vdot]), *numbers)  # complex for derivatives
-        self.W = SimpleNamespace(BK=self.zeros(nb, 24), X=self.zeros(nv, 6), O=self.zeros(nb, 3))
-        for b in range(nb):
-            pose(S, self.W, b, q.T)
-            motion(S, self.W, b, v.T)
+        own = [] if vdot is None else [vdot]
+        self.dtype = np.result_type(q, v, *own, S.body_x, S.frame_x, S.const)  # complex for derivatives
+        self.W = OverTime(self.zeros(nb, 24), self.zeros(nv, 6), self.zeros(nb, 3))
+        if self.dtype == float:
+            one = AtOnce(np.zeros((nb, 24)), np.zeros((nv, 6)), np.zeros((nb, 3)))
+            q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)
+            kinematics_over_time(Bodies(S.body_i, S.body_x), one, q, v, self.W)
+        else:
+            for b in range(nb):
+                pose(S, self.W, b, q.T)
+                motion(S, self.W, b, v.T)
         if vdot is not None:
             self._accelerate(vdot.T)
         self._frames: dict[int, Record] = {}
@@ -84,6 +88,10 @@ class Records:
         """Record of body b's centre of mass."""
         return load(self.W.BK, b)
 
+    def bodies(self, b: Sequence[int] | np.ndarray) -> Record:
+        """Records of several bodies' centres of mass: arrays (bodies, n)."""
+        return load(self.W.BK[b].swapaxes(0, 1)[None], 0)
+
     def frame(self, k: int) -> Record:
         """Record of frame k."""
         if k not in self._frames:
@@ -99,7 +107,6 @@ class Records:
 
     def carried(self, b: int, offset: tuple, turn: tuple) -> Record:
         """Record of a point and axes carried by body b (-1: ground)."""
-        offset, turn = tuple(map(over_time, offset)), tuple(map(over_time, turn))
         if b >= 0:
             return carried(self.body(b), offset, turn)
         zero = self.zeros()
@@ -161,15 +168,17 @@ def wound(counted: Mapping[str, float], angles: Mapping[str, float]) -> dict[str
 
 
 def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, Any], tuple[int, Any], Coordinate]:
-    """(frame, extra turn) twice: what a joint's coordinate is measured between, from its frames F and M."""
+    """(frame, extra turn or ()) twice: what a joint's coordinate is measured between, from its frames F and M."""
     c = joint.coordinates[what]
     ends = []
     for role in c.frames:
         turn = getattr(c, f"turn_{role}")
-        ends.append((x.structure.frame_at[joint.name, role, ""], turn if len(turn) else np.eye(3)))
+        ends.append((x.structure.frame_at[joint.name, role, ""], turn))
     return ends[0], ends[1], c
 
 
 def turned(record: Record, turn: Any) -> Record:
-    """The record with its axes turned by a constant rotation."""
+    """The record with its axes turned by a constant rotation, if there is one."""
+    if not len(turn):
+        return record
     return (record[0], mm(record[1], tuple(np.asarray(turn).ravel())), *record[2:])

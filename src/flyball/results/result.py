@@ -182,6 +182,11 @@ class Result:
         return Records(self.values, self.q, self.v, self.vdot, self.wound)
 
     @cached_property
+    def motions(self) -> Records:
+        """The same without the accelerations, which have to be solved for."""
+        return Records(self.values, self.q, self.v, None, self.wound)
+
+    @cached_property
     def measured(self) -> Measured:
         """Quantities that forces act along and that laws name."""
         return Measured(self)

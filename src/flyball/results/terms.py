@@ -21,15 +21,15 @@ def term(result: Result, k: int) -> tuple[Record, Record, tuple]:
     """Records of frames F and M of term k, and what its formula says of them.
 
     That is value, force on M at M's origin (the reverse acts at F's on F's body), torque on M's body, torque on F's
-    body, acceleration bias; without its coefficient.
+    body, acceleration bias; without its coefficient. The records have no accelerations but those with every vdot zero.
     """
     x = result.values
     t = x.structure.terms[k]
-    F, M = result.records.frame(t.F), result.records.frame(t.M)
+    F, M = result.motions.frame(t.F), result.motions.frame(t.M)
     hint: Any = result.states[:, t.hint] if t.hint >= 0 else 0.0
     kind, par = t.formula.of_kind, parameters(x.system.term_x, k)
     if kind.single:
-        return F, M, _one_by_one(kind.row, par, (F, M, hint + result.records.zeros()), x.system.const)
+        return F, M, _one_by_one(kind.row, par, (F, M, hint + result.motions.zeros()), x.system.const)
     return F, M, kind.row(par, F, M, hint, x.system.const)
 
 
@@ -52,7 +52,7 @@ def coefficient(result: Result, k: int) -> float:
 def along(result: Result, joint: Joint, what: str) -> Wrench:
     """Force and torque on ``body_j``, about M's origin, of a unit effort along a joint's coordinate."""
     (i, turn_i), (j, turn_j), c = coordinate_frames(result.values, joint, what)
-    F, M = turned(result.records.frame(i), turn_i), turned(result.records.frame(j), turn_j)
+    F, M = turned(result.motions.frame(i), turn_i), turned(result.motions.frame(j), turn_j)
     par = (*c.row.par[:6], 0.0, 0.0)
     _, f, tM, tF, _ = c.row.of_kind.row(par, F, M, 0.0, result.values.system.const)
     force, torque = (f, tM) if c.frames[1] == "M" else (neg(f), tF)

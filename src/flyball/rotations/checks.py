@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
-from ..math.lanes import deciding
 from ..math.scalar import real_parts, sqrt
 
 ORTHONORMAL = 1e-9  # largest entry of R^T R - 1 of what still counts as a rotation matrix
@@ -46,7 +45,7 @@ def numbers(value: Any, shape: tuple[int, ...], what: str, rule: str = "") -> np
 def _finite(a: np.ndarray) -> np.ndarray:
     if a.dtype != object:
         return np.isfinite(a)
-    known = deciding(a)
+    known = real_parts(a)
     return np.asarray(known - known == 0.0)
 
 
@@ -83,7 +82,7 @@ def rotation_matrices(value: Any, what: str) -> np.ndarray:
         If a matrix is not orthonormal to 1e-9 or is left-handed.
     """
     R = numbers(value, (3, 3), what)
-    known = deciding(R) if R.dtype == object else R
+    known = real_parts(R) if R.dtype == object else R
     off = np.abs(np.swapaxes(known, -1, -2) @ known - np.eye(3)).max(axis=(-1, -2), initial=0.0)
     if np.any(off > ORTHONORMAL):
         k = np.unravel_index(int(np.argmax(off)), off.shape)
@@ -91,7 +90,7 @@ def rotation_matrices(value: Any, what: str) -> np.ndarray:
             f"{what}{place(tuple(map(int, k)))}: the matrix is not a rotation: its columns must be orthonormal, but "
             f"R^T R is off by {off[k]:.2g} (at most {ORTHONORMAL:g}); rotations.nearest gives the closest rotation"
         )
-    refuse(np.linalg.det(deciding(R)) < 0, R, what, "is not a rotation: it mirrors, so make its columns right-handed")
+    refuse(np.linalg.det(real_parts(R)) < 0, R, what, "is not a rotation: it mirrors, so make its columns right-handed")
     return R
 
 
@@ -105,7 +104,7 @@ def unit_quaternions(value: Any, what: str) -> np.ndarray:
     """
     e = numbers(value, (4,), what)
     size = np.sqrt((e * e).sum(axis=-1, keepdims=True))
-    bad = ~(deciding(size)[..., 0] > SMALLEST)
+    bad = ~(real_parts(size)[..., 0] > SMALLEST)
     refuse(bad, e, what, "has no direction; a quaternion must not be zero (no rotation is (1, 0, 0, 0))")
     return e / size
 

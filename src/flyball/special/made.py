@@ -56,19 +56,7 @@ class Made:
             flat[SAMPLED] = first
             flat[first:] = [self.loaded.addresses[name] if name else 0 for name in self.laws]
         S = S._replace(flat=flat)
-        (address, tables, constants), _tables = self.reckoning(S)
-        _FUNCTION(address)(tables, None, 0.0, constants, None, None, None)
-        return S
-
-    def reckoning(self, S: System) -> tuple[list[int], np.ndarray]:
-        """What reckons the constants anew where other numbers stand in the tables of a `system`.
-
-        Returns
-        -------
-        list of int
-            Addresses: of the code, of the tables' addresses, of where the constants go (`equations.many.reckon`).
-        ndarray
-            The tables' addresses, to be kept as long as these are used.
-        """
         tables = tables_of(S)
-        return [self.loaded.addresses["CONSTANTS"], tables.ctypes.data, S.flat.ctypes.data + 8 * FLAT], tables
+        constants = flat.ctypes.data + 8 * FLAT
+        _FUNCTION(self.loaded.addresses["CONSTANTS"])(tables.ctypes.data, None, 0.0, constants, None, None, None)
+        return S

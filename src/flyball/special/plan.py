@@ -51,10 +51,9 @@ def plan(x: Values) -> Plan:
 
 def _planned(s: Structure, S: System) -> Plan:
     digest = hashlib.sha256(s.kept.get("code of structure", None, 1, lambda: _structure(s, S)))
-    for name in TABLES:
-        table = getattr(S, name)
-        for x in PLAIN:
-            digest.update(np.packbits(table == x).tobytes())
+    entries = np.concatenate([getattr(S, name).ravel() for name in TABLES])
+    for x in PLAIN:
+        digest.update(np.packbits(entries == x).tobytes())
     size = estimate(S)
     why = ""
     if np.iscomplexobj(S.body_x):

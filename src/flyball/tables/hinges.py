@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..math.lanes import deciding
 from ..math.products import product
+from ..math.scalar import real_parts
 from .afresh import Afresh
 from .poses import Poses
 from .specs import FrameSpec, Structure
@@ -85,7 +85,7 @@ def _leave_out(body_x: np.ndarray, links: np.ndarray, kinds: np.ndarray) -> None
     body_x[at, tree] = ONE.ravel()
     for rotation, turns in ((tree, TREE_TURNS), (body, BODY_TURNS)):
         R = body_x[links, rotation]
-        none = _never_else(R) & (np.abs(deciding(R) - ONE.ravel()) < 1e-15).all(axis=1)
+        none = _never_else(R) & (np.abs(real_parts(R) - ONE.ravel()) < 1e-15).all(axis=1)
         body_x[links[none], rotation] = ONE.ravel()
         body_x[links[none], turns] = 0.0
         body_x[links[~none], turns] = (ONE.ravel() != R[~none]).any(axis=1).astype(float)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..math.lanes import per_lane
 from ..math.scalar import real_parts
 from ..math.vec import cross
 
@@ -23,7 +22,6 @@ def usual_mass(masses: list[Any]) -> Any:
     return sum(heavy) / len(heavy) if heavy else 1.0
 
 
-@per_lane
 def inverse_inertia(J: np.ndarray, size: Any, planar: bool) -> tuple[np.ndarray, np.ndarray]:
     """Inverse of an inertia, and what was added to it before.
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ..math.lanes import count, gathered, has_lanes, spread
 from ..math.scalar import maximum, real_parts
 from ..model.body import GROUND
 from .afresh import Afresh
@@ -37,7 +36,7 @@ def mass_table(s: Structure, bodies: Mapping, frame_x: np.ndarray, length: Any, 
     """
     body_x = new.table("body_x", (len(s.tables["body_i"]), BODY_WIDTH), frame_x.dtype)
     moved = {f.body for f in s.frames if new.asks(f.element)}
-    rescaled = new.base is None or has_lanes([length]) or new.base.system.glob[LENGTH] != length
+    rescaled = new.base is None or new.base.system.glob[LENGTH] != length
     usual = usual_mass([d.mass for name, d in bodies.items() if name != GROUND])
     reach = _reaches(s, frame_x)
     for name, b in s.place.items():
@@ -79,8 +78,6 @@ def _turning(x: np.ndarray, J: np.ndarray, compact: Any, bulky: Any, planar: boo
 
 def _reaches(s: Structure, frame_x: np.ndarray) -> np.ndarray:
     """Of every body the largest component, taken positive, of the ways from its centre of mass to its frames."""
-    if n := count((frame_x,)):
-        return _reaches_of_lanes(s, spread(frame_x[:, :3], n))
     out = np.zeros(len(s.tables["body_i"]), frame_x.dtype)
     flat = frame_x[:, :3]
     best = np.argmax(np.abs(real_parts(flat)), axis=1)
@@ -90,12 +87,3 @@ def _reaches(s: Structure, frame_x: np.ndarray) -> np.ndarray:
     order = order[s.tables["frame_i"][order] >= 0]
     out[s.tables["frame_i"][order]] = largest[order]  # the last one given is the largest
     return out
-
-
-def _reaches_of_lanes(s: Structure, ways: np.ndarray) -> np.ndarray:
-    """The same of ways (n, frames, 3) of many runs."""
-    largest, out = np.abs(ways).max(axis=2), np.zeros((len(ways), len(s.tables["body_i"])))
-    for k, b in enumerate(s.tables["frame_i"].tolist()):
-        if b >= 0:
-            np.maximum(out[:, b], largest[:, k], out=out[:, b])
-    return gathered(out)

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..math.lanes import deciding
 from ..math.products import inner
+from ..math.scalar import real_parts
 from ..model.body import GROUND
 from ..model.expressions import number
 from ..model.model import Model
@@ -40,4 +40,4 @@ def tempo(given: Numbers, model: Model, gravity: np.ndarray, length: Any) -> Any
 
 def _size(x: np.ndarray) -> Any:
     """Length of a vector (3,); zero of what is zero, where a root has no derivative."""
-    return np.sqrt(inner(x, x)) if deciding(x).any() else 0.0
+    return np.sqrt(inner(x, x)) if real_parts(x).any() else 0.0

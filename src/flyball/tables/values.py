@@ -16,7 +16,6 @@ import numpy as np
 
 from ..compiler.by_address import addresses
 from ..errors import ModelError
-from ..math.lanes import has_lanes, over_lanes
 from ..math.scalar import real_parts, sqrt
 from ..model.body import GROUND
 from ..model.coupling import Coupling
@@ -51,6 +50,7 @@ class Values:
     length: float  # a typical length of the mechanism [m]
     poses: Poses  # where frames are when it is drawn
     kept: Kept = field(default_factory=Kept, init=False)  # where motions of it start; a changed copy has its own
+    alike: Values | None = field(default=None, init=False, repr=False)  # see `unforced`
 
     @property
     def numbers(self) -> Mapping[str, SimpleNamespace]:
@@ -68,10 +68,21 @@ class Values:
         return self.given.env
 
     @property
+    def unforced(self) -> Values:
+        """Values from which these differ in numbers of forces and controllers alone; themselves, if none are known.
+
+        What depends on bodies, joints and the drawn state is worked out once for both.
+        """
+        return self if self.alike is None else self.alike
+
+    @property
     def told(self) -> dict[str, float]:
         """Values of the parameters that it was made with."""
         names = list(self.structure.model.parameters)
         return dict(zip(names, self.system.const[: len(names)].real.tolist(), strict=True))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"alike": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """In another process code has other addresses."""
@@ -99,7 +110,7 @@ def values(
 
 def values_of(s: Structure, n: Numbers, holds: Mapping[str, complex] | None = None) -> Values:
     """The same from the numbers of its elements."""
-    if kind_of([*n.env.values(), *(holds or {}).values()]) is not float:
+    if n.dtype is not float or (holds and kind_of(holds.values()) is not float):
         return _filled(s, n, holds or {})
     return s.kept.get("values", (n.key, bits(holds or {})), MOST, lambda: _filled(s, n, holds or {}))
 
@@ -109,15 +120,37 @@ def _filled(s: Structure, given: Numbers, holds: Mapping[str, Any]) -> Values:
     if holds:
         return _refilled(s, given, holds, Afresh())
     first = s.kept.known("filled first")
-    x = _refilled(s, given, holds, Afresh.since(first, given, s.model))
+    new = Afresh.since(first, given, s.model)
+    x = _forced(s, given, new) if new.only_acts and given.dtype is float else None
+    x = x or _refilled(s, given, holds, new)
     if first is None and given.dtype is float:
         s.kept.get("filled first", None, 1, lambda: x)
     return x
 
 
+def _forced(s: Structure, given: Numbers, new: Afresh) -> Values | None:
+    """The values where forces and controllers alone have other numbers; None if bodies or frames are moved by these."""
+    base, pose = new.base, Poses(s, given)
+    assert base is not None
+    S, dtype = base.system, base.system.body_x.dtype
+    frame_x = _frame_x(s, pose, new.table("frame_x", (len(s.frames), 12), dtype), new)
+    const, curve_at = _constants(s, given.of, given.env, dtype)
+    term_x = _term_x(s, pose, {}, curve_at, new.table("term_x", (len(s.terms), 8), dtype), new)
+    gravity = np.array(s.model.gravity_vector(given.env), dtype)
+    same = (frame_x, S.frame_x), (term_x, S.term_x), (gravity, S.glob[: len(gravity)])
+    if any(a.tobytes() != b.tobytes() for a, b in same):
+        return None
+    force_x = _force_x(s, pose, new.table("force_x", (len(s.forces), 16), dtype), new)
+    switch_x = new.table("switch_x", (len(s.switches), 8), dtype)
+    switch_x = switches.numbers(s, given.of, switch_x, new.asks, pose.apart)
+    x = Values(s, S._replace(force_x=force_x, const=const, switch_x=switch_x), base.q, base.v, given, base.length, pose)
+    x.alike = base
+    return x
+
+
 def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afresh) -> Values:
     model, env, numbers, bodies = s.model, given.env, given.of, given.bodies
-    dtype = kind_of([*given.env.values(), *holds.values()])
+    dtype = kind_of([*given.env.values(), *holds.values()]) if holds else given.dtype
     pose = Poses(s, given)
     frame_x = _frame_x(s, pose, new.table("frame_x", (len(s.frames), 12), dtype), new)
     length = _length(s, frame_x, bodies)
@@ -139,17 +172,15 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
         t["load_i"], t["switch_i"], switch_x, t["guard_i"], t["control_i"],
          t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl, np.zeros(FLAT, np.int64),
     )  # fmt: skip
-    typical = length if has_lanes([length]) else float(length.real)
-    x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, typical, pose)
+    x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, float(length.real), pose)
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
     x.q[:], x.v[:] = positions(x, drawn, new=new), free_velocities(x, drawn, new=new)
     return x
 
 
 def _frame_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
-    for k, f in enumerate(s.frames):
-        if new.asks(f.element):
-            x[k] = pose.row(f)
+    for k in new.rows(s, "frames"):
+        x[k] = pose.row(s.frames[k])
     return x
 
 
@@ -177,7 +208,6 @@ def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamesp
     return length if length.real > 0.0 else 1.0
 
 
-@over_lanes
 def _reach(on_bodies: np.ndarray, on_ground: np.ndarray, centres: np.ndarray) -> Any:
     """The same by places alone, (..., k, 3) each; 0 where they are all one."""
     places = np.concatenate([on_ground, centres], axis=-2)
@@ -228,9 +258,8 @@ def _term_x(
     numbers = pose.numbers
     factors = {c.name: np.array(c.factors(numbers[c.name], s.model, pose.axis)) for c in s.model.couplings}
     factors = {name: f / f[0] for name, f in factors.items()}
-    for k, t in enumerate(s.terms):
-        if not new.asks(t.element, t.owner):
-            continue
+    for k in new.rows(s, "terms"):
+        t = s.terms[k]
         x[k] = t.formula.par
         x[k, 7] = t.sign * t.formula.par[7]
         e = t.element
@@ -270,9 +299,8 @@ def _coupled(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
 
 
 def _force_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
-    for k, e in enumerate(s.forces):
-        if not new.asks(e):
-            continue
+    for k in new.rows(s, "forces"):
+        e = s.forces[k]
         par = e.parameters(pose.numbers[e.name], pose.apart(e))
         if len(par) > x.shape[1]:
             raise ModelError(f"{e.title}: parameters() gives {len(par)} numbers; a force has up to {x.shape[1]}")

@@ -17,7 +17,7 @@ from ...results.departure import Departure
 from ...results.numbers import tuple_of
 from ...tables.coordinates import BodyState
 from ...tables.system import NQ, Q0
-from ..compiled import Compiled, compiled
+from ..compiled import Compiled, compiled, places
 from .described import fast, not_kept
 from .gaps import contradictory_velocities, disagreement, no_rate
 from .positions import CLOSED, OPEN, close, misfit, newton, rounding
@@ -42,6 +42,13 @@ class Assembly:
         """The same with arrays and scratch of its own."""
         c, q, v = self.compiled.again(), self.q.copy(), self.v.copy()
         return Assembly(c, self.t, q, v, dict(self.moved), self.iterations, self.departures)
+
+    def of(self, c: Compiled) -> Assembly:
+        """The same of a mechanism that differs in forces and controllers alone, whose states begin as these say."""
+        a, n = self.again(), len(c.structure.controls)
+        z = np.concatenate([c.z[:n], a.compiled.z[n:]])
+        a.compiled = Compiled(c.values, z, c.parameters)
+        return a
 
     @property
     def y(self) -> np.ndarray:
@@ -94,9 +101,18 @@ def assembled(
     """
     plain = compiled(model, parameters=parameters)
     x = plain.values
-    model = x.structure.model
-    found = x.kept.get("assembled", float(t).hex(), MOST, lambda: _found(model, plain, t, parameters, why).again())
-    return found.again()
+    model, key = x.structure.model, float(t).hex()
+    home = x if _own_places(plain) else x.unforced
+    found = home.kept.get("assembled", key, MOST, lambda: _found(model, plain, t, parameters, why).again())
+    return found.again() if found.compiled.values is x else found.of(plain)
+
+
+def _own_places(c: Compiled) -> bool:
+    """Whether turns and places as drawn are others than those of the values that differ in forces alone."""
+    x, n = c.values, len(c.structure.controls)
+    if (other := x.alike) is None:
+        return True
+    return not np.array_equal(c.z[n:], other.kept.get("places", None, 1, lambda: places(other))[n:])
 
 
 def _found(

@@ -28,6 +28,7 @@ from ...tables.values import Values
 from ..compiled import Compiled
 
 AUTO = "auto"
+KEPT = "kept"  # code that this process has, if it serves a mechanism: of the runs of a study
 FIRST, AGAIN = 8, 4  # steps after which auto chooses, and how many times more until it does again
 GAIN = 3.0  # times faster
 MARGIN = 1.25  # times what it takes to make or load code, that it must save
@@ -92,17 +93,25 @@ def check_specialize(value: Any) -> None:
     ModelError
         If it is none of True, False and ``"auto"``.
     """
-    if not isinstance(value, (bool, str)) or value not in (True, False, AUTO):
+    if not isinstance(value, (bool, str)) or value not in (True, False, AUTO, KEPT):
         raise ModelError(f"specialize is True, False or {AUTO!r}, not {value!r}")
 
 
-def worth_making(x: Values, evaluations: int, runs: int) -> bool:
-    """Whether made code pays for so many motions, of which one took so many evaluations by the tables."""
+def has_code(x: Values, evaluations: int, runs: int) -> bool:
+    """Have code made for so many motions, of which one took so many evaluations by the tables, if it pays; whether
+    there is such code now.
+    """
     plan = special.plan(x)
     if x.structure.guards or special.refusal(plan):
         return False
     computing = runs * evaluations * kind(x.structure)[1]
-    return computing * (1.0 - 1.0 / GAIN) >= MARGIN * special.price(plan, special.known(plan, x))
+    if computing * (1.0 - 1.0 / GAIN) < MARGIN * special.price(plan, special.known(plan, x)):
+        return False
+    try:
+        special.code(plan, x)
+    except special.Refused:
+        return False
+    return True
 
 
 class Engine:
@@ -112,8 +121,8 @@ class Engine:
     ----------
     c : Compiled
         In the coordinates of the motion, with the scratch that it is run on.
-    wish : bool or "auto"
-        What the user wants.
+    wish : bool, "auto" or "kept"
+        What is wanted.
     without : str
         Why made code would do nothing here, if it would not.
 
@@ -141,10 +150,13 @@ class Engine:
         elif why := without or (MODES if c.structure.guards else ""):
             self.told = f"{TABLES}: {why}"
         else:
-            self.told, self.due = SHORT, FIRST
-            self._kind, self._each = kind(c.structure)
-            if special.ready() and special.known(plan := special.plan(c.values), c.values) == "memory":
-                self._take(plan)
+            self.told = SHORT
+            if wish == AUTO:
+                self.due = FIRST
+                self._kind, self._each = kind(c.structure)
+            made = special.in_memory(special.plan(c.values), c.values) if special.ready() else None
+            if made is not None:
+                self._take(made, "kept in this process")
 
     def begin(self, clock: ex.Clock) -> None:
         """The motion begins there."""
@@ -200,7 +212,7 @@ class Engine:
         try:
             if without:
                 raise special.Refused(without)
-            self._take(special.plan(self.c.values))
+            self._take(*special.code(special.plan(self.c.values), self.c.values))
         except special.Refused as error:
             raise ModelError(f"specialize=True: {error}; leave it out") from None
 
@@ -215,7 +227,7 @@ class Engine:
                 raise special.Refused(why)
             there = special.known(plan, x)
             if there or self._pays(left + SPENT.of(self._kind) / MANY, special.price(plan, there)):
-                self._take(plan)
+                self._take(*special.code(plan, x))
         except special.Refused as error:
             self.told, self.due = f"{TABLES}: {error}", math.inf
 
@@ -223,7 +235,6 @@ class Engine:
         """Whether code is worth a price (both [ns])."""
         return computing * (1.0 - 1.0 / GAIN) >= MARGIN * price
 
-    def _take(self, plan: special.Plan) -> None:
-        made, how = special.code(plan, self.c.values)
+    def _take(self, made: special.Made, how: str) -> None:
         self.c.run_on(made)
         self.told, self.due = f"{MADE}: {how}", math.inf

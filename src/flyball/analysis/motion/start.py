@@ -23,6 +23,7 @@ from ...tables.specs import Structure
 from ...tables.structure import outdated
 from ...tables.switches import declared
 from ...tables.system import G_VALUE, HOLD, MODE, NU, Q0, SEMIDEFINITE, VALUE
+from ...tables.values import values_of
 from ..assemble import assemble
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
@@ -184,8 +185,15 @@ def begin_at(
     known_coordinates(coordinates)
     x = base.compiled.values
     key = coordinates, float(base.t).hex(), base.y.tobytes(), switches
-    found = x.kept.get("begun", key, MOST, lambda: _begun(base, coordinates, parameters, switches))
-    a = base if found.assembly.compiled.values is x else found.assembly.again()
+    found = x.unforced.kept.get("begun", key, MOST, lambda: _begun(base, coordinates, parameters, switches))
+    if found.assembly.compiled.values is found.base.compiled.values:
+        a = base
+    elif found.base.compiled.values is x:
+        a = found.assembly.again()
+    else:
+        c = found.assembly.compiled
+        own = Compiled(values_of(c.structure, x.given), c.z, dict(parameters or {}))
+        a = replace(found.assembly.again(), compiled=own.again())
     if before is None:
         return Start(base, a, a.y, found.coordinates, dict(found.wound))
     y = _gone_on(before, a)

@@ -1,19 +1,24 @@
-"""Some runs of a study, one after the other: each is what the analysis makes of it, failures by themselves."""
+"""Runs of a study, one after the other: each is what the analysis makes of it by itself, and may fail by itself."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...errors import FlyballError
 from ...model.model import Model
+from ...numerics.integrators.tableaux import TABLEAUX
 from ...results.study import DONE, FAILED
+from ..motion.choice import AUTO as SUITABLE
+from ..motion.engines import KEPT, has_code
 from .reading import CURVE, Reading
-from .single import Single
+from .single import Motion, Single
+
+FEW = 3  # runs for which it is not worth while to look whether code pays
 
 
 @dataclass(frozen=True)
@@ -63,41 +68,53 @@ class Answers:
             getattr(self, name).update({int(at[k]): text for k, text in getattr(other, name).items()})
 
 
+def prepared(question: Question, points: np.ndarray, runs: int) -> Question:
+    """The same for so many runs, of which some points are given: code for their mechanism is made once, where it pays.
+
+    The runs that it serves take it, the others go through the tables; the results are the same to the last bit.
+    """
+    o, model = question.options, question.model
+    if runs <= FEW or not isinstance(question.single, Motion) or o.specialize is False:
+        return question
+    if model.contacts or model.bulk or o.method not in (SUITABLE, *TABLEAUX):
+        return question
+    for k in dict.fromkeys((0, len(points) // 2, len(points) - 1)):  # one may fail, and says why when its turn comes
+        try:
+            first = question.single.run(model, replace(question.at(points[k]), specialize=o.specialize is True))
+        except FlyballError:
+            continue
+        made = o.specialize is True or has_code(first.values, first.health.evaluations, runs)
+        return replace(question, options=replace(o, specialize=KEPT if made else False))
+    return question
+
+
 def compute(question: Question, points: np.ndarray, stopped: Callable[[], bool] = lambda: False) -> Answers:
     """The runs at some points; those that are left when ``stopped`` says so stay to be done."""
+    started = time.perf_counter()
     out = question.empty(len(points))
     for k, point in enumerate(points):
         if stopped():
             break
-        alone(question, point, out, k)
+        _run(question, point, out, k)
+    out.seconds = time.perf_counter() - started
     return out
 
 
-def alone(question: Question, point: np.ndarray, out: Answers, k: int) -> None:
-    """One run by itself, as number k."""
-    guarded(out, k, partial(_told, question, point, out, k))
-
-
-def guarded(out: Answers, k: int, run: Callable[[], Sequence[np.ndarray]]) -> None:
-    """Write what a run makes, or why it fails: whatever it raises is its own, but an interrupt."""
+def _run(question: Question, point: np.ndarray, out: Answers, k: int) -> None:
+    """One run, as number k: whatever it raises is its own, but an interrupt."""
+    single = question.single
     try:
-        for values, found in zip(out.values, run(), strict=True):
-            values[k] = found
+        found = single.run(question.model, question.at(point))
+        for values, x in zip(out.values, single.read(found, question.asked, question.times), strict=True):
+            values[k] = x
+        if doubts := single.doubtful(found):
+            out.doubtful[k] = "; ".join(doubts)
+        if remarks := (*single.remarks(found), *doubts):
+            out.remarks[k] = "; ".join(map(str, remarks))
     except Exception as error:
         out.status[k], out.reasons[k] = FAILED, _reason(error)
         return
     out.status[k] = DONE
-
-
-def _told(question: Question, point: np.ndarray, out: Answers, k: int) -> list[np.ndarray]:
-    single = question.single
-    found = single.run(question.model, question.at(point))
-    values = single.read(found, question.asked, question.times)
-    if doubts := single.doubtful(found):
-        out.doubtful[k] = "; ".join(doubts)
-    if remarks := (*single.remarks(found), *doubts):
-        out.remarks[k] = "; ".join(map(str, remarks))
-    return values
 
 
 def _reason(error: Exception) -> str:

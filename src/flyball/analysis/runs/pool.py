@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
-import pickle
 import threading
-import warnings
-from collections import OrderedDict
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from ...errors import ModelError, StartWarning
-from .compute import Answers, Question
-from .runner import Runner, runner, timed
+from .compute import Answers, Question, compute, prepared
+from .remote import elsewhere, packed
 
 LONG, FIRST, PARTS = 512, 8, 64  # most runs in a task; in the first ones; into how many these divide a study
 SECONDS = 0.5  # that a task should take
@@ -79,70 +74,10 @@ def _submitting(
             max(cores(), getattr(executor, "_max_workers", 0)),
         )
         return
-    stop, run = threading.Event(), runner(question, points)
+    stop, run = threading.Event(), partial(compute, prepared(question, points, len(points)))
     pool = ThreadPoolExecutor(threads, thread_name_prefix="flyball study")
     try:
-        yield lambda some: pool.submit(timed, run, some, stop.is_set), threads
+        yield lambda some: pool.submit(run, some, stop.is_set), threads
     finally:
         stop.set()  # runs that go on end, others do not begin
         pool.shutdown(cancel_futures=True)
-
-
-# Runs in other processes: what is sent there, and what they keep of it.
-
-
-HELD = 4  # questions that a worker process keeps
-
-
-def packed(question: Question, runs: int) -> tuple[str, bytes]:
-    """For other processes, which compute so many runs together: bytes, and what they are known by.
-
-    Raises
-    ------
-    ModelError
-        If it holds something that cannot be sent.
-    """
-    try:
-        data = pickle.dumps((question, runs))
-    except Exception as pickling:
-        data = _by_value((question, runs), pickling)
-    return hashlib.sha256(data).hexdigest(), data
-
-
-def _by_value(question: tuple[Question, int], pickling: Exception) -> bytes:
-    """With functions that have no name in a module, if what Dask brings for that is there."""
-    try:
-        import cloudpickle
-    except ImportError:
-        raise ModelError(
-            f"the study cannot be sent to another process ({pickling}): define its functions in a module that workers "
-            f"can import, or leave executor out"
-        ) from None
-    return cloudpickle.dumps(question)
-
-
-_HELD: OrderedDict[str, Runner] = OrderedDict()
-_LOCK = threading.Lock()
-
-
-def elsewhere(key: str, data: bytes, points: np.ndarray) -> Answers:
-    """Some runs in another process, which keeps what it made ready for the runs before."""
-    with _LOCK:
-        run = _HELD.get(key)
-    if run is None:
-        question, runs = pickle.loads(data)
-        with _quiet():
-            run = runner(replace(question, model=question.model.snapshot()), points, runs)
-        with _LOCK:
-            _HELD[key] = run
-            while len(_HELD) > HELD:
-                _HELD.popitem(last=False)
-    with _quiet():
-        return timed(run, points, lambda: False)
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", StartWarning)  # remarks say it
-        yield

@@ -32,7 +32,7 @@ class ForceView(View):
         e, S = self.element, self._x.system
         k = self._index()
         F, M, par = self._frames
-        a, b = (np.broadcast_to(i, (self._result.records.n,)) for i in e.inputs(par, F, M))
+        a, b = (np.broadcast_to(i, (self._result.motions.n,)) for i in e.inputs(par, F, M))
         laws = tuple(self._law(int(S.force_i[k, FORCE_LAW + i]), a, b) for i in range(3))
         force, torque = e.wrench(par, F, M, laws, (a, b))
         return (a, b), force, torque
@@ -40,7 +40,7 @@ class ForceView(View):
     @property
     def _frames(self) -> tuple[tuple, tuple, Any]:
         """Records of F and M over time, and its numbers, of a force between frames."""
-        r, S = self._result.records, self._x.system
+        r, S = self._result.motions, self._x.system
         k = self._index()
         F, M = (r.frame(int(S.force_i[k, side])) for side in (FORCE_F, FORCE_M))
         return F, M, wide(S.force_x, k)
@@ -66,7 +66,7 @@ class ForceView(View):
         load = 0.0 * x
         if S.force_i[k, FORCE_LOAD] >= 0:
             force, torque = self._result.reactions.of(e.joint)
-            load = e.load(wide(S.force_x, k), self._result.records.frame(int(S.force_i[k, FORCE_M])), force, torque)
+            load = e.load(wide(S.force_x, k), self._result.motions.frame(int(S.force_i[k, FORCE_M])), force, torque)
         return x, rate, e.effort(wide(S.force_x, k), x, rate, laws, load) + 0.0 * x
 
     def _way(self, k: int, rate: np.ndarray) -> np.ndarray:
@@ -96,7 +96,7 @@ class ForceView(View):
         else:
             e = self.element
             m = s.measured.get(e.coordinate_text() or f"{e.name}:length")
-            nothing = self._result.records.zeros() + np.nan
+            nothing = self._result.motions.zeros() + np.nan
             x, rate = (nothing, nothing) if m is None else self._result.measured.quantity(m)
             effort = nothing
         side = sign(effort) * (effort != 0.0)
@@ -112,16 +112,16 @@ class ForceView(View):
     def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Values of a law over time."""
         if at < 0:
-            return self._result.records.zeros()
+            return self._result.motions.zeros()
         s, S, t = self._x.structure, self._x.system, self._result.t
-        if self._result.records.dtype == float and takes_arrays(S.code, at):
+        if self._result.motions.dtype == float and takes_arrays(S.code, at):
             slots = self._result.measured.slots[0]
             behind = len(slots) - len(s.switches)
             return over_time(S.code, S.const, at, (t, a, b), (slots[:behind], slots[behind:]))
-        stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3), self._result.records.dtype)
+        stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3), self._result.motions.dtype)
         sensed = self._result.measured.slots
         x = np.stack([t, a, b], axis=1)
-        out = self._result.records.zeros()
+        out = self._result.motions.zeros()
         for i in range(len(t)):
             try:
                 out[i] = evaluate(S.code, S.const, at, stack, tuple(x[i]), sensed[:, :, i])
@@ -144,7 +144,7 @@ class ForceView(View):
         n = len(self._result.t)
         if isinstance(self.element, JointForce):
             (k, turn), _, _ = coordinate_frames(self._x, self._x.structure.model[self.element.joint], "angle")
-            axis = turned(self._result.records.frame(k), turn)[1]
+            axis = turned(self._result.motions.frame(k), turn)[1]
             effort = self._whole_along()[2]
             return np.zeros((n, 3)), np.stack([a * effort for a in (axis[2], axis[5], axis[8])], axis=1)
         if isinstance(self.element, CoordinateForce):
@@ -171,10 +171,10 @@ class ForceView(View):
         """Potential energy stored in it [J]."""
         e = self.element
         if e.energy is None:
-            return self._result.records.zeros()
+            return self._result.motions.zeros()
         if isinstance(e, CoordinateForce):
             if not any(f is e for f in self._x.structure.forces):
-                return self._result.records.zeros()
+                return self._result.motions.zeros()
             S, k = self._x.system, self._index()
             x = self._result.measured.quantity(int(S.force_i[k, FORCE_F]))[0]
             return self._in_force() * e.energy(wide(S.force_x, k), x)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import ModelError
-from ...math.lanes import over_time
 from ...math.scalar import atan2, rounded
 from ...math.vec import dot, mtv, sub
 from ...model.body import GROUND
@@ -29,11 +28,11 @@ class JointView(View):
 
     def __init__(self, result: Result, element: Any) -> None:
         super().__init__(result, element)
-        self._known: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+        self._known: dict[tuple[str, bool], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
-    def _measure(self, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A coordinate, its rate and its acceleration, through the row that measures it."""
-        r, x = self._result.records, self._x
+    def _measure(self, what: str, solved: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A coordinate, its rate and, where that is ``solved`` for, its acceleration, through the row that measures."""
+        r, x = self._result.records if solved else self._result.motions, self._x
         (i, turn_i), (j, turn_j), c = coordinate_frames(x, self.element, what)
         F, M = turned(r.frame(i), turn_i), turned(r.frame(j), turn_j)
         par: tuple[float, ...] = (*c.row.par[:6], 0.0, 0.0)
@@ -42,7 +41,7 @@ class JointView(View):
             par, hint = (1.0, *par[1:]), self._turns(what, i, j)
         value, f, tM, tF, second = c.row.of_kind.row(par, F, M, hint, x.system.const)
         rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
-        offset = over_time(self.element.offset(x.numbers[self.element.name], what))
+        offset = self.element.offset(x.numbers[self.element.name], what)
         return c.sign * value + offset, c.sign * rate, c.sign * second
 
     def _turns(self, what: str, i: int, j: int) -> Any:
@@ -54,7 +53,7 @@ class JointView(View):
         name = f"{self.element.name}.{what}"
         if name in s.state_at:
             return self._result.states[:, s.state_at[name]]
-        r = self._result.records
+        r = self._result.motions
         (here, drawn_here), (there, drawn_there) = (
             (self._heading(k) + r.angle(int(S.frame_i[k])), self._heading(k) + r.drawn_angle(int(S.frame_i[k])))
             for k in (i, j)
@@ -72,9 +71,9 @@ class JointView(View):
             return self._result.states[:, self._x.structure.state_at[f"{self.element.name}.place"]]
         k = next((k for k, ending in enumerate(ORDERS) if k and name.endswith(ending)), 0)
         what = name.removesuffix(ORDERS[k])
-        if what not in self._known:
-            self._known[what] = self._measure(what)
-        return self._known[what][k]
+        if (key := (what, k == 2)) not in self._known:
+            self._known[key] = self._measure(*key)
+        return self._known[key][k]
 
     def _wrench(self) -> Wrench:
         """Force on body_j at M's origin and torque about it, world components."""

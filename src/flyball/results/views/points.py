@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ...math.lanes import over_time
 from ...math.scalar import atan2
 from ...model.body import Body, Frame
 from ...model.geometry import matrix_to_quaternion
+from ..records import Record
 from .base import View, same_sign, stacked
 
 if TYPE_CHECKING:
@@ -23,18 +24,26 @@ class PointView(View):
 
     def __init__(self, result: Result, element: Body | Frame) -> None:
         super().__init__(result, element)
-        self._body, offset, self._turn = result.records.placed(element.name)
-        self._record = result.records.carried(self._body, offset, self._turn)
+        self._placed = self._body, _, self._turn = result.motions.placed(element.name)
+
+    @cached_property
+    def _moving(self) -> Record:
+        """Its record without accelerations."""
+        return self._result.motions.carried(*self._placed)
+
+    @cached_property
+    def _record(self) -> Record:
+        return self._result.records.carried(*self._placed)
 
     @property
     def position(self) -> np.ndarray:
         """Position of its origin in the world [m], (n, 2) or (n, 3)."""
-        return stacked(self._record[0], self._result.planar)
+        return stacked(self._moving[0], self._result.planar)
 
     @property
     def velocity(self) -> np.ndarray:
         """Velocity of its origin, world axes [m/s]."""
-        return stacked(self._record[3], self._result.planar)
+        return stacked(self._moving[3], self._result.planar)
 
     @property
     def acceleration(self) -> np.ndarray:
@@ -53,19 +62,19 @@ class PointView(View):
     def _effort(self, coordinate: str) -> np.ndarray:
         """Force [N] or torque [N m] along a coordinate while it is locked, else 0: where no events happen, too."""
         rows = [w.row for w in self._result.values.structure.switches if w.switch.label == coordinate]
-        return self._result.multipliers[:, rows[0]] if rows else self._result.records.zeros()
+        return self._result.multipliers[:, rows[0]] if rows else self._result.motions.zeros()
 
     @property
     def rotation(self) -> np.ndarray:
         """Rotation matrices, world from frame, (n, 3, 3)."""
-        R = [x + self._result.records.zeros() for x in self._record[1]]  # in the plane some are plain numbers
+        R = [x + self._result.motions.zeros() for x in self._moving[1]]  # in the plane some are plain numbers
         return np.stack(R, axis=1).reshape(-1, 3, 3)
 
     @property
     def quaternion(self) -> np.ndarray:
         """Unit quaternions, scalar first, (n, 4): of the sign of the one before; in the plane of half the angle."""
         if self._result.planar:
-            half, zero = 0.5 * self.angle, self._result.records.zeros()
+            half, zero = 0.5 * self.angle, self._result.motions.zeros()
             return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=1)
         return same_sign(matrix_to_quaternion(self.rotation))
 
@@ -74,12 +83,12 @@ class PointView(View):
         """Planar: orientation [rad], whole turns counted."""
         if not self._result.planar:
             raise AttributeError(self._unknown("angle"))
-        return self._result.records.angle(self._body) + over_time(atan2(self._turn[3], self._turn[0]))
+        return self._result.motions.angle(self._body) + atan2(self._turn[3], self._turn[0])
 
     @property
     def angular_velocity(self) -> np.ndarray:
         """Angular velocity, world axes [rad/s]; planar: one number a time."""
-        return self._record[2][2] if self._result.planar else np.stack(self._record[2], axis=1)
+        return self._moving[2][2] if self._result.planar else np.stack(self._moving[2], axis=1)
 
     @property
     def angular_acceleration(self) -> np.ndarray:
