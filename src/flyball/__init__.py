@@ -264,4 +264,4 @@ def __dir__() -> list[str]:
         importlib.import_module(f".{room}", __name__)
     rooms = tuple(f"{__name__}.{room}." for room in _ROOMS)
     elements = [k for k, c in Element.registry.items() if c.__module__.startswith(rooms)]
-    return sorted({*_HOME, *_MODULES, *elements, "__version__"} - {"Solid", "Surface"})
+    return sorted({*_HOME, *_MODULES, *elements, "__version__"} - {"Solid", "ConvexSolid", "Surface"})

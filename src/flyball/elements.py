@@ -2,15 +2,19 @@
 
 A force is a class with `element` above it that derives from one of the base classes. Its formula is a static method:
 ``wrench(par, F, M, laws, values)`` of a `BodyForce`, `TwoPointForce` or `TwoFrameForce`, ``effort(par, x, rate, laws,
-load)`` of a `CoordinateForce` or `JointForce`. A joint derives from `Joint` and names its `blocks`; it needs no
-formula. `flyball.math.vec` and `flyball.math.scalar` hold the functions that formulas may use. ``flyball.testing``
-tests an element.
+load)`` of a `CoordinateForce` or `JointForce`. A joint derives from `Joint` and names its `blocks`: constraint rows of
+flyball, or a `ConstraintRow` with a formula ``row(par, F, M)``. A shape derives from `ConvexSolid` and has a support
+function ``support(par, d)``. `flyball.math.vec` and `flyball.math.scalar` hold the functions that formulas may use.
+``flyball.testing`` tests an element. `runge_kutta` defines a method of integration.
 """
 
 from __future__ import annotations
 
 from .compiler.formulas import formula as formula
 from .constraints import blocks as blocks
+from .constraints.along import point_row as point_row
+from .constraints.along import seen_from as seen_from
+from .constraints.blocks import ConstraintRow as ConstraintRow
 from .model.element import Angle as Angle
 from .model.element import Damping as Damping
 from .model.element import Direction as Direction
@@ -40,3 +44,5 @@ from .model.force import TwoFrameForce as TwoFrameForce
 from .model.force import TwoPointForce as TwoPointForce
 from .model.joint import Coordinate as Coordinate
 from .model.joint import Joint as Joint
+from .model.shapes import ConvexSolid as ConvexSolid
+from .numerics.integrators.runge_kutta import runge_kutta as runge_kutta

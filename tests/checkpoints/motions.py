@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.checkpoints import keeper
+from flyball.analysis import checkpointed as keeper
 from flyball.analysis.motion.part import Part
 
 STEPS = 40  # of a part

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.checkpoints import keeper
+from flyball.analysis import checkpointed as keeper
 from flyball.results.joined import joined
 
 from .motions import Killed, cut, double_pendulum, killed

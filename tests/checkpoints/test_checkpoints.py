@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.analysis import checkpointed as keeper
 from flyball.analysis import simulate as simulating
-from flyball.analysis.checkpoints import keeper
-from flyball.analysis.checkpoints.heeded import heeded
+from flyball.analysis.checkpointed import heeded
 from flyball.analysis.motion import part
 
 from .motions import (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.checkpoints import keeper
+from flyball.analysis import checkpointed as keeper
 
 from .motions import bouncer, crank, cut, double_pendulum, pile, sampled, switched, twisting, watched
 

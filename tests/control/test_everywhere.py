@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 import flyball as fb
-from flyball.analysis.checkpoints import keeper
+from flyball.analysis import checkpointed as keeper
 from flyball.analysis.motion.events import run
 from flyball.analysis.motion.implicit.made import implicit
 from tests.checkpoints.motions import cut, killed

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.fastest import fastest
 from flyball.analysis.motion.start import begin
+from flyball.analysis.motion.stiff import fastest
 from flyball.numerics.arnoldi import largest
 from flyball.numerics.integrators import clock as ex
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.results.drawn import drawn
 from flyball.view.animate import record
+from flyball.view.described import drawn
 from flyball.view.outlines import hull
 from flyball.view.recording import Recording
 from flyball.view.still import COLORS, still

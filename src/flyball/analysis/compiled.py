@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import gc
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -11,7 +13,6 @@ import numpy as np
 
 from ..compiler.buffers import PooledBuffer, StructBuffer
 from ..compiler.kernels import BoundKernel
-from ..constraints.registry import KINDS
 from ..equations.engine import POSITION, engine, evaluate
 from ..equations.projection import NONE
 from ..equations.scratch import scratch, tables, work
@@ -29,7 +30,6 @@ from ..tables.specs import Structure
 from ..tables.structure import Choices, structure
 from ..tables.system import System, Work, assign
 from ..tables.values import Values, values
-from .uncollected import uncollected
 
 
 @dataclass
@@ -142,12 +142,12 @@ class Compiled:
     @cached_property
     def has_curves(self) -> bool:
         """Whether a term leans on a place on a curve."""
-        return any(KINDS[t.formula.kind].place for t in self.structure.terms)
+        return any(t.formula.of_kind.place for t in self.structure.terms)
 
     def find_places(self) -> None:
         """Take for the places on curves those nearest of all at the poses last evaluated, wherever one was before."""
         for t in self.structure.terms:
-            if KINDS[t.formula.kind].place:
+            if t.formula.of_kind.place:
                 F, M = ((x[:3], x[3:12].reshape(3, 3)) for x in self.work.FK[[t.F, t.M]])
                 self.z[t.hint] = t.element.nearest(self.values.numbers[t.element.name], F, M)[0]  # type: ignore[attr-defined]
 
@@ -326,3 +326,18 @@ def places(x: Values) -> np.ndarray:
         if (name := f"{e.name}.place") in s.state_at:
             z[s.state_at[name]] = e.nearest(x.numbers[e.name], *x.poses.ends(e))[0]  # type: ignore[attr-defined, arg-type]
     return z
+
+
+# Python's collector of cycles, kept away while very many objects are made that stay.
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """No collection in here, where it would look through a large mechanism's objects time and again and free none."""
+    before = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if before:
+            gc.enable()

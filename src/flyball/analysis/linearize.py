@@ -14,15 +14,17 @@ from functools import partial
 import numpy as np
 
 from ..errors import ModelError
+from ..model.controller import Controller
 from ..model.model import Model
-from ..model.quantities import one
+from ..model.quantities import ENERGY, one
+from ..model.sensor import Sensor
 from ..model.touching import holds_at_times
+from ..results.booked import ADDED
 from ..results.descriptor import Descriptor
 from ..results.equilibrium import Equilibrium
 from ..results.linear import LinearModel, StateSpace
 from ..results.result import Result
 from .compiled import compiled
-from .linear.counted import refuse_counted
 from .linear.curves import slopes, snapshot
 from .linear.cycles import Sample, over_a_cycle, refuse_unsettled
 from .linear.derivatives import Equations, State
@@ -326,3 +328,31 @@ def _told(
         np.zeros(3) if frame is None else frame.turning,
         "" if frame is None else frame.told,
     )
+
+
+# Quantities that count from the start of a motion on: works and what is lost. A state says nothing of them.
+
+
+OF_ENERGY = ("balance", *ADDED)
+WORK = "work"
+
+
+def refuse_counted(model: Model, names: Sequence[str]) -> None:
+    """Refuse outputs of a linear model that integrals over the motion are.
+
+    Raises
+    ------
+    ModelError
+        Naming the first of them.
+    """
+    for name in names:
+        of = str(name)
+        while "." not in of and isinstance(e := model.find(of), Sensor):
+            of = e.of
+        owner, _, what = of.partition(".")
+        if what in OF_ENERGY if owner == ENERGY else what == WORK and not isinstance(model.find(owner), Controller):
+            instead = "energy.total" if owner == ENERGY else f"{owner}.power"
+            raise ModelError(
+                f"output {name!r} counts from the start of a motion on, so no state of a linear model tells it; ask "
+                f"for {instead!r}"
+            )

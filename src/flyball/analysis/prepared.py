@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numbers
 import threading
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,13 +21,16 @@ from ..errors import AnalysisError, ModelError
 from ..laws.evaluation import evaluate_jet
 from ..laws.functions import fault
 from ..model.body import GROUND, Frame
+from ..model.model import Model
 from ..results.records import TURN
 from ..results.result import Result
 from ..tables.names import velocity_names
 from ..tables.points import points
 from .assembly.start import Assembly
 from .compiled import Compiled, compiled
-from .motion.start import Start
+from .motion.start import Start, begin
+from .options import Options
+from .untouched import SLIDING, refuse_contact
 
 
 class Prepared:
@@ -319,3 +323,17 @@ class Prepared:
         body = c.values.bodies[e.body if isinstance(e, Frame) else name]
         b = c.structure.place[e.body if isinstance(e, Frame) else name]
         return b, body.R.T @ (p - body.c), body.R.T @ R
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrepareOptions(Options):
+    """What `Mechanism.prepare` is asked."""
+
+    coordinates: str
+    parameters: Mapping[str, float] | None
+
+
+def prepare(model: Model, o: PrepareOptions) -> Prepared:
+    """A mechanism made ready: see `Mechanism.prepare`."""
+    refuse_contact(model, "prepare", SLIDING)
+    return Prepared(begin(model.snapshot(), 0.0, o.parameters, None, o.coordinates))

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError, SingularityError
+from ..model.expressions import number
 from ..model.model import Model, listing, suggest
 from ..model.quantities import one
+from ..model.wiring import wired
 from ..results.result import Result
 from ..results.sensitivity import Sensitivity
 from .assemble import assemble
-from .compiled import Compiled
+from .compiled import Compiled, compiled
 from .equilibrium import equilibrium, resting
 from .linear.begun import held, start_changes, start_tangents
 from .linear.carried import carried
@@ -22,14 +24,13 @@ from .linear.controlled import determined_copy
 from .linear.curves import over_time, slopes, snapshot
 from .linear.derivatives import Equations, State, stepped_values
 from .linear.differences import Found, check, whole
-from .linear.in_motion import moving_copy
 from .linear.jumps import refuse_jumps, refuse_switching
 from .linear.kinks import refuse_kinks
 from .linear.moded import at_modes, of_modes
 from .linear.own_words import in_own_words
 from .linear.question import Question
 from .linear.rest import Rest
-from .linear.sliders import Slid, refuse_sampled
+from .linear.sliders import Scale, Slid, beginnings, refuse_sampled, slid
 from .linear.tangent import Direction, Linear, Tangent, friction
 from .linear.undetermined import refuse_undetermined, told_by_reactions
 from .linear.variation import Variation, Varied, followed
@@ -342,3 +343,30 @@ ANALYSES: dict[str, tuple[Callable[[Question], Sensitivity], Callable[[Question]
     "equilibrium": (_equilibrium, _at_rest),
     "modes": (of_modes, at_modes),
 }
+
+
+# A mechanism with controllers whose motion is asked about, as one that has bodies in their place (`sliders`).
+
+
+LIGHT = 1e-3  # of the mechanism's mass, that of a body for a state: errors of works are judged by the mass of all
+
+
+def moving_copy(model: Model, parameters: Mapping[str, float] | None, outputs: Sequence[str]) -> Slid:
+    """The copy in which velocities stand for states, which begins as the model does.
+
+    Parameters
+    ----------
+    model : Model
+        With continuous controllers.
+    parameters : mapping
+        Values in place of the model's.
+    outputs : sequence of str
+        Curves that are asked for.
+    """
+    c = compiled(model, parameters=parameters)
+    mass = LIGHT * float(c.values.system.bodies.mass.sum()) or 1.0
+    scales = {x.name: Scale(push=mass, mass=mass) for x in wired(model)}
+    begin, env = beginnings(model), model.environment(parameters)
+    other = slid(model, begin, outputs, scales=scales, board=mass)
+    now = {name: number(text, env, None, f"what {name!r} begins with") for name, text in begin.items()}
+    return replace(other, at=now)

@@ -61,7 +61,7 @@ def _linked(kernel: Any) -> bytes:
     finally:
         if collecting:
             gc.enable()
-    entry = _entry(context, description) if kernel.form is None else _formula_entry(context, description, kernel)
+    entry = _entry(context, description) if kernel.signature is None else _formula_entry(context, description, kernel)
     module = llvm().parse_assembly(entry)
     for text in library.modules():
         part = llvm().parse_assembly(text)
@@ -80,7 +80,7 @@ def _types(kernel: Any) -> tuple[Any, ...]:
 
     from .references import numbers, reference
 
-    if kernel.form is not None:
+    if kernel.signature is not None:
         return tuple(numbers(x, kernel.first_order) for x in kernel.parameters)
     return tuple(
         reference(x) if isinstance(x, Struct | Array) else types.int64 if x is int else types.float64
@@ -118,14 +118,16 @@ def _formula_entry(context: Any, description: Any, code: Any) -> str:
     Raises
     ------
     TypeError
-        If its result is not nested as that of its form.
+        If its result is not nested as that of its signature.
     """
     from llvmlite import ir
 
     from .references import leaves, loaded, nested, numbers, shape_of, stored
 
-    if (found := shape_of(description.restype)) != code.form.result:
-        raise TypeError(f"its result is {found or description.restype}, and must be {code.form.result}")
+    if (found := shape_of(description.restype)) != code.signature.result:
+        raise TypeError(
+            f"the lengths of its result are {found or description.restype}, not {code.signature.result} (0: a number)"
+        )
     module = context.create_module("entry")
     of = context.call_conv.get_function_type(description.restype, description.argtypes)
     callee = ir.Function(module, of, description.llvm_func_name)

@@ -6,9 +6,12 @@ anyway fall away, and which row stands in for it while a joint is still far from
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from . import alignment, along, angle, blade, coincident, curve, distance, perpendicular, rolling, skew, spin
+from .registry import BY_ADDRESS, KINDS, Kind
 
 _UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _ZERO = (0.0, 0.0, 0.0)
@@ -26,6 +29,59 @@ class Row:
     measure: str = "m"  # unit of its value
     holonomic: bool = True  # whether it has a value; else it restrains velocities only
     plus: tuple[str, ...] = ()  # coordinates of the joint that are added to the row, with coefficients it gives
+
+    parameters: ClassVar[int] = 7  # that its joint may give (`Joint.constants`)
+
+    @property
+    def of_kind(self) -> Kind:
+        """Its formula, and what is known of that."""
+        return KINDS[self.kind]
+
+
+@dataclass(frozen=True)
+class ConstraintRow(Row):
+    """A constraint equation with a formula of a user's own: a subclass defines it as a static method.
+
+    ``row(par, F, M)`` returns the value, the force on M at its origin (the reverse acts on F's body at F's origin), the
+    torques on the bodies of M and F about the origins of M and F, and the acceleration bias: with v, w, a, alpha the
+    velocities and accelerations in the records F and M,
+
+    - force . (v_M - v_F) + torque_M . w_M + torque_F . w_F is the rate of the value,
+    - the bias is the rate of that.
+
+    Force and torques are so the reaction at a Lagrange multiplier of 1.
+
+    Parameters
+    ----------
+    axes : str
+        Axes of the joint frame, such as ``"xy"``, that the equation is about. In a planar mechanism a row whose axes
+        include the normal is left out.
+    far : Row, optional
+        A row in place of this one while the mechanism is assembled from far away.
+    measure : str
+        Unit of the value, ``"m"`` or ``"rad"``.
+    holonomic : bool
+        Whether the row has a value. If not, only the velocities are constrained; the formula returns a value of 0.
+    """
+
+    kind: int = field(default=BY_ADDRESS, init=False)
+    par: tuple[float, ...] = field(default=(0.0,) * 7 + (1.0,), init=False)
+
+    parameters: ClassVar[int] = 6
+    points: ClassVar[str] = ""
+    """``"F"``, ``"M"`` or ``"FM"``: frames of which the formula reads the origin's motion only, with no torque there.
+    Such a frame may be on a point mass."""
+    row: ClassVar[Callable[..., Any]]
+
+    @property
+    def of_kind(self) -> Kind:
+        """Its formula as those of the built-in rows are called: parameter 6 is taken from the value."""
+
+        def row(par: Any, F: Any, M: Any, hint: Any, data: Any) -> Any:
+            value, *wrench = type(self).row(par[:6], F, M)
+            return value - par[6], *wrench
+
+        return Kind(self.kind, row, points=self.points)
 
 
 def _row(kind: int, a: str, b: str = "", **more) -> Row:

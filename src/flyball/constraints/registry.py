@@ -20,6 +20,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
 
+from ..compiler.by_address import Signature
+
+FRAME = (3, 9, 3, 3, 3, 3)
+"""Lengths of a kinematic record: position, rotation, angular velocity, velocity, angular acceleration, acceleration."""
+SIGNATURES = (
+    Signature(
+        "row",
+        "par, F, M",
+        (6, FRAME, FRAME),
+        (0, 3, 3, 3, 0),
+        "(value, force on M, torque on M, torque on F, bias): a number, three tuples of three, a number",
+    ),
+)
+"""The formula of a constraint row of a user's own: `blocks.ConstraintRow`."""
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -73,10 +88,12 @@ def ordered(found: list[Kind]) -> tuple[Kind, ...]:
 def _modules() -> list[ModuleType]:
     package = __name__.rpartition(".")[0]
     path = importlib.import_module(package).__path__
-    names = [info.name for info in pkgutil.iter_modules(path) if info.name != "registry"]
+    names = [info.name for info in pkgutil.iter_modules(path) if info.name not in ("registry", "blocks")]
     return [importlib.import_module(f"{package}.{name}") for name in names]
 
 
 KINDS = ordered([k for module in _modules() for k in _kinds_of(module)])
 RARE = sum(k.often for k in KINDS)
 """Kinds from this number on share one loop: nearly as fast, and much less to compile."""
+BY_ADDRESS = len(KINDS)
+"""The number of rows of a user's own, whose formulas are called by address."""

@@ -17,6 +17,7 @@ kind  name       parameters, in the shape's axes
 8     POLYGON    rounding radius; a convex polygon in z = 0, vertices counter-clockwise about z; one of two is a segment
 9     ELLIPSOID  three half axes
 10    HEMISPHERE radius; its flat side in z = 0, its dome towards +z
+11    SOLID      of a user's own: seven numbers that its support function gets, and by how much it is enlarged
 ====  =========  =====================================================================================================
 
 In planar mechanisms circles are SPHERE, and what has corners is POLYGON; a PLANE's z axis lies in the plane there.
@@ -24,7 +25,7 @@ In planar mechanisms circles are SPHERE, and what has corners is POLYGON; a PLAN
 
 from __future__ import annotations
 
-SPHERE, PLANE, BOX, CAPSULE, CYLINDER, CONE, HULL, FIELD, POLYGON, ELLIPSOID, HEMISPHERE = range(11)
+SPHERE, PLANE, BOX, CAPSULE, CYLINDER, CONE, HULL, FIELD, POLYGON, ELLIPSOID, HEMISPHERE, SOLID = range(12)
 """Numbers of the kinds; a further kind takes the next one."""
 PLANAR = frozenset((SPHERE, PLANE, POLYGON))
 """Kinds of planar mechanisms."""

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..compiler.layout import Float2, Int1, Int2
+import numpy as np
+
+from ..compiler.layout import CodeTables1, Float2, Int1, Int2
 
 # columns of Geometry.shape_i
 KIND, MOVER, FIRST, COUNT, FACE_FIRST, FACE_COUNT, MEMBER, MASK, MATERIAL = range(9)
@@ -39,6 +41,7 @@ class Geometry(NamedTuple):
     vertex: Float2  # (nv, 3): of hulls and the like, in the shape's axes
     face: Int1  # (nf,): their faces: count of corners, then the corners counter-clockwise from outside, and so on
     apart: Int2  # (nx, 2): pairs of movers (the smaller first; -1 what stands still) that never touch, sorted
+    code: CodeTables1 = np.zeros(0, np.int64)  # (ns,): code table of a shape of a user's own; 0 of others
 
 
 class Movers(NamedTuple):

@@ -6,10 +6,12 @@ user's own class are no part of these lists: they are called by address (`compil
 
 from __future__ import annotations
 
-from ..compiler.formulas import formula, has_formula
+from math import nan
+
+from ..compiler.formulas import formula, formula_at, has_formula
 from ..compiler.sources import generated, ladder
-from ..constraints.registry import KINDS, RARE
-from ..forces import BRANCHES, EFFORTS, FORMS, INPUTS, WRENCHES
+from ..constraints.registry import BY_ADDRESS, KINDS, RARE
+from ..forces import BRANCHES, EFFORTS, INPUTS, SIGNATURES, WRENCHES
 from ..tables.system import TERM_KINDS
 from . import rows, turns
 
@@ -17,24 +19,37 @@ NAN = "nan + 0.0 * par[0]"
 NONE = f"({NAN}, {NAN}, {NAN})"
 OFTEN = KINDS[:RARE]
 
-rare = ladder(
+_rare = ladder(
     __name__,
-    "rare",
+    "_rare",
     "par, F, M, hint, data",
     {k.number: k.row for k in KINDS[RARE:]},
     f"{NAN}, {NONE}, {NONE}, {NONE}, {NAN}",
 )
-"""The formula of a kind that has no loop of its own."""
 
-INPUT, WRENCH, EFFORT, BRANCH = range(len(FORMS))
 
-inputs = ladder(__name__, "inputs", FORMS[INPUT].arguments, INPUTS, f"({NAN}, {NAN})", INPUT)
+@formula
+def rare(kind, par, F, M, hint, data):
+    """The formula of a kind of row that has no loop of its own; of a user's own by the address of its code table."""
+    if kind <= BY_ADDRESS:
+        return _rare(kind, par, F, M, hint, data)
+    x = nan + 0.0 * par[0]
+    none = (x, x, x)
+    value, force, torque_M, torque_F, bias = formula_at(kind, 0, (par[:6], F, M), (x, none, none, none, x))
+    return value - par[6], force, torque_M, torque_F, bias
+
+
+INPUT, WRENCH, EFFORT, BRANCH = range(len(SIGNATURES))
+
+inputs = ladder(__name__, "inputs", SIGNATURES[INPUT].arguments, INPUTS, f"({NAN}, {NAN})", INPUT)
 """What the laws of a force between frames may depend on."""
 
-wrench = ladder(__name__, "wrench", FORMS[WRENCH].arguments, WRENCHES, f"({NONE}, {NONE})", WRENCH)
+wrench = ladder(__name__, "wrench", SIGNATURES[WRENCH].arguments, WRENCHES, f"({NONE}, {NONE})", WRENCH)
 """Wrench of a force between frames on M."""
 
-branch = ladder(__name__, "branch", FORMS[BRANCH].arguments, BRANCHES, f"({NAN}, {NAN}, {NAN}, {NAN}, {NAN})", BRANCH)
+branch = ladder(
+    __name__, "branch", SIGNATURES[BRANCH].arguments, BRANCHES, f"({NAN}, {NAN}, {NAN}, {NAN}, {NAN})", BRANCH
+)
 """On which branch of its formula a force between frames is, for kinds whose formula breaks; see `forces.BRANCHES`."""
 
 breaks = generated(
@@ -46,7 +61,7 @@ breaks = generated(
 )
 """Whether the formula of a kind of force breaks somewhere."""
 
-effort = ladder(__name__, "effort", FORMS[EFFORT].arguments, EFFORTS, NAN, EFFORT)
+effort = ladder(__name__, "effort", SIGNATURES[EFFORT].arguments, EFFORTS, NAN, EFFORT)
 """Force along a measured quantity."""
 
 

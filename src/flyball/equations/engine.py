@@ -6,8 +6,11 @@ the state in ``y[0]``. It never contains the right-hand side, so that it compile
 
 from __future__ import annotations
 
+from functools import cache, lru_cache
+
 import numpy as np
 
+from ..compiler.buffers import StructBuffer, StructPool
 from ..compiler.formulas import formula
 from ..compiler.kernels import kernel
 from ..numerics.integrators.clock import STATES, Clock, ClockCounts, ClockReals
@@ -150,12 +153,31 @@ def evaluate(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[in
 
     With POSITION the turns and places in ``y`` are brought up to date.
     """
-    real = ClockReals.blank()
-    real.t = t
-    Y = np.zeros((STATES, len(y)))
-    Y[0] = y
-    none = np.zeros(0, np.int64)
-    clock = Clock(real, ClockCounts.blank(), np.zeros(0), Y, np.zeros((1, len(y))), none, np.zeros((ROWS, 0)))
-    status = motion_kernel(S, W, tableau("rk45"), clock, np.zeros((0, 0)), task)
-    y[:] = Y[0]
-    return status, clock.K[0]
+    clock = _standing(len(y)).new()
+    clock.array("real").t = t
+    state = clock.array("y")[0]
+    state[:] = y
+    status = int(engine(S, W, _unused(), clock, _no_rows(), task))
+    y[:] = state
+    return status, clock.array("K")[0]
+
+
+@lru_cache
+def _standing(ny: int) -> StructPool:
+    """Clocks that stand, of states of so many numbers."""
+    none, one = np.zeros(0, np.int64), np.zeros((1, ny))
+    return StructPool(
+        Clock(ClockReals.blank(), ClockCounts.blank(), np.zeros(0), np.zeros((STATES, ny)), one, none,
+              np.zeros((ROWS, 0)))
+    )  # fmt: skip
+
+
+@cache
+def _unused() -> StructBuffer:
+    """Coefficients of an integrator, for tasks that integrate nothing."""
+    return StructBuffer(tableau("rk45"))
+
+
+@cache
+def _no_rows() -> StructBuffer:
+    return StructBuffer(Sheet(np.zeros((0, 0))))

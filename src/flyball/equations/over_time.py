@@ -6,8 +6,15 @@ from typing import NamedTuple
 
 from ..compiler.kernels import kernel
 from ..compiler.layout import Float2, Float3
-from ..tables.system import System
+from ..tables.system import Bodies, Tree
 from .tree import motion, pose
+
+
+class BodyTables(NamedTuple):
+    """What of `System` it is computed from."""
+
+    tree: Tree
+    bodies: Bodies
 
 
 class AtOnce(NamedTuple):
@@ -27,7 +34,7 @@ class OverTime(NamedTuple):
 
 
 @kernel
-def kinematics_over_time(S: System, W: AtOnce, q: Float2, v: Float2, out: OverTime) -> int:
+def kinematics_over_time(S: BodyTables, W: AtOnce, q: Float2, v: Float2, out: OverTime) -> int:
     """Poses, velocities and bias accelerations at the coordinates q (n, nq) and velocities v (n, nv)."""
     for i in range(q.shape[0]):
         for b in range(S.tree.parent.shape[0]):

@@ -10,6 +10,7 @@ value_k - f(t, s): the sensors' gradients times df/ds are taken from the row.
 from __future__ import annotations
 
 from ..compiler.formulas import formula
+from ..constraints.registry import BY_ADDRESS
 from ..laws.evaluation import evaluate_jet
 from ..math.scalar import atan2, cos, sin
 from ..math.vec import add, cross, load3, neg, put3, scale, sub
@@ -143,14 +144,25 @@ def each_row(S, W, z, whole, kind, row):
 
 
 @formula
+def kind_of(S, k, kind):
+    """The number of term k's kind, or the address of its code table."""
+    return S.term_code[k] if kind == BY_ADDRESS else kind
+
+
+@formula
 def rare_values(S, W, z, first, last, row):
-    """``each_value`` for kinds that share one loop, ``row(kind, par, F, M, hint, data)``: less to compile."""
+    """``each_value`` for kinds that share one loop, ``row(kind, par, F, M, hint, data)``: less to compile.
+
+    A row of a user's own has the address of its code table for its kind.
+    """
     for kind in range(first, last):
         for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
             F = load(W.FK, S.terms.F[k])
             M = load(W.FK, S.terms.M[k])
             hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
-            g, force, torque_M, torque_F, _ = row(kind, parameters(S.term_parameters, k), F, M, hint, S.const)
+            g, force, torque_M, torque_F, _ = row(
+                kind_of(S, k, kind), parameters(S.term_parameters, k), F, M, hint, S.const
+            )
             add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
 
 
@@ -162,7 +174,7 @@ def rare_biases(S, W, z, first, last, row):
             F = load(W.FK, S.terms.F[k])
             M = load(W.FK, S.terms.M[k])
             hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
-            _, _, _, _, bias = row(kind, parameters(S.term_parameters, k), F, M, hint, S.const)
+            _, _, _, _, bias = row(kind_of(S, k, kind), parameters(S.term_parameters, k), F, M, hint, S.const)
             add_bias(S, W, k, bias)
 
 
@@ -174,7 +186,9 @@ def rare_rows(S, W, z, first, last, row):
             F = load(W.FK, S.terms.F[k])
             M = load(W.FK, S.terms.M[k])
             hint = hint_of(S, z, k, 0.0 * S.term_parameters[k, 0])
-            g, force, torque_M, torque_F, bias = row(kind, parameters(S.term_parameters, k), F, M, hint, S.const)
+            g, force, torque_M, torque_F, bias = row(
+                kind_of(S, k, kind), parameters(S.term_parameters, k), F, M, hint, S.const
+            )
             add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
             add_bias(S, W, k, bias)
 

@@ -5,7 +5,8 @@ import pkgutil
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ..compiler.by_address import Form
+from ..compiler.by_address import Signature
+from ..constraints.registry import FRAME
 from ..model.force import Force
 
 for _module in pkgutil.iter_modules(__path__):
@@ -39,14 +40,15 @@ INPUTS, WRENCHES, EFFORTS = (formulas(_HERE, name) for name in ("inputs", "wrenc
 BRANCHES = formulas(_HERE, "branch")
 """Kind -> four numbers, of which two states within half a turn that are on one branch of a force's formula have a
 positive product; and the speed [rad/s] at which it turns."""
-_FRAME = (3, 9, 3, 3, 3, 3)  # position, rotation, angular velocity, velocity, angular acceleration, acceleration
-FORMS = (
-    Form("inputs", "par, F, M", (16, _FRAME, _FRAME), 2),
-    Form("wrench", "par, F, M, laws, values", (16, _FRAME, _FRAME, 3, 2), (3, 3)),
-    Form("effort", "par, x, rate, laws, load", (16, 0, 0, 3, 0), 0),
-    Form("branch", "par, F, M", (16, _FRAME, _FRAME), 5),
+SIGNATURES = (
+    Signature("inputs", "par, F, M", (16, FRAME, FRAME), 2, "two numbers: a quantity and its rate"),
+    Signature(
+        "wrench", "par, F, M, laws, values", (16, FRAME, FRAME, 3, 2), (3, 3), "(force, torque), each a tuple of three"
+    ),
+    Signature("effort", "par, x, rate, laws, load", (16, 0, 0, 3, 0), 0, "a number"),
+    Signature("branch", "par, F, M", (16, FRAME, FRAME), 5, "five numbers"),
 )
-"""The formulas of forces that kernels call, in the order of their code tables."""
+"""The formulas of forces that kernels call by address, in the order of their code tables."""
 if set(WRENCHES) & set(EFFORTS):
     raise RuntimeError(f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}")
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here

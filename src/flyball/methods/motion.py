@@ -76,7 +76,7 @@ class Motions(Model):
             with choices of its own: steps of fixed length by impulses, for contact with friction. auto: ``dop853``,
             which goes from touch to touch, and ``radau`` for as long as a long motion is stiff; steps by impulses
             where bodies may touch at many places, or in ways that it does not know: ``health.method`` says which,
-            from when on, and why.
+            from when on, and why. Or the name of a Runge-Kutta method that `elements.runge_kutta` has defined.
         rtol : float [1]
             Tolerance of the error of a step relative to the state; 1e-13 at least, 0.1 at most.
         atol : float [m, rad, m/s, rad/s], optional
@@ -155,7 +155,7 @@ class Motions(Model):
         AssemblyError
             If the mechanism cannot be assembled.
         """
-        from ..analysis.prepare import PrepareOptions, prepare
+        from ..analysis.prepared import PrepareOptions, prepare
 
         return prepare(self, PrepareOptions.asked(locals()))
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ..constraints.blocks import Row
-from ..constraints.registry import KINDS
 from .element import Element, Law, Point, PointPair
 from .geometry import vector
 from .joint import WorldFrame
@@ -168,7 +167,7 @@ class CoordinateForce(Force):
 
     def on_points(self) -> bool:
         """Its terms say."""
-        return all(set("FM") <= set(KINDS[formula.kind].points) for _, _, formula in self.path())
+        return all(set("FM") <= set(formula.of_kind.points) for _, _, formula in self.path())
 
 
 @dataclass(frozen=True)

@@ -141,8 +141,27 @@ class Joint(Element):
         return getattr(n, name) if name else 0.0
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """Parameters 0 to 6 of a row, given the drawn frames; the last is what its value is compared with."""
+        """Parameters 0 to 6 of a row, given the drawn frames; the last is what its value is compared with.
+
+        Of a `ConstraintRow` up to six: what its formula gets as ``par``, in SI units.
+        """
         return row.par[:7]
+
+    def row_parameters(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
+        """The same, seven.
+
+        Raises
+        ------
+        ModelError
+            If there are more than the row has.
+        """
+        par = tuple(self.constants(n, row, F, M))
+        if len(par) > row.parameters:
+            raise ModelError(
+                f"{self.title}: constants() gives {len(par)} numbers for its {type(row).__name__}, which has up to "
+                f"{row.parameters}"
+            )
+        return (*par, *(0.0,) * (7 - len(par)))
 
     def weight(self, n: SimpleNamespace, coordinate: str, F: WorldFrame, M: WorldFrame) -> float:
         """Coefficient of a coordinate that is added to a row (``Row.plus``)."""

@@ -107,7 +107,7 @@ def check_joint(model: Model, e: Joint, n: Any) -> None:
         return
     F, M = e.world_frames(n, model.planar)
     for row in e.rows(model.planar):
-        e.constants(n, row, F, M)
+        e.row_parameters(n, row, F, M)
 
 
 def check_by_frames(model: Model, e: Joint | TwoFrameForce) -> None:

@@ -12,8 +12,7 @@ from ..tables.reads import read
 from .energy import gained
 from .lag import late
 from .ledger import Ledger, apart, whole
-from .one_sided import pulls
-from .one_way import one_way
+from .one_sided import one_way, pulls
 from .overturned import overturned
 from .residue import missed
 
@@ -57,7 +56,8 @@ def warnings(result: Result) -> tuple[str, ...]:
 
 def doubtful(result: Result) -> tuple[str, ...]:
     """Reasons to think that a motion is not what its tolerance asks for; none for a sound one."""
-    balance = _balance(result) or late(whole(result))
+    ledger = whole(result)
+    balance = _balance(ledger) or late(ledger)
     return tuple(text for text in (balance, overturned(result), missed(result), _violation(result)) if text)
 
 
@@ -116,9 +116,9 @@ def energy_moved(result: Result) -> float:
     return float(whole(result).moved(0, len(result.t)))
 
 
-def _balance(result: Result) -> str:
+def _balance(x: Ledger) -> str:
     """What is said of all of it; or else of the part whose balance is worst, of those that nothing connects."""
-    found = _off(whole(result))
+    found, result = _off(x), x.result
     if not found and result.health.options.get("rtol") is not None:
         found = max((_off(x) for piece in result.pieces or (result,) for x in apart(piece)), default=())
     return found[1] if found else ""
@@ -130,21 +130,22 @@ def _off(x: Ledger) -> tuple[float, str] | tuple[()]:
     What moves together is as accurate as the energy of all of it, and what nothing connects with others as its own.
     """
     rows, t = len(x.result.t), x.result.t
-    if all(lost <= allowed for _, _, lost, _, allowed in _excesses(x, rows, np.zeros(rows))):
-        return ()  # and so by what stands in no row, which only allows for more
-    for begin, end, lost, there, allowed in _excesses(x, rows, _unseen(x)):
+    if all(lost <= allowed for _, _, lost, _, allowed in _excesses(x, rows, np.zeros(rows), 0.0)):
+        return ()  # what stands in no row, and rounding, only allow for more
+    for begin, end, lost, there, allowed in _excesses(x, rows, _unseen(x), _rest(x)):
         if lost > allowed and x.known(begin, end):
             when = "" if end - begin == rows else f" between t = {t[begin]:.6g} and {t[end - 1]:.6g} s"
             return _told(x, when, lost, there, allowed)
     return ()
 
 
-def _excesses(x: Ledger, rows: int, unseen: np.ndarray) -> Iterator[tuple[int, int, float, float, float]]:
-    """First row and last (not counted), what is lost there, moved and to be expected [J]; ``unseen``: `_unseen`.
+def _excesses(x: Ledger, rows: int, unseen: np.ndarray, least: float) -> Iterator[tuple[int, int, float, float, float]]:
+    """First row and last (not counted), what is lost there, moved and to be expected [J].
 
-    Of all rows, then of the stretches where more may be lost than that.
+    ``unseen`` and ``least``: see `_unseen` and `_rest`. Of all rows, then of the stretches where more may be lost than
+    that.
     """
-    part, moved, least = balanced(x.result), x.moved(0, rows) + float(unseen.max(initial=0.0)), _rest(x)
+    part, moved = balanced(x.result), x.moved(0, rows) + float(unseen.max(initial=0.0))
     yield 0, rows, float(np.abs(x.balance).max(initial=0.0)), moved, part * moved + least
     for begin, end in _suspects(x, rows, x.kinetic + unseen, (part, moved, least)):
         # velocities v are as far off as those of what moves most, u: by m v du

@@ -28,28 +28,28 @@ STORED = "contact_elastic"
 """Energy stored in contacts that give way, among what contacts exchange."""
 
 
-def kinetic(result: Result, bodies: Sequence[int]) -> np.ndarray:
+def kinetic(result: Result, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
     """Sum of m v^2 / 2 + w . I w / 2 over rows of the body table [J]."""
     _, R, w, v, _, _ = result.motions.bodies(bodies)
     return _of_speeds(result, bodies, R, w, v)
 
 
-def gained(result: Result, bodies: Sequence[int], time: float) -> np.ndarray:
+def gained(result: Result, bodies: Sequence[int] | np.ndarray, time: float) -> np.ndarray:
     """Kinetic energy [J] that the accelerations at every output time give bodies at rest in a time [s]."""
     _, R, _, _, alpha, a = result.records.bodies(bodies)
     return time**2 * _of_speeds(result, bodies, R, alpha, a)
 
 
-def _of_speeds(result: Result, bodies: Sequence[int], R: tuple, w: tuple, v: tuple) -> np.ndarray:
+def _of_speeds(result: Result, bodies: Sequence[int] | np.ndarray, R: tuple, w: tuple, v: tuple) -> np.ndarray:
     table = result.values.system.bodies
     w_B, inertia = mtv(R, w), tuple(table.inertia[bodies].T[..., None])
     return (0.5 * table.mass[bodies, None] * dot(v, v) + 0.5 * dot(w_B, mv(inertia, w_B))).sum(axis=0)
 
 
-def gravity(result: Result, bodies: Sequence[int]) -> np.ndarray:
+def gravity(result: Result, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
     """Potential energy of gravity of rows of the body table [J]."""
     S = result.values.system
-    return -(S.bodies.mass[bodies, None] * dot(tuple(S.gravity), result.motions.bodies(bodies)[0])).sum(axis=0)
+    return -(S.bodies.mass[bodies][:, None] * dot(tuple(S.gravity), result.motions.bodies(bodies)[0])).sum(axis=0)
 
 
 class Energy(Named):

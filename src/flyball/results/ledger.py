@@ -56,7 +56,8 @@ class Ledger:
     def went(self) -> np.ndarray:
         """Square of how far each of the bodies came about [m^2]."""
         r = self.result.motions
-        return sum(np.ptp(p, axis=1) ** 2 for p in r.bodies(self.bodies)[0])
+        x, y, z = (np.ptp(p, axis=1) for p in r.bodies(self.bodies)[0])
+        return x**2 + y**2 + z**2
 
     def known(self, begin: int, end: int) -> bool:
         """Whether the balance holds between two rows, the last not counted."""

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..equations.over_time import AtOnce, OverTime, kinematics_over_time
+from ..equations.over_time import AtOnce, BodyTables, OverTime, kinematics_over_time
 from ..equations.records import at_rest, carried, load
-from ..equations.scratch import tables
 from ..equations.tree import column, motion, pose
 from ..equations.velocities import turned_angles
 from ..math.products import product
@@ -43,7 +42,7 @@ class Records:
         if self.dtype == float:
             one = AtOnce(np.zeros((nb, 24)), np.zeros((nv, 6)), np.zeros((nb, 3)))
             q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)
-            kinematics_over_time(tables(x.structure, S), one, q, v, self.W)
+            kinematics_over_time(BodyTables(S.tree, S.bodies), one, q, v, self.W)
         else:
             for b in range(nb):
                 pose(S, self.W, b, q.T)
@@ -88,7 +87,7 @@ class Records:
         """Record of body b's centre of mass."""
         return load(self.W.BK, b)
 
-    def bodies(self, b: Sequence[int]) -> Record:
+    def bodies(self, b: Sequence[int] | np.ndarray) -> Record:
         """Records of several bodies' centres of mass: arrays (bodies, n)."""
         return load(self.W.BK[b].swapaxes(0, 1)[None], 0)
 
@@ -168,15 +167,17 @@ def wound(counted: Mapping[str, float], angles: Mapping[str, float]) -> dict[str
 
 
 def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, Any], tuple[int, Any], Coordinate]:
-    """(frame, extra turn) twice: what a joint's coordinate is measured between, from its frames F and M."""
+    """(frame, extra turn or ()) twice: what a joint's coordinate is measured between, from its frames F and M."""
     c = joint.coordinates[what]
     ends = []
     for role in c.frames:
         turn = getattr(c, f"turn_{role}")
-        ends.append((x.structure.frame_at[joint.name, role, ""], turn if len(turn) else np.eye(3)))
+        ends.append((x.structure.frame_at[joint.name, role, ""], turn))
     return ends[0], ends[1], c
 
 
 def turned(record: Record, turn: Any) -> Record:
-    """The record with its axes turned by a constant rotation."""
+    """The record with its axes turned by a constant rotation, if there is one."""
+    if not len(turn):
+        return record
     return (record[0], mm(record[1], tuple(np.asarray(turn).ravel())), *record[2:])

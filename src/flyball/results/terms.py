@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..constraints.registry import KINDS
 from ..equations.rows import COEFFICIENT, parameters
 from ..math.vec import neg, scale
 from ..model.joint import Joint
@@ -28,7 +27,7 @@ def term(result: Result, k: int) -> tuple[Record, Record, tuple]:
     t = x.structure.terms[k]
     F, M = result.motions.frame(t.F), result.motions.frame(t.M)
     hint: Any = result.states[:, t.hint] if t.hint >= 0 else 0.0
-    kind, par = KINDS[t.formula.kind], parameters(x.system.term_parameters, k)
+    kind, par = t.formula.of_kind, parameters(x.system.term_parameters, k)
     if kind.single:
         return F, M, _one_by_one(kind.row, par, (F, M, hint + result.motions.zeros()), x.system.const)
     return F, M, kind.row(par, F, M, hint, x.system.const)
@@ -55,7 +54,7 @@ def along(result: Result, joint: Joint, what: str) -> Wrench:
     (i, turn_i), (j, turn_j), c = coordinate_frames(result.values, joint, what)
     F, M = turned(result.motions.frame(i), turn_i), turned(result.motions.frame(j), turn_j)
     par = (*c.row.par[:6], 0.0, 0.0)
-    _, f, tM, tF, _ = KINDS[c.row.kind].row(par, F, M, 0.0, result.values.system.const)
+    _, f, tM, tF, _ = c.row.of_kind.row(par, F, M, 0.0, result.values.system.const)
     force, torque = (f, tM) if c.frames[1] == "M" else (neg(f), tF)
     return scale(c.sign, force), scale(c.sign, torque)
 

@@ -43,7 +43,7 @@ def kept() -> bool:
 
 def known(p: Plan, x: Values) -> str:
     """Where code for a mechanism is: "memory", "disk", or "" (nowhere)."""
-    if _in_memory(p, x.system) is not None:
+    if in_memory(p, x) is not None:
         return "memory"
     folder = _folder()
     if folder is None or _nowhere.get(p.key) == (changed := folder.stat().st_mtime_ns):
@@ -75,7 +75,7 @@ def code(p: Plan, x: Values) -> tuple[Made, str]:
     if why := refusal(p):
         raise Refused(why)
     with _LOCK:
-        if (found := _in_memory(p, x.system)) is not None:
+        if (found := in_memory(p, x)) is not None:
             return found, "kept in this process"
         if (found := _on_disk(p, x.system)) is not None:
             return found, "found on disk"
@@ -105,9 +105,10 @@ def digest(S: System, entries: list[Entry]) -> str:
     return hashlib.sha256(repr(entries).encode() + values.tobytes()).hexdigest()[:DIGITS]
 
 
-def _in_memory(p: Plan, S: System) -> Made | None:
+def in_memory(p: Plan, x: Values) -> Made | None:
+    """The code for a mechanism that this process has."""
     for key, made in list(_found.items()):
-        if key[0] == p.key and key[1] == digest(S, made.known):
+        if key[0] == p.key and key[1] == digest(x.system, made.known):
             return made
     return None
 

@@ -51,9 +51,9 @@ def plan(x: Values) -> Plan:
 
 def _planned(s: Structure, S: System) -> Plan:
     digest = hashlib.sha256(s.kept.get("code of structure", None, 1, lambda: _structure(s, S)))
-    for table in traced_arrays(S).values():
-        for x in PLAIN:
-            digest.update(np.packbits(table == x).tobytes())
+    entries = np.concatenate([table.ravel() for table in traced_arrays(S).values()])
+    for x in PLAIN:
+        digest.update(np.packbits(entries == x).tobytes())
     size = estimate(S)
     why = ""
     if np.iscomplexobj(S.const):
@@ -73,8 +73,8 @@ def estimate(S: System) -> int:
 def _structure(s: Structure, S: System) -> bytes:
     """Hash of what parameters cannot change, of sources and processor."""
     digest = hashlib.sha256(machine().encode() + sources())
-    digest.update(" ".join("" if x is None else x.content for x in s.own).encode())
-    for name, a in arrays(S._replace(force_code=S.force_code != 0)):
+    digest.update(" ".join("" if x is None else x.content for x in (*s.force_code, *s.term_code)).encode())
+    for name, a in arrays(S._replace(force_code=S.force_code != 0, term_code=S.term_code != 0)):
         number = name.partition(".")[0] in TRACED
         digest.update(f"{name} {a.shape} {a.dtype}".encode() + (b"" if number else np.ascontiguousarray(a).tobytes()))
     digest.update(f"{s.nq} {s.nv} {len(s.states)} {s.depth} {len(s.measured)} {len(s.loads)}".encode())

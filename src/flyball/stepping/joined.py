@@ -11,11 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compiler.layout import Float2, Int1, Int2, Record
+from ..compiler.layout import Float2, Int1, Int2, Record, Struct, struct
 from ..equations.tasks import Sheet
 from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.tableaux import Tableau
-from ..numerics.ldl import Pattern
 from ..tables.system import System, Work
 
 # what may be asked at the door (`joints.joined`), in the order of a step: the start of a motion; velocities without
@@ -106,20 +105,12 @@ class Joined(NamedTuple):
     pose: Float2  # (movers, 12): before they were put onto the joints
 
 
-def _none(of: type, dimensions: str, **parts: Any) -> Any:
-    """A named tuple of empty arrays: of floats with so many dimensions, of integers where that is a letter."""
-    names = [n for n in of._fields if n not in parts]  # type: ignore[attr-defined]
-    for name, d in zip(names, dimensions, strict=True):
-        whole = d in "abc"
-        parts[name] = np.zeros((0,) * ("abc".index(d) + 1 if whole else int(d)), np.int64 if whole else float)
-    return of(**parts)
+def _empty(layout: Struct) -> Any:
+    """A named tuple of arrays without entries."""
+    parts = [_empty(x) if isinstance(x, Struct) else np.zeros((0,) * x.ndim, x.dtype) for _, x in layout.fields]
+    return layout.of(*parts)
 
 
 def no_mechanism() -> Joined:
     """Tables of no mechanism, of the types of all others: what the loop of steps is compiled for."""
-    S = _none(System, "b2a2b2bbaabb2abbb2bbaa11bbba", ldl=_none(Pattern, "aaaaaaaa"))
-    W = _none(Work, "22222211122222112221a1")
-    clock, R = _none(Clock, "1a122a2"), _none(Tableau, "21222a")
-    sheet = Sheet(np.zeros((0, 0)))
-    tables = _none(Joined, "a1aba22222222b2bba2", S=S, W=W, R=R, clock=clock, sheet=sheet, slopes=sheet)
-    return tables._replace(real=JoinedReals.blank(), count=JoinedCounts.blank(), group=np.zeros(1, np.int64))
+    return _empty(struct(Joined))._replace(group=np.zeros(1, np.int64))

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.registry import KINDS
 from ..equations.tree import column
 from ..graph.node import Graph, Node
 from ..graph.operations import ADD, MULTIPLY, NUMBER
@@ -41,7 +40,7 @@ def counted(x: Values, S: System) -> tuple[System, list[int]]:
     hint, parameters = S.terms.hint.copy(), S.term_parameters.copy()
     more: list[int] = []
     for k, t in enumerate(s.terms):
-        if KINDS[t.formula.kind].turns and hint[k] < 0:
+        if t.formula.of_kind.turns and hint[k] < 0:
             hint[k] = len(s.states) + len(more)
             parameters[k, 0] = 1.0
             more.append(k)

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ..constraints.curve import point
-from ..constraints.registry import KINDS
 from ..equations.records import load
 from ..equations.rows import BY_TIME, parameters
 from ..graph.arrays import objects
@@ -95,7 +94,7 @@ def _places(x: Values, T: Traced) -> tuple[list[Place], list[Node]]:
     S, W = T.system, T.work
     places, feet = [], []
     for k, t in enumerate(x.structure.terms):
-        kind = KINDS[t.formula.kind]
+        kind = t.formula.of_kind
         if kind.foot is None or kind.progress is None:
             continue
         F, M, par = load(W.FK, t.F), load(W.FK, t.M), parameters(S.term_parameters, k)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.curve import point
-from ..constraints.registry import KINDS
+from ..constraints.registry import Kind
 from ..equations.records import load
 from ..equations.rows import parameters
 from ..errors import ModelError
@@ -55,11 +55,11 @@ def places_at(x: Formulated, places: Sequence[Place], values: Mapping[str, Any])
         given = [*x.cleaned(objects([*records, *parameters(S.term_parameters, place.term)])), *S.const]
         numbers = [float(np.real(n)) for n in evaluate(given, values)]
         F, M = ((tuple(n[:3]), tuple(n[3:])) for n in (numbers[:12], numbers[12:24]))
-        out[place.symbol.data.name] = nearest(t.formula.kind, tuple(numbers[24:32]), F, M, np.array(numbers[32:]))
+        out[place.symbol.data.name] = nearest(t.formula.of_kind, tuple(numbers[24:32]), F, M, np.array(numbers[32:]))
     return out
 
 
-def nearest(kind: int, par: tuple[float, ...], F: tuple, M: tuple, data: np.ndarray) -> float:
+def nearest(kind: Kind, par: tuple[float, ...], F: tuple, M: tuple, data: np.ndarray) -> float:
     """Parameter of the point of a curve that is nearest to M: of points on it the nearest, then by Newton's method."""
     at = int(par[1])
     breaks = data[at + BREAKS : at + BREAKS + int(data[at + 1])]
@@ -67,6 +67,5 @@ def nearest(kind: int, par: tuple[float, ...], F: tuple, M: tuple, data: np.ndar
     x, _, _, y, _, _ = point(par, s, data)
     p = mtv(F[1], sub(M[0], F[0]))
     guess = s[np.argmin((x - p[0]) ** 2 + (y - p[1]) ** 2)]
-    foot = KINDS[kind].foot
-    assert foot is not None
-    return float(foot(par, F, M, float(guess), data))
+    assert kind.foot is not None
+    return float(kind.foot(par, F, M, float(guess), data))

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..constraints.registry import KINDS
+from ..constraints.registry import Kind
 from ..errors import ModelError
 from ..graph.arrays import objects
 from ..graph.node import Graph, Node, Symbol
@@ -37,7 +37,7 @@ ORIENTATIONS = ("quaternion", "bryant")
 class Term(NamedTuple):
     """A term of a row: kind and parameters of its formula, what it counts, how its frames are turned before."""
 
-    kind: int
+    kind: Kind
     par: tuple
     weight: float
     turn_F: tuple = ()
@@ -187,7 +187,7 @@ class Textbook(Home):
 
     def _term(self, t: Term, data: Any) -> np.ndarray:
         """One term with all accelerations apart: value, force, torques on M and F, bias."""
-        kind, par = KINDS[t.kind], t.par
+        kind, par = t.kind, t.par
         zero = (0.0, 0.0, 0.0)
         F, M = (
             (f[0], mm(f[1], tuple(np.ravel(turn))) if len(turn) else f[1], *f[2:4], zero, zero)
@@ -216,19 +216,19 @@ def textbook(model: Model, parameters: Iterable[tuple[str, Node]], name: str, or
     n, ends = x.numbers[name], x.poses.ends(joint)
     rows = []
     for row in joint.rows(model.planar):
-        par = [_shown(c) for c in joint.constants(n, row, *ends)]
+        par = [_shown(c) for c in joint.row_parameters(n, row, *ends)]
         data: list[Any] = []
-        if KINDS[row.kind].place:
+        if row.of_kind.place:
             curves = joint.curves(n)
             data = [float(c.real) for curve in curves for c in curve]
             par[1:3] = 0.0, float(len(curves[0]))
-        terms = [Term(row.kind, (*par, 1.0), row.par[7])]
+        terms = [Term(row.of_kind, (*par, 1.0), row.par[7])]
         for what in row.plus:
             c = joint.coordinates[what]
             if c.frames != "FM":
                 raise ModelError(f"{joint.title}: its row of {what!r} is from M to F and has no textbook form")
             weight = c.sign * c.row.par[7] * _shown(joint.weight(n, what, *ends))
-            terms.append(Term(c.row.kind, (*c.row.par[:6], 0.0, 1.0), weight, c.turn_F, c.turn_M))
+            terms.append(Term(c.row.of_kind, (*c.row.par[:6], 0.0, 1.0), weight, c.turn_F, c.turn_M))
         rows.append((row, terms, np.array(data, object)))
     return Textbook(joint, graph, rows, orientation)
 

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..model.body import Frame
 from ..model.coupling import Coupling
+from ..model.element import Element
 from ..model.force import Force
 from ..model.joint import Joint
 from ..model.model import Model
 from .numbers import Numbers
-from .system import changed
+from .specs import Structure
 
 if TYPE_CHECKING:
     from .values import Values
-
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -44,17 +42,36 @@ class Afresh:
         acting = model.kept.get("acting", None, 1, lambda: {e.name for e in (*model.forces, *model.controllers)})
         return cls(base, other.union(*(stand_on.get(name, ()) for name in other)), other <= acting)
 
-    def table(self, name: str, new: T, dtype: Any) -> T:
-        """A table of `System` to be filled in: with what is known, or the ``new`` one."""
-        return new if self.base is None else changed(lambda _, x: x.astype(dtype), getattr(self.base.system, name))
+    def table(self, name: str, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
+        """A table of `System` to be filled in: with what is known, or empty."""
+        if self.base is None:
+            return np.zeros(shape, dtype)
+        return getattr(self.base.system, name).astype(dtype)
 
     def state(self, name: str, n: int, dtype: Any) -> np.ndarray:
         """The same of the drawn coordinates, "q", or velocities, "v"."""
         return np.zeros(n, dtype) if self.base is None else getattr(self.base, name).astype(dtype)
 
+    def rows(self, s: Structure, table: str) -> Iterable[int]:
+        """Numbers of the rows of a table ("frames", "terms" or "forces") that are filled in again."""
+        if self.base is None:
+            return range(len(getattr(s, table)))
+        of = s.kept.get("rows of elements", table, 3, lambda: _rows(getattr(s, table)))
+        return sorted({k for name in self.names for k in of.get(name, ())})
+
     def asks(self, *elements: Any) -> bool:
         """Whether rows of one of these elements (None: of the world) are filled in again."""
         return self.base is None or any(e is not None and e.name in self.names for e in elements)
+
+
+def _rows(specs: Sequence[Any]) -> Mapping[str, list[int]]:
+    """Element -> the rows that depend on it."""
+    out: dict[str, list[int]] = {}
+    for k, x in enumerate(specs):
+        elements = (x,) if isinstance(x, Element) else (x.element, getattr(x, "owner", None))
+        for name in {e.name for e in elements if e is not None}:
+            out.setdefault(name, []).append(k)
+    return out
 
 
 def _stand_on(model: Model) -> Mapping[str, set[str]]:

@@ -9,7 +9,7 @@ import numpy as np
 from ..compiler.by_address import CodeTable, code_table
 from ..constraints.blocks import DISTANCE, turning
 from ..errors import ModelError
-from ..forces import BRANCHES, EFFORTS, FORMS, INPUTS, WRENCHES
+from ..forces import BRANCHES, EFFORTS, INPUTS, SIGNATURES, WRENCHES
 from ..model.carried import carried
 from ..model.controller import Controller
 from ..model.element import LawOf, fields_with
@@ -19,7 +19,7 @@ from ..model.force import CoordinateForce, Force
 from ..model.sensor import Sensor
 from ..model.touch import Touch
 from .specs import Structure, frame
-from .system import OWN, SLIDING, Forces
+from .system import FORCE_BY_ADDRESS, SLIDING, Forces
 from .terms import coordinate_frames, coordinate_term, measured_term
 
 
@@ -101,12 +101,12 @@ def _sensed(s: Structure, e: Sensor | Event | Controller, kind: str, text: str) 
 def forces(s: Structure) -> None:
     """Force table, sorted by kind."""
     acting = [(f, formulas_of(type(f))) for f in s.model.acting() if _acts(s, f)]
-    acting.sort(key=lambda x: OWN if x[1] is not None else x[0].kind)
-    s.forces, s.own = [f for f, _ in acting], [x for _, x in acting]
+    acting.sort(key=lambda x: FORCE_BY_ADDRESS if x[1] is not None else x[0].kind)
+    s.forces, s.force_code = [f for f, _ in acting], [x for _, x in acting]
     none = np.full(len(s.forces), -1, np.int64)
     table = Forces(none, none.copy(), np.full((len(s.forces), 3), -1, np.int64), *(none.copy() for _ in range(5)))
     for k, e in enumerate(s.forces):
-        table.kind[k] = e.kind if s.own[k] is None else OWN
+        table.kind[k] = e.kind if s.force_code[k] is None else FORCE_BY_ADDRESS
         table.family[k] = isinstance(e, CoordinateForce)
         if isinstance(e, CoordinateForce):
             table.F[k] = _along(s, e)
@@ -136,17 +136,13 @@ def formulas_of(cls: type[Force]) -> CodeTable | None:
     ModelError
         If the class lacks a formula.
     """
-    known = zip(FORMS, (INPUTS, WRENCHES, EFFORTS, BRANCHES), strict=True)
+    known = zip(SIGNATURES, (INPUTS, WRENCHES, EFFORTS, BRANCHES), strict=True)
     kind = getattr(cls, "kind", -1)
-    own = kind < 0 or any(getattr(cls, form.name, None) is not of.get(kind) for form, of in known)
+    own = kind < 0 or any(getattr(cls, signature.name, None) is not of.get(kind) for signature, of in known)
     if cls.__module__.startswith("flyball.") or not own:
         return None
-    needed = FORMS[2:3] if issubclass(cls, CoordinateForce) else FORMS[:2]
-    for form in needed:
-        if not hasattr(cls, form.name):
-            raise ModelError(f"{cls.__name__} has no formula {form}; define it as a static method")
     _refuse_names(cls)
-    return code_table(cls, FORMS)
+    return code_table(cls, SIGNATURES, SIGNATURES[2:3] if issubclass(cls, CoordinateForce) else SIGNATURES[:2])
 
 
 def _refuse_names(cls: type[Force]) -> None:
@@ -163,11 +159,6 @@ def _refuse_names(cls: type[Force]) -> None:
                 f"{c.__name__}: {', '.join(sorted(taken or {'load'}))} has a meaning for every force; give the field "
                 f"another name"
             )
-
-
-def addresses(s: Structure) -> np.ndarray:
-    """Addresses of the code tables of forces: `System.force_code`."""
-    return np.array([0 if x is None else x.address for x in s.own], np.int64)
 
 
 def _acts(s: Structure, e: Force) -> bool:

@@ -25,6 +25,10 @@ def velocity_names(s: Structure) -> list[Named]:
     the plane, in space ``turn x``, ``turn y``, ``turn z`` about the body's own axes, which point masses do not
     have. Tree joints: the joint's coordinates; what has no name of its own is a ``turn`` or ``shift`` along an axis.
     """
+    return s.kept.get("names of velocities", None, 1, lambda: _named(s))
+
+
+def _named(s: Structure) -> list[Named]:
     tree = s.tables["tree"]
     out = [Named("", "m")] * s.nv
     hung = set()

@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
@@ -40,7 +41,7 @@ class Numbers:
     world: dict[Hashable, Any] = field(default_factory=dict)  # the same of one frame, with its carrier
     local: dict[Hashable, np.ndarray] = field(default_factory=dict)  # and on its body
 
-    @property
+    @cached_property
     def dtype(self) -> Any:
         """Kind of numbers that tables of these are made of: expressions, else complex numbers, else floats."""
         return kind_of(self.env.values())
@@ -61,20 +62,25 @@ def numbers(model: Model, parameters: Mapping[str, Any] | None = None) -> Number
         If a number makes no sense, or there is no such parameter.
     """
     model = model.snapshot()
-    env = _environment(model, parameters or {})
+    env, kind, told = _environment(model, parameters or {})
     read = tuple(_state_of(path) for path in files(model))
-    if kind_of(env.values()) is object:
+    if kind is object:
         return _all(model, env, object())
-    key = bits(env), read
+    key = told, read
     return model.kept.get("numbers", key, MOST, lambda: _found(model, env, key))
 
 
-def _environment(model: Model, parameters: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Values of all parameters, not to be changed."""
+def _environment(model: Model, parameters: Mapping[str, Any]) -> tuple[Mapping[str, Any], Any, Hashable]:
+    """Values of all parameters, not to be changed; their kind, and their bits."""
     if not all(type(x) in PLAIN for x in parameters.values()):
-        return model.environment(parameters)
+        return _known(model.environment(parameters))
     written = tuple((name, type(x), repr(x)) for name, x in parameters.items())
-    return model.kept.get("environment", written, MOST, lambda: model.environment(parameters))
+    return model.kept.get("environment", written, MOST, lambda: _known(model.environment(parameters)))
+
+
+def _known(env: Mapping[str, Any]) -> tuple[Mapping[str, Any], Any, Hashable]:
+    kind = kind_of(env.values())
+    return env, kind, None if kind is object else bits(env)
 
 
 def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:

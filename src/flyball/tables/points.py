@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from ..constraints.blocks import Row
-from ..constraints.registry import KINDS
 from ..errors import FlyballError, ModelError
 from ..math.products import product
 from ..model.body import Body, Frame
@@ -101,7 +100,7 @@ def _ends(model: Model, among: Mapping[str, str]) -> Iterator[tuple[str, str, El
 
 def sees_point(row: Row, role: str) -> bool:
     """Whether a row depends on the place of its frame F or M only, and makes no torque about it."""
-    return role in KINDS[row.kind].points
+    return role in row.of_kind.points
 
 
 def _coordinates(model: Model) -> Iterator[tuple[str, Element]]:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.registry import KINDS
 from ..math.products import product
 from ..model.body import GROUND, Body
 from ..model.force import BodyForce
@@ -108,8 +107,8 @@ class Poses:
         """What a term's formula gives in the drawn configuration."""
         poses = (self.world(self.s.frames[k]) for k in (t.F, t.M))
         F, M = ((tuple(p), tuple(R.ravel()), *((0.0,) * 3,) * 4) for p, R, _ in poses)
-        par = (1.0, *t.formula.par[1:6], 0.0, 0.0) if KINDS[t.formula.kind].turns else (*t.formula.par[:6], 0.0, 0.0)
-        return KINDS[t.formula.kind].row(par, F, M, self.turned(t.owner), None)[0]
+        par = (1.0, *t.formula.par[1:6], 0.0, 0.0) if t.formula.of_kind.turns else (*t.formula.par[:6], 0.0, 0.0)
+        return t.formula.of_kind.row(par, F, M, self.turned(t.owner), None)[0]
 
     def turned(self, owner: Any) -> float:
         """Angle of a body or frame in the plane as drawn, whole turns counted; 0 for joints, which begin there."""

@@ -89,7 +89,8 @@ class Structure:
     slots: dict[str, int] = field(default_factory=dict)  # sensor -> slot that laws read (rates come after all values)
     angles: list[tuple[int, int, int]] = field(default_factory=list)  # frame F, frame M, state
     forces: list[Force] = field(default_factory=list)
-    own: list[CodeTable | None] = field(default_factory=list)  # formulas of each force that are not flyball's
+    force_code: list[CodeTable | None] = field(default_factory=list)  # formulas of each force of a user's own
+    term_code: list[CodeTable | None] = field(default_factory=list)  # of each term
     switches: list[Any] = field(default_factory=list)  # rows with modes (`switches.SwitchSpec`)
     branches: Any = None  # what finds the sides of laws' corners (`branches.Branches`); None: laws decide themselves
     guards: list[tuple[int, int, int]] = field(default_factory=list)  # what is watched: kind, of what, which way
@@ -119,6 +120,11 @@ class Structure:
     def nv(self) -> int:
         """Number of velocities."""
         return int(self.tables["tree"].nv.sum())
+
+    @cached_property
+    def code_tables(self) -> set[CodeTable]:
+        """Code tables of all classes of a user's own in it."""
+        return {x for x in (*self.force_code, *self.term_code) if x is not None}
 
     @property
     def states(self) -> list[str]:

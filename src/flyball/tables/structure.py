@@ -75,7 +75,7 @@ def structure(model: Model, choices: Choices = PLAIN) -> Structure:
 
 def outdated(s: Structure) -> bool:
     """Whether a Python function that it was made of is no longer what it was: a law, or a formula of a user's class."""
-    return any(f.native.stale for f in s.functions) or any(x is not None and x.stale for x in s.own)
+    return any(f.native.stale for f in s.functions) or any(x.stale for x in s.code_tables)
 
 
 def _decided(model: Model, choices: Choices) -> Structure:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 import numpy as np
 
 from ..compiler.layout import COMPLEX, CodeTables1, Int1, Int2, Number1, Number2, Record
-from ..constraints.registry import KINDS
+from ..constraints.registry import BY_ADDRESS
 from ..numerics.ldl import Pattern
 
 T = TypeVar("T", bound=tuple)
@@ -20,7 +20,7 @@ T = TypeVar("T", bound=tuple)
 FREE, PLANAR, POINT, REVOLUTE, PRISMATIC, SPHERICAL, WELD = range(7)
 TREE_NQ, TREE_NV = (7, 3, 3, 1, 1, 4, 0), (6, 3, 3, 1, 1, 3, 0)
 BETWEEN, ALONG, SLIDING = range(3)  # families of forces: `Forces.family`
-OWN = 1000  # the kind of forces that have a code table: no built-in element's number
+FORCE_BY_ADDRESS = 1000  # the kind of forces that have a code table: no built-in element's number
 # modes of switches: the row counts for nothing, holds its quantity where it is, or at rest
 OFF, HELD, STEADY = 0.0, 1.0, 2.0
 # kinds of guards; what a guard's zero is watched for
@@ -41,7 +41,7 @@ SCRATCH, PREPARE, PLACE, MOVE, LOADS, FACTOR, REUSE, STEP, STEP_UNLOADED, REFINE
 # how the equations are solved: `System.solver`
 SCHUR, COUPLED, ARTICULATED = range(3)
 
-TERM_KINDS = len(KINDS)
+TERM_KINDS = BY_ADDRESS + 1
 WIDTH = {
     "inertia": 9, "inverse_inertia": 9, "excess_inertia": 9, "joint_position": 3, "joint_rotation": 9,
     "body_position": 3, "body_rotation": 9, "position": 3, "rotation": 9,
@@ -248,6 +248,7 @@ class System(NamedTuple):
     frames: Frames
     terms: Terms
     term_parameters: Number2  # (nt, 8): of its formula, the last one its factor in the row
+    term_code: CodeTables1  # (nt,): code table of a row of a user's own (`ConstraintRow`); 0 of others
     segments: Segments
     rows: Rows
     row_start: Int1  # (nr + nm + 1,): first entry of each row, then of each measured quantity, in Work.G
@@ -255,7 +256,7 @@ class System(NamedTuple):
     sensor_drivers: SensorDrivers
     forces: Forces
     force_parameters: Number2  # (nk, 16)
-    force_code: CodeTables1  # (nk,): code table of a force whose class is not flyball's; 0 of others
+    force_code: CodeTables1  # (nk,): code table of a force of a user's own; 0 of others
     angles: Angles
     load_terms: LoadTerms
     switches: Switches

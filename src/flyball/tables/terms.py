@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.blocks import ANGLE, Row, point_coordinate
-from ..constraints.registry import KINDS
+from ..compiler.by_address import CodeTable, code_table
+from ..constraints.blocks import ANGLE, ConstraintRow, Row, point_coordinate
+from ..constraints.registry import SIGNATURES
 from ..model.body import Driver, Initial
 from ..model.element import Element, LawOf
 from ..model.event import Event
@@ -48,7 +49,7 @@ def _joint_rows(s: Structure, joint: Joint) -> None:
             continue
         used = row.far if s.far and row.far is not None else row
         term = TermSpec(len(s.rows), F, M, used, 1.0, joint)
-        if KINDS[used.kind].place:
+        if used.of_kind.place:
             term.hint = s.state(f"{joint.name}.place")
         s.terms.append(term)
         for what in row.plus:
@@ -85,7 +86,7 @@ def _told_row(s: Structure, e: Driver | Initial, text: str, law: int) -> RowSpec
     """The row of a coordinate that follows a law."""
     first = len(s.rows)
     term = coordinate_term(s, text, e, first)
-    s.rows.append(RowSpec(e, text, law, wrap=KINDS[term.formula.kind].turns))
+    s.rows.append(RowSpec(e, text, law, wrap=term.formula.of_kind.turns))
     s.slices[e.name] = slice(first, first + 1)
     return s.rows[-1]
 
@@ -109,7 +110,7 @@ def coordinate_term(
         F, M, sign = 0, frame(s, owner, "M"), 1.0
         formula = ANGLE if what == "angle" else point_coordinate(what)
     term = TermSpec(row, F, M, formula, sign, e, owner, what, measured)
-    if KINDS[formula.kind].turns and (counted or measured):
+    if formula.of_kind.turns and (counted or measured):
         term.hint = count(s, owner, what, F, M)
     s.terms.append(term)
     return term
@@ -133,14 +134,14 @@ def _turning(s: Structure) -> None:
     for joint in s.model.joints:
         for what, c in joint.measured(s.model.planar).items():
             needed = not s.model.planar or f"{joint.name}.{what}" in told
-            if KINDS[c.row.kind].turns and needed and step_of(s, joint.name, what) is None:
+            if c.row.of_kind.turns and needed and step_of(s, joint.name, what) is None:
                 count(s, joint, what, *coordinate_frames(s, joint, what)[:2])
 
 
 def measured_term(s: Structure, m: int, F: int, M: int, formula: Row, sign: float, e: Element) -> None:
     """Add a term to a measured quantity."""
     s.terms.append(TermSpec(m, F, M, formula, sign, e, measured=True))
-    if KINDS[formula.kind].place:
+    if formula.of_kind.place:
         s.terms[-1].hint = s.state(f"{e.name}.place")
 
 
@@ -162,6 +163,7 @@ def sort(s: Structure) -> None:
     new[order] = np.arange(len(order))
     s.frames = [s.frames[k] for k in order]
     s.terms.sort(key=lambda t: t.formula.kind)
+    s.term_code = [_code(t.formula) for t in s.terms]
     for t in s.terms:
         t.F, t.M = int(new[t.F]), int(new[t.M])
         if t.measured:
@@ -184,6 +186,11 @@ def sort(s: Structure) -> None:
     s.tables["kind_terms"] = terms.astype(np.int64)
     s.tables["sizes"] = np.array([solver, s.nq, moving, ground], np.int64).view(Sizes)
     _force_frames(s, new)
+
+
+def _code(row: Row) -> CodeTable | None:
+    """The formula of a row of a user's own."""
+    return code_table(type(row), SIGNATURES, SIGNATURES) if isinstance(row, ConstraintRow) else None
 
 
 def frames_of(s: Structure, e: Force) -> tuple[np.ndarray, ...]:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.registry import KINDS
+from ..compiler.by_address import addresses
 from ..errors import ModelError
 from ..math.scalar import real_parts, sqrt
 from ..model.body import GROUND
@@ -24,7 +24,6 @@ from ..model.kept import Kept, bits
 from . import switches
 from .afresh import Afresh
 from .coordinates import BodyState, free_velocities, positions
-from .forces import addresses
 from .hinges import tree_frames
 from .masses import mass_table
 from .numbers import Numbers, kind_of, numbers
@@ -88,7 +87,9 @@ class Values:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """In another process code has other addresses."""
         vars(self).update(state)
-        self.system = self.system._replace(force_code=addresses(self.structure))
+        self.system = self.system._replace(
+            force_code=addresses(self.structure.force_code), term_code=addresses(self.structure.term_code)
+        )
 
 
 def values(
@@ -109,7 +110,7 @@ def values(
 
 def values_of(s: Structure, n: Numbers, holds: Mapping[str, complex] | None = None) -> Values:
     """The same from the numbers of its elements."""
-    if kind_of([*n.env.values(), *(holds or {}).values()]) is not float:
+    if n.dtype is not float or (holds and kind_of(holds.values()) is not float):
         return _filled(s, n, holds or {})
     return s.kept.get("values", (n.key, bits(holds or {})), MOST, lambda: _filled(s, n, holds or {}))
 
@@ -120,7 +121,8 @@ def _filled(s: Structure, given: Numbers, holds: Mapping[str, Any]) -> Values:
         return _refilled(s, given, holds, Afresh())
     first = s.kept.known("filled first")
     new = Afresh.since(first, given, s.model)
-    x = (_forced(s, given, new) if new.only_acts else None) or _refilled(s, given, holds, new)
+    x = _forced(s, given, new) if new.only_acts and given.dtype is float else None
+    x = x or _refilled(s, given, holds, new)
     if first is None and given.dtype is float:
         s.kept.get("filled first", None, 1, lambda: x)
     return x
@@ -149,7 +151,7 @@ def _forced(s: Structure, given: Numbers, new: Afresh) -> Values | None:
 
 def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afresh) -> Values:
     model, env, numbers, bodies = s.model, given.env, given.of, given.bodies
-    dtype = kind_of([*given.env.values(), *holds.values()])
+    dtype = kind_of([*given.env.values(), *holds.values()]) if holds else given.dtype
     pose = Poses(s, given)
     frames = _frames(s, pose, new.table("frames", blank(Frames, len(s.frames), dtype), dtype), new)
     length = _length(s, frames.position, bodies)
@@ -169,7 +171,8 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     system = System(  # type: ignore[misc]
         **s.tables,
         bodies=table, frames=frames, term_parameters=terms, force_parameters=forces, switch_numbers=of_switches,
-        force_code=addresses(s), const=const, gravity=np.array([*gravity], dtype),
+        force_code=addresses(s.force_code), term_code=addresses(s.term_code), const=const,
+        gravity=np.array([*gravity], dtype),
         scales=scales, units=np.array(_units(s, length), dtype),
         ldl=s.ldl, flat=np.zeros(FLAT, np.int64),
     )  # fmt: skip
@@ -180,10 +183,9 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
 
 
 def _frames(s: Structure, pose: Poses, table: Frames, new: Afresh) -> Frames:
-    for k, f in enumerate(s.frames):
-        if new.asks(f.element):
-            row = pose.row(f)
-            table.position[k], table.rotation[k] = row[:3], row[3:]
+    for k in new.rows(s, "frames"):
+        row = pose.row(s.frames[k])
+        table.position[k], table.rotation[k] = row[:3], row[3:]
     return table
 
 
@@ -261,18 +263,17 @@ def _term_parameters(
     numbers = pose.numbers
     factors = {c.name: np.array(c.factors(numbers[c.name], s.model, pose.axis)) for c in s.model.couplings}
     factors = {name: f / f[0] for name, f in factors.items()}
-    for k, t in enumerate(s.terms):
-        if not new.asks(t.element, t.owner):
-            continue
+    for k in new.rows(s, "terms"):
+        t = s.terms[k]
         x[k] = t.formula.par
         x[k, 7] = t.sign * t.formula.par[7]
         e = t.element
         n = numbers[e.name]
-        if t.hint >= 0 and KINDS[t.formula.kind].turns:
+        if t.hint >= 0 and t.formula.of_kind.turns:
             x[k, 0] = 1.0
         if isinstance(e, Joint) and t.owner is None:
-            x[k, :7] = e.constants(n, t.formula, *pose.ends(e))
-            if KINDS[t.formula.kind].place:
+            x[k, :7] = e.row_parameters(n, t.formula, *pose.ends(e))
+            if t.formula.of_kind.place:
                 at = curve_at[e.name]
                 x[k, 1:3] = at, at + len(e.curves(n)[0])
         elif isinstance(e, Joint):
@@ -303,9 +304,8 @@ def _coupled(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
 
 
 def _force_parameters(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
-    for k, e in enumerate(s.forces):
-        if not new.asks(e):
-            continue
+    for k in new.rows(s, "forces"):
+        e = s.forces[k]
         par = e.parameters(pose.numbers[e.name], pose.apart(e))
         if len(par) > x.shape[1]:
             raise ModelError(f"{e.title}: parameters() gives {len(par)} numbers; a force has up to {x.shape[1]}")

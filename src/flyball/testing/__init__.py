@@ -1,4 +1,4 @@
-"""Contract tests for force elements of a user's own: one call tests an instance in every way that flyball uses it."""
+"""Contract tests for elements of a user's own: one call tests an instance in every way that flyball uses it."""
 
 from __future__ import annotations
 

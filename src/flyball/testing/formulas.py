@@ -12,6 +12,7 @@ from ..graph.node import Graph, Symbol, Undecided
 from ..graph.values import evaluate
 from ..model.element import LawOf, Unit, fields_with
 from ..model.force import CoordinateForce
+from ..model.joint import Joint
 from ..model.units import powers_in_si
 from .frames import power, random_rotation, record, stepped, turned
 from .states import INPUTS, WRENCH, State, flat, nest
@@ -49,12 +50,12 @@ def finite(s: Subject) -> str:
         try:
             found = state.function(*state.arguments)
         except Exception as error:
-            return f"{state.form} raises {type(error).__name__}: {error}"
+            return f"{state.signature} raises {type(error).__name__}: {error}"
         lengths = _lengths(found)
-        if lengths != state.form.result:
-            return f"{state.form} returns {found!r}; it must return {_wanted(state)}"
+        if lengths != state.signature.result:
+            return f"{state.signature} returns {found!r}; it must return {state.signature.returns}"
         if not np.isfinite(list(flat(found))).all():
-            return f"{state.form} returns {found!r} at an ordinary state"
+            return f"{state.signature} returns {found!r} at an ordinary state"
     return ""
 
 
@@ -65,19 +66,13 @@ def _lengths(x: Any) -> Any:
     return tuple(inner) if any(n != 0 for n in inner) else len(inner)
 
 
-def _wanted(state: State) -> str:
-    if state.form.name == "wrench":
-        return "(force, torque), each a tuple of three numbers"
-    return "a number" if state.form.result == 0 else f"a tuple of {state.form.result} numbers"
-
-
 def compiled(s: Subject) -> str:
     """Compiled code gives what the Python formula gives."""
     for state in s.states:
         x = state.numbers
         plain, fast = state.at(x.tolist()), state.compiled(x, False)
         if _differ(plain, fast, ROUNDING):
-            return f"{state.form} is {_shown(plain)} in Python and {_shown(fast)} compiled"
+            return f"{state.signature} is {_shown(plain)} in Python and {_shown(fast)} compiled"
     return ""
 
 
@@ -90,9 +85,9 @@ def complex_numbers(s: Subject) -> str:
             real, plain, fast = state.at(x.tolist()), state.at(given.tolist()), state.compiled(given, True)
             for found, how in ((plain, "in Python"), (fast, "compiled")):
                 if _differ(real, np.real(found), ROUNDING):
-                    return f"{state.form} is {_shown(real)} on floats and {_shown(found)} on complex numbers {how}"
+                    return f"{state.signature} is {_shown(real)} on floats and {_shown(found)} on complex numbers {how}"
             if _differ(np.imag(plain) / STEP, np.imag(fast) / STEP, ROUNDING, np.abs(real).max()):
-                return f"{state.form}: derivatives by complex numbers differ between Python and compiled code"
+                return f"{state.signature}: derivatives by complex numbers differ between Python and compiled code"
     return ""
 
 
@@ -112,7 +107,7 @@ def derivatives(s: Subject) -> str:
             size = np.abs(state.at(x.tolist())).max()
             if all(_differ(exact, d, SLOPE, size) for d in near):
                 return (
-                    f"the derivatives of {state.form} by a complex step are {_shown(exact)}, and "
+                    f"the derivatives of {state.signature} by a complex step are {_shown(exact)}, and "
                     f"{_shown(near[1])} by differences; abs(), max(), math.sqrt() and the like lose imaginary parts: "
                     f"use functions of flyball.math.scalar"
                 )
@@ -130,33 +125,33 @@ def symbols(s: Subject) -> str:
         graph, x = Graph(), state.numbers
         given: list[Any] = []
         for k, value in enumerate(x.tolist()):
-            symbol = Symbol(f"x{k}", "parameter" if k < state.form.shapes[0] else "coordinate")
-            given.append(graph.symbol(symbol, value if k < state.form.shapes[0] else None) if value else 0.0)
+            symbol = Symbol(f"x{k}", "parameter" if k < state.signature.lengths[0] else "coordinate")
+            given.append(graph.symbol(symbol, value if k < state.signature.lengths[0] else None) if value else 0.0)
         try:
             found = state.at(given)
         except Undecided as error:
-            return f"{state.form} cannot be written in symbols: {error}"
+            return f"{state.signature} cannot be written in symbols: {error}"
         got = np.array(evaluate(list(found), {f"x{k}": value for k, value in enumerate(x.tolist())}), float)
         if _differ(state.at(x.tolist()), got, ROUNDING):
-            return f"{state.form} is {_shown(state.at(x.tolist()))} on floats and {_shown(got)} in symbols"
+            return f"{state.signature} is {_shown(state.at(x.tolist()))} on floats and {_shown(got)} in symbols"
     return ""
 
 
 def rates(s: Subject) -> str:
     """The second input is the rate of the first."""
     for state in s.states:
-        if state.form == INPUTS and state.frames is not None:
+        if state.signature == INPUTS and state.frames is not None:
             F, M = (record(stepped(x, STEP), complex) for x in state.frames)
             rate = np.imag(state.function(state.arguments[0], F, M)[0]) / STEP
             found = state.function(*state.arguments)[1]
             if _differ(rate, found, ROUNDING, 1e-3):
-                return f"{state.form}: the second input is {found:.6g}; the rate of the first is {rate:.6g}"
+                return f"{state.signature}: the second input is {found:.6g}; the rate of the first is {rate:.6g}"
     return ""
 
 
 def energy(s: Subject) -> str:
     """What a conservative element gives it loses of its energy."""
-    e = s.element
+    e: Any = s.element
     if not e.conservative():
         return ""
     cls: Any = type(e)
@@ -167,7 +162,7 @@ def energy(s: Subject) -> str:
             found = cls.effort(par, x, rate, laws, load)
             if _differ(lost, found, ROUNDING, abs(found)):
                 return f"it is conservative; effort is {found:.6g}, minus the slope of its energy is {lost:.6g}"
-        elif state.form == WRENCH and state.frames is not None:
+        elif state.signature == WRENCH and state.frames is not None:
             F, M = state.frames
             lost = 0.0
             if cls.energy is not None:
@@ -180,6 +175,49 @@ def energy(s: Subject) -> str:
     return ""
 
 
+def gradient(s: Subject) -> str:
+    """The rate of a row's value is what its force and torques give with the velocities of the frames."""
+    for state in s.states:
+        if state.frames is None or state.row is None or not state.row.holonomic:
+            continue
+        F, M = (record(stepped(x, STEP), complex) for x in state.frames)
+        rate = np.imag(state.function(state.arguments[0], F, M)[0]) / STEP
+        found = _rate(state.function(*state.arguments), *state.arguments[1:])
+        if _differ(rate, found, 10.0 * ROUNDING, _size(state)):
+            return (
+                f"{state.signature}: the value changes at a rate of {rate:.6g}; force . (v_M - v_F) + torque_M . w_M + "
+                f"torque_F . w_F is {found:.6g}. The reverse of the force acts on F's body at F's origin"
+            )
+    return ""
+
+
+def bias(s: Subject) -> str:
+    """The bias of a row is the rate of that, with the accelerations of the frames."""
+    for state in s.states:
+        if state.frames is None or state.row is None:
+            continue
+        F, M = (record(stepped(x, STEP), complex) for x in state.frames)
+        wanted = np.imag(_rate(state.function(state.arguments[0], F, M), F, M)) / STEP
+        found = state.function(*state.arguments)[4]
+        if _differ(wanted, found, 10.0 * ROUNDING, _size(state)):
+            return (
+                f"{state.signature}: the bias is {found:.6g}; the rate of force . (v_M - v_F) + torque_M . w_M + "
+                f"torque_F . w_F, with the accelerations of F and M, is {wanted:.6g}"
+            )
+    return ""
+
+
+def _rate(row: Any, F: Any, M: Any) -> Any:
+    """What the force and the torques of a row give with the velocities of its frames."""
+    _, force, torque_M, torque_F, _ = (np.array(x) for x in row)
+    return force @ (np.array(M[3]) - F[3]) + torque_M @ np.array(M[2]) + torque_F @ np.array(F[2])
+
+
+def _size(state: State) -> float:
+    """The largest number in the result of a state."""
+    return float(np.abs(state.at(state.numbers.tolist())).max())
+
+
 def axes(s: Subject) -> str:
     """Frames turned and shifted in the world: what is measured stays, the wrench turns with them."""
     Q = random_rotation(3)
@@ -189,18 +227,32 @@ def axes(s: Subject) -> str:
         F, M = (record(turned(x, Q, SHIFT)) for x in state.frames)
         here = state.function(*state.arguments)
         there = state.function(state.arguments[0], F, M, *state.arguments[3:])
-        wanted = here if state.form == INPUTS else tuple(tuple(Q @ np.array(x)) for x in here)
+        wanted = tuple(tuple(Q @ np.array(x)) if isinstance(x, tuple) else x for x in here)
         if _differ(list(flat(wanted)), list(flat(there)), WORLD, 1e-3):
             return (
-                f"{state.form} depends on the axes or the origin of the world: frames turned and shifted together "
-                f"give {_shown(list(flat(there)))}, and must give {_shown(list(flat(wanted)))}. For a force that is "
-                f"given in the world's axes skip the checks 'axes' and 'turned'"
+                f"{state.signature} depends on the axes or the origin of the world: frames turned and shifted together "
+                f"give {_shown(list(flat(there)))}, and must give {_shown(list(flat(wanted)))}. For an element that "
+                f"is given in the world's axes skip the checks 'axes' and 'turned'"
             )
     return ""
 
 
 def units(s: Subject) -> str:
     """In other units of length, mass and time the same: no constant of the formula has a unit."""
+    if (new := _rescaled(s)) is None:
+        return ""
+    for state, given, wanted in _of_rows(s, new) if isinstance(s.element, Joint) else _of_force(s, s.element, new):
+        found = np.array(list(flat(state.function(*given))))
+        if _differ(wanted, found, WORLD):
+            return (
+                f"{state.signature} in other units of length, mass and time is {_shown(found)}, and must be "
+                f"{_shown(wanted)}: a constant in it has a unit, or a field has another unit than its formula needs"
+            )
+    return ""
+
+
+def _rescaled(s: Subject) -> SimpleNamespace | None:
+    """The numbers of the element in other units; None if the unit of one is not known."""
     e = s.element
     along = _along(e) if isinstance(e, CoordinateForce) else 0
     new = SimpleNamespace(**vars(s.numbers))
@@ -210,8 +262,32 @@ def units(s: Subject) -> str:
             dimension = e.dimensions.get(name, (None, None))[along]
         if value is not None:
             if dimension is None:
-                return ""  # a field of any dimension: nothing is known of how it changes
+                return None
             setattr(new, name, _scaled(value, _factor(dimension)))
+    return new
+
+
+Rescaled = Iterator[tuple[State, tuple[Any, ...], np.ndarray]]
+"""States, their arguments in other units, and what their formulas must give in these."""
+
+
+def _of_rows(s: Subject, new: SimpleNamespace) -> Rescaled:
+    """The same of the rows of a joint."""
+    e: Any = s.element
+    m = _factor("m")
+    ends = [(p * m, R) for p, R in s.ends]
+    for state in s.states:
+        row: Any = state.row
+        par = e.row_parameters(new, row, *ends)[:6]
+        F, M = (_frame(f) for f in state.arguments[1:])
+        value, rate = _factor(row.measure), _factor("1/s")
+        units = np.repeat([value, value / m, value, value, value * rate * rate], [1, 3, 3, 3, 1])
+        yield state, (par, F, M), np.array(list(flat(state.function(*state.arguments)))) * units
+
+
+def _of_force(s: Subject, e: Any, new: SimpleNamespace) -> Rescaled:
+    """The same of a force."""
+    along = _along(e) if isinstance(e, CoordinateForce) else 0
     laws = [of.dimension for of in fields_with(type(e), LawOf).values()]
     length, force = (1.0 if along else _factor("m")), (_factor("N*m") if along else _factor("N"))
     effort = force if not laws or laws[0] is None else _factor(laws[0])
@@ -219,23 +295,17 @@ def units(s: Subject) -> str:
     for state in s.states:
         function, arguments = state.function, state.arguments
         if state.frames is None:
-            _, x, rate, told, load = arguments
+            _, x, rate, values, load = arguments
             slower = length * _factor("1/s")
-            given = par, x * length, rate * slower, (told[0] * effort, *told[1:]), load * _factor("N")
+            given = par, x * length, rate * slower, (values[0] * effort, *values[1:]), load * _factor("N")
             wanted = np.array([function(*arguments) * force])
         else:
             F, M = (_frame(f) for f in arguments[1:3])
-            if state.form == INPUTS:
+            if state.signature == INPUTS:
                 continue
             given = par, F, M, tuple(x * effort for x in arguments[3]), e.inputs(par, F, M)
             wanted = np.array(list(flat(function(*arguments)))) * np.repeat([_factor("N"), _factor("N*m")], 3)
-        found = np.array(list(flat(function(*given))))
-        if _differ(wanted, found, WORLD):
-            return (
-                f"{state.form} in other units of length, mass and time is {_shown(found)}, and must be "
-                f"{_shown(wanted)}: a constant in it has a unit, or a field has another unit than its formula needs"
-            )
-    return ""
+        yield state, given, wanted
 
 
 def _along(e: CoordinateForce) -> int:

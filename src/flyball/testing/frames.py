@@ -43,10 +43,15 @@ def moved(m: Frame, t: float) -> Frame:
 
 
 def stepped(m: Frame, e: float) -> Frame:
-    """The frame after an imaginary time of its motion."""
+    """The frame after an imaginary time i e of its motion: imaginary parts over e are rates."""
     w = m["w"]
     turn = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-    return m | {"p": m["p"] + 1j * e * m["v"], "R": (np.eye(3) + 1j * e * turn) @ m["R"]}
+    return m | {
+        "p": m["p"] + 1j * e * m["v"],
+        "R": (np.eye(3) + 1j * e * turn) @ m["R"],
+        "w": w + 1j * e * m["alpha"],
+        "v": m["v"] + 1j * e * m["a"],
+    }
 
 
 def turned(m: Frame, Q: np.ndarray, d: np.ndarray) -> Frame:
@@ -55,7 +60,7 @@ def turned(m: Frame, Q: np.ndarray, d: np.ndarray) -> Frame:
 
 
 def power(wrench: Any, F: Frame, M: Frame) -> Any:
-    """Power of a wrench on M and of its reverse on F's body at the same point."""
+    """Power of a force and a torque on M, and of the reverse on F's body at the same point."""
     f, t = (np.array(x) for x in wrench)
     d = M["p"] - F["p"]
     return f @ (M["v"] - F["v"] - np.cross(F["w"], d)) + t @ (M["w"] - F["w"])

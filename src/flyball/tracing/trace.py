@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.registry import KINDS
 from ..equations.dispatch import row_biases, row_values
 from ..equations.friction import reaction_loads
 from ..equations.kinematics import motions, poses
@@ -135,7 +134,7 @@ def tables_by_name(s: Structure, S: System) -> dict[int, str]:
     """What tables are called, by where they begin in the table of constants; curves of joints are x and y of these."""
     found = {at: name for name, at in s.table_at.items()}
     for k, t in enumerate(s.terms):
-        if KINDS[t.formula.kind].place:
+        if t.formula.of_kind.place:
             found |= {
                 int(S.term_parameters[k, 1].real): f"{t.element.name}.x",
                 int(S.term_parameters[k, 2].real): f"{t.element.name}.y",

@@ -9,7 +9,10 @@ import numpy as np
 from ..errors import FlyballError
 from ..model.model import Model
 from ..model.summary import summary
-from ..results.drawn import drawn
+from ..results.health import Health
+from ..results.result import Result
+from ..tables.structure import structure
+from ..tables.values import values
 from .animate import record
 from .still import still
 
@@ -27,3 +30,24 @@ def described(model: Model) -> str:
     except (FlyballError, ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError):
         picture = ""
     return f"<div>{picture}{text}</div>"
+
+
+# The mechanism as drawn, read like any result: for pictures before anything is computed.
+
+
+def drawn(model: Model) -> Result:
+    """The mechanism where it is drawn, at rest and without loads, as a result with one time.
+
+    Nothing is assembled and nothing compiled: bodies are where the description puts them, joints may be open.
+
+    Raises
+    ------
+    ModelError
+        If the description cannot be made into tables.
+    """
+    model = model.snapshot()
+    x = values(structure(model), model.environment())
+    s = x.structure
+    still, loads = np.zeros((1, s.nv)), np.zeros((1, len(s.rows) + len(s.prescribed)))
+    health = Health(True, "as drawn", 0.0, 0.0, 0, 0, 0, 0, 0.0)
+    return Result(model, x, np.zeros(1), x.q[None], still, np.zeros((1, len(s.states))), still, loads, health)

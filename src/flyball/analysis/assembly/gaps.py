@@ -7,9 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ...equations.records import load
+from ...equations.rows import parameters
 from ...errors import AssemblyError
 from ..compiled import Compiled
 
+PARTS = ("value", "force on M", "torque on M", "torque on F", "bias")  # that a row's formula returns
 SHOWN = 8  # elements that a message names
 SMALL = 1e-9  # part of the mechanism's length, or radians, below which a gap is none
 
@@ -27,6 +30,8 @@ def disagreement(c: Compiled, best: Any) -> AssemblyError:
             f"{name!r} cannot be assembled at t = {t:g} s: the law of {lawless[0].title} has no finite value there"
             f"{f': {missed.message}' if missed else ''}"
         )
+    if text := undefined_row(c):
+        return AssemblyError(f"{name!r} cannot be assembled at t = {t:g} s: {text}")
     gaps: dict[str, tuple[float, float]] = {}
     for element, rows in c.structure.slices.items():
         part, metric = g[rows], c.metric[rows]
@@ -41,6 +46,24 @@ def disagreement(c: Compiled, best: Any) -> AssemblyError:
         gaps={k: gaps[k] for k in worst},
         best=best,
     )
+
+
+def undefined_row(c: Compiled) -> str:
+    """The constraint row of a user's own that is not finite at the kinematics in the scratch; else nothing."""
+    s, S, W = c.structure, c.values.system, c.work
+    for k, t in enumerate(s.terms):
+        if s.term_code[k] is None:
+            continue
+        par, F, M = parameters(S.term_parameters, k), load(W.FK, t.F), load(W.FK, t.M)
+        with np.errstate(all="ignore"):
+            row = t.formula.of_kind.row(par, F, M, 0.0, S.const)
+        if not np.isfinite(np.hstack(row)).all():
+            named = ", ".join(f"{name} {np.array(x)}" for name, x in zip(PARTS, row, strict=True))
+            return (
+                f"{type(t.formula).__name__}.row of {t.element.title} is not finite for par = {np.array(par[:6])} with "
+                f"its frames at {np.array(F[0])} m and {np.array(M[0])} m: {named}"
+            )
+    return ""
 
 
 def _size(metres: float, radians: float, length: float) -> str:

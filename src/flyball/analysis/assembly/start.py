@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ...model.body import Body, Driver, Frame
+from ...model.element import LawOf
+from ...model.expressions import Expression, number
 from ...model.geometry import quaternion_to_matrix, rotation_about
 from ...model.model import Model
 from ...results.departure import Departure
@@ -17,7 +20,6 @@ from ..compiled import Compiled, compiled, places
 from .described import fast, not_kept
 from .gaps import contradictory_velocities, disagreement, no_rate
 from .positions import CLOSED, OPEN, close, misfit, newton, rounding
-from .told import driven, told, turns, wind
 from .velocities import consistent, contradiction
 
 MOST = 4  # assembled starts of the same numbers that are kept
@@ -107,7 +109,9 @@ def assembled(
 def _own_places(c: Compiled) -> bool:
     """Whether turns and places as drawn are others than those of the values that differ in forces alone."""
     x, n = c.values, len(c.structure.controls)
-    return x.alike is None or not np.array_equal(places(x)[n:], places(x.alike)[n:])
+    if (other := x.alike) is None:
+        return True
+    return not np.array_equal(c.z[n:], other.kept.get("places", None, 1, lambda: places(other))[n:])
 
 
 def _found(
@@ -212,3 +216,60 @@ def _origin(q: np.ndarray, drawn: Any, k: int) -> np.ndarray:
     """Origin of a body's reference frame from its coordinates; a point mass stays turned as it is drawn."""
     R = drawn.R if len(q) == k else rotation_about(2, q[2]) if k == 2 else quaternion_to_matrix(q[3:7])
     return q[:k] - (R @ drawn.com)[:k]
+
+
+# What is asked of the start besides the drawing: initial conditions, and what drivers say of it.
+
+
+def turns(c: Compiled, known: Mapping[str, float]) -> dict[str, float]:
+    """What the states that count turns begin near, where coordinates are told their value."""
+    out = {}
+    for name in set(known) & set(c.structure.state_at):
+        joint, what = c.structure.model.coordinate(name, c.structure.model.bodies[0])
+        coordinate = joint.coordinates[what] if hasattr(joint, "coordinates") else None
+        sign = coordinate.sign if coordinate else 1.0
+        offset = joint.offset(c.values.numbers[joint.name], what) if coordinate else 0.0
+        out[name] = sign * (known[name] - offset)
+    return out
+
+
+def wind(c: Compiled, known: Mapping[str, float], q: np.ndarray) -> None:
+    """Bodies in the plane that are told their angle begin with its whole turns."""
+    s = c.structure
+    for name, value in known.items():
+        owner, what = s.model.coordinate(name, s.model.bodies[0])
+        if what != "angle" or not isinstance(owner, (Body, Frame)):
+            continue
+        b = s.place[s.model.carrier(owner.name, owner)]
+        if b >= 0:
+            whole = np.round((value - c.values.poses.turned(owner)) / (2.0 * np.pi))
+            q[s.tables["body_i"][b, 2] + 2] += 2.0 * np.pi * whole
+
+
+def told(model: Model, env: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+    """Values and rates that initial conditions ask for."""
+    values, rates = {}, {}
+    for i in model.initial:
+        unit = model.unit(i.name, i)
+        if i.value is not None:
+            values[i.name] = number(i.value, env, unit, f"value of {i.title}")
+        if i.rate is not None:
+            rates[i.name] = number(i.rate, env, f"{unit}/s", f"rate of {i.title}")
+    return values, rates
+
+
+def _law(model: Model, d: Driver) -> Expression:
+    return model.law(d.law, LawOf(model.unit(d.coordinate, d)), f"law of {d.title}")
+
+
+def driven(model: Model, t: float, env: Mapping[str, float]) -> dict[str, float]:
+    """What drivers' laws ask for at time t, as far as they follow time alone."""
+    out = {}
+    model = model.snapshot()
+    tables = {x.name: x for x in model.tables}
+    laws = model.kept.get("laws of drivers", None, 1, lambda: {d.name: _law(model, d) for d in model.drivers})
+    for d in model.drivers:
+        law = laws[d.name]
+        if law.names <= {"t", *env}:
+            out[d.coordinate] = law.evaluate({**env, "t": t}, tables=tables)
+    return out

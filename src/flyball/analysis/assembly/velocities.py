@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -41,12 +42,22 @@ class Wanted:
     c: Compiled
     q: np.ndarray
     nu: np.ndarray
-    G: Any  # both dense up to `SMALL` velocities
-    root: Any
+    G: Any  # dense up to `SMALL` velocities
+    free: np.ndarray  # 0 for velocities that are given and must not change, else 1
     scale: np.ndarray  # of the hard rows
     held: list[Given]  # hard, besides the constraints
     soft: list[Given]
-    weights: dict[str, np.ndarray]
+
+    @cached_property
+    def root(self) -> Any:
+        """See above; dense up to `SMALL` velocities."""
+        return self.c.inverse_mass_root(self.free, dense=self.c.structure.nv <= SMALL)
+
+    @cached_property
+    def weights(self) -> dict[str, np.ndarray]:
+        """Of the soft rows."""
+        root = self.root
+        return {g.name: _weight(_plain(root[g.at : g.at + g.n, g.at : g.at + g.n]), g) for g in self.soft}
 
     @classmethod
     def at(cls, c: Compiled, q: np.ndarray, nu: np.ndarray, still: np.ndarray | None = None) -> Wanted:
@@ -57,15 +68,13 @@ class Wanted:
         for g in told:
             if g.as_drawn and g.whole:
                 free[g.at : g.at + g.n] = 0.0
-        root = c.inverse_mass_root(free, dense=small)
         held = [g for g in told if g.as_drawn and not g.whole]
         soft = [g for g in told if not g.as_drawn]
-        weights = {g.name: _weight(_plain(root[g.at : g.at + g.n, g.at : g.at + g.n]), g) for g in soft}
         G = c.jacobian() if small else c.sparse_jacobian()
         if held:
             G = _above(G, _stacked(c, q, held, {}))
         scale = np.concatenate([row_scales(c), *(_inverse_sizes(c, g) for g in held)])
-        return cls(c, q, nu, G, root, scale, held, soft, weights)
+        return cls(c, q, nu, G, free, scale, held, soft)
 
     @property
     def determined(self) -> bool:

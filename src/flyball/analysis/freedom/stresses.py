@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...constraints.registry import KINDS
 from ...equations.records import load
 from ...equations.rows import parameters
 from ...math.vec import neg, scale
@@ -44,7 +43,7 @@ def self_stresses(
             t = s.terms[k]
             par = parameters(S.term_parameters, k)
             hint = z[t.hint] if t.hint >= 0 else 0.0
-            _, f, tM, tF, _ = KINDS[t.formula.kind].row(par, frame(t.F), frame(t.M), hint, S.const)
+            _, f, tM, tF, _ = t.formula.of_kind.row(par, frame(t.F), frame(t.M), hint, S.const)
             if s.frames[t.M].role != "M":  # measured from M to F
                 f, tM = neg(f), tF
             wrench = np.stack(np.broadcast_arrays(*f, *scale(1.0 / x.length, tM)), axis=-1)

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...errors import NotConverged
+from ...errors import NotConverged, SingularityError
+from ...numerics.saddle import surely_independent
 from ...tables.names import velocity_names
 from .balance import clearly_settled
+from .derivatives import Equations, State
 from .free import free
 from .kinks import kinks
 from .rest import Rest
-from .shaky import refuse_shaky
 from .stability import stability
 
 NEWTON, DESCENT = 40, 400  # steps
@@ -25,7 +26,7 @@ LONGEST = 0.3  # a step in radians, or parts of the mechanism's length
 NEARLY = 1e-3  # of what is missing: less is left where everything on the way is nearly linear
 PUSH = 1e-2  # in the same
 BALANCED = 1e-9  # forces left, of those that act
-CLOSED = 1e-10  # of the mechanism's length
+CLOSED = 1e-10  # gaps that Newton's method leaves, of the mechanism's length
 SOFT, HARD, STUCK = 1e-8, 1e2, 1e8  # dampings: where Newton takes over, where descent begins, where it gives up
 
 
@@ -180,4 +181,57 @@ def failure(x: Rest) -> NotConverged:
         f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, {best.pushed()} and "
         f"nothing holds against it. Give a better guess, or add what has to hold it: a spring, a stop, a driver",
         residuals,
+    )
+
+
+# Loads that nothing carries: positions at rest that only the closing tolerance keeps from being singular.
+#
+# Where constraints lose rank without letting anything move, the structure can shake: w with G w = 0 for which the gaps
+# grow as kappa s^2 / 2 with the way s along it. Forces that do work along w are balanced by no finite reaction.
+# Newton's method ends beside the singular position, where G w = sigma u and the reaction is as large as the way
+# s = sigma / kappa is short. A way whose gaps are within the closing tolerance says nothing:
+# such reactions are made of it.
+
+
+DENSE = 300  # rows or columns up to which all singular values are found
+WEAK, NONE = 1e-3, 1e-11  # singular values of rows of unit length that are looked at: smaller ones carry nothing
+STEP = 1e-3  # way along which it is seen how a singular value changes, in radians or parts of the mechanism's length
+LOADED = 1e-4  # work of the forces along the shake, of what they could do: less is none
+PART = 1e-3  # of a dependency: elements with less have none in it
+
+
+def refuse_shaky(x: Rest) -> None:
+    """Refuse a position at rest whose reactions are made of the closing tolerance.
+
+    Raises
+    ------
+    SingularityError
+        Naming the elements whose constraints depend on each other there, and what they let shake.
+    """
+    if not len(x.g):
+        return
+    if min(x.G.shape) > DENSE and surely_independent(x.G):  # others bend too much to be shaky
+        return
+    U, d, Vt = np.linalg.svd(x.G.toarray(), full_matrices=False)
+    force = x.scale * Equations(State.resting(x.c, x.t, x.q)).block("r")
+    for u, sigma, w in zip(U.T, d, Vt, strict=True):
+        if not NONE * d[0] < sigma < WEAK * d[0]:
+            continue
+        there, back = (u @ x.moved(s * STEP * w, 0.0 * x.lam).G @ w for s in (1.0, -1.0))
+        bends = abs(there - back) / (2.0 * STEP)
+        if sigma**2 < 2.0 * CLOSED * bends and abs(w @ force) > LOADED * (np.abs(w) @ np.abs(force)):
+            raise _refused(x, u, w)
+
+
+def _refused(x: Rest, u: np.ndarray, w: np.ndarray) -> SingularityError:
+    """The error that names what is shaky."""
+    rows = x.c.structure.rows
+    names = tuple(dict.fromkeys(r.element.name for r, part in zip(rows, u, strict=True) if abs(part) > PART))
+    shakes = velocity_names(x.c.structure)[int(np.argmax(np.abs(w)))].name
+    return SingularityError(
+        f"{x.c.structure.model.name!r} has no equilibrium at t = {x.t:.6g} s: the constraints of {', '.join(names)} "
+        f"depend on each other there, so that it can shake along {shakes}, and no finite reaction carries the load "
+        f"along it. Move them out of this position, take one of them out, or give what yields: a spring, a bushing",
+        x.t,
+        names,
     )

@@ -92,6 +92,7 @@ class SimulateOptions(Integration):
             raise ModelError(
                 f"unknown method {self.method!r}{hint}; choose one of {', '.join(known)}, or a Stepping, for contact"
             )
+        self.refuse_without_step()
 
 
 class Way(NamedTuple):

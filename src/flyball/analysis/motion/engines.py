@@ -6,21 +6,25 @@ other at the end of any step.
 Left to choose (``auto``), a motion has the code that this process has for its mechanism from its beginning on: to know
 that takes some microseconds. Else it begins by the tables. After some steps, code that is on disk is taken, if the rest
 is worth looking for it, and other code is made where the rest, or what was computed of such mechanisms in this process,
-takes longer than that. How long is estimated from counts (`account.py`).
+takes longer than that. How long is estimated from counts (`Account`, `kind`).
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
+import threading
+from collections import OrderedDict
 from typing import Any
 
 from ... import special
 from ...errors import ModelError
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.refusal import afresh
+from ...tables.cost import cost
+from ...tables.specs import Structure
 from ...tables.values import Values
 from ..compiled import Compiled
-from .account import SPENT, kind
 
 AUTO = "auto"
 KEPT = "kept"  # code that this process has, if it serves a mechanism: of the runs of a study
@@ -35,6 +39,49 @@ FAILED = (ex.STUCK, ex.NOT_FINITE, ex.UNREPORTED)
 TABLES, MADE = "table-driven", "made for this mechanism"
 SHORT = f"{TABLES}: too little is computed to make code for it"
 MODES = "rows that hold at times and let go at others, and events, are for the tables"
+
+
+MOST = 256  # kinds of mechanisms that are known
+
+
+class Account:
+    """Times [ns] by kind of mechanism."""
+
+    def __init__(self) -> None:
+        self._spent: OrderedDict[str, float] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def add(self, key: str, more: float) -> None:
+        """So much more."""
+        with self._lock:
+            self._spent[key] = self._spent.pop(key, 0.0) + more
+            while len(self._spent) > MOST:
+                self._spent.popitem(last=False)
+
+    def of(self, key: str) -> float:
+        """All of it."""
+        with self._lock:
+            return self._spent.get(key, 0.0)
+
+
+SPENT = Account()
+"""By the table-driven engine."""
+
+
+EACH, PART = 150.0, 0.6  # an evaluation on average [ns], and part of the cost of a right-hand side
+
+
+def kind(s: Structure) -> tuple[str, float]:
+    """The same for mechanisms that differ in numbers only; what an evaluation of the table-driven engine takes [ns]."""
+    return s.kept.get("kind", None, 1, lambda: (_hashed(s), EACH + PART * cost(s)))
+
+
+def _hashed(s: Structure) -> str:
+    digest = hashlib.blake2b(digest_size=16)
+    for name, table in sorted(s.tables.items()):
+        digest.update(f"{name}{table.shape}".encode())
+        digest.update(table.tobytes())
+    return digest.hexdigest()
 
 
 def check_specialize(value: Any) -> None:
@@ -106,8 +153,9 @@ class Engine:
             if wish == AUTO:
                 self.due = FIRST
                 self._kind, self._each = kind(c.structure)
-            if special.ready() and special.known(plan := special.plan(c.values), c.values) == "memory":
-                self._take(plan)
+            made = special.in_memory(special.plan(c.values), c.values) if special.ready() else None
+            if made is not None:
+                self._take(made, "kept in this process")
 
     def begin(self, clock: ex.Clock) -> None:
         """The motion begins there."""
@@ -163,7 +211,7 @@ class Engine:
         try:
             if without:
                 raise special.Refused(without)
-            self._take(special.plan(self.c.values))
+            self._take(*special.code(special.plan(self.c.values), self.c.values))
         except special.Refused as error:
             raise ModelError(f"specialize=True: {error}; leave it out") from None
 
@@ -178,7 +226,7 @@ class Engine:
                 raise special.Refused(why)
             there = special.known(plan, x)
             if there or self._pays(left + SPENT.of(self._kind) / MANY, special.price(plan, there)):
-                self._take(plan)
+                self._take(*special.code(plan, x))
         except special.Refused as error:
             self.told, self.due = f"{TABLES}: {error}", math.inf
 
@@ -186,7 +234,6 @@ class Engine:
         """Whether code is worth a price (both [ns])."""
         return computing * (1.0 - 1.0 / GAIN) >= MARGIN * price
 
-    def _take(self, plan: special.Plan) -> None:
-        made, how = special.code(plan, self.c.values)
+    def _take(self, made: special.Made, how: str) -> None:
         self.c.run_on(made)
         self.told, self.due = f"{MADE}: {how}", math.inf

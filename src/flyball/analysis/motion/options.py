@@ -90,6 +90,12 @@ class Integration(Options):
             raise ModelError(
                 f"{error}; simulate knows implicit ones too (radau for stiff mechanisms), and impulse, for contact"
             ) from None
+        self.refuse_without_step()
+
+    def refuse_without_step(self) -> None:
+        """Refuse a method that has no estimate of its error, if no width of its steps is given."""
+        if self.step is None and not tableau(self.method).E.any():
+            raise ModelError(f"method={self.method!r} has no estimate of its error: give the width of its steps, step=")
 
     def _rates(self) -> None:
         """Baumgarte's rates have their usual values, or are refused where nothing asks for them."""

@@ -11,7 +11,7 @@ import time
 
 from ...numerics.integrators import clock as ex
 from ...tables.specs import Structure
-from .account import kind
+from .engines import kind
 
 KEPT = "not at its end: kept at t = {:.6g} s"
 """What a result that is a part of a motion says of its end."""

@@ -28,6 +28,7 @@ from ...tables.system import (
     OFF,
     REVOLUTE,
 )
+from ..assembly.gaps import undefined_row
 from ..assembly.start import Assembly
 from ..compiled import Compiled
 from ..freedom.contradiction import story
@@ -217,6 +218,8 @@ def _not_finite(a: Assembly, clock: ex.Clock, method: str) -> str:
         return f"at t = {t:.6g} s the motion is not finite any more: {text}"
     if text := boundless(a, clock, _component):
         return text
+    if text := undefined_row(a.compiled):
+        return f"the equations of motion are not finite just after t = {t:.6g} s: {text}"
     times = [t + d * span for d in (0.0, *AHEAD)]
     broken = (text for at in times for find in (broken_force, _broken_rate) if (text := find(a.compiled, at)))
     if text := next(broken, "") or _broken_ahead(a, clock):

@@ -4,13 +4,13 @@ import importlib
 import pkgutil
 from typing import TYPE_CHECKING
 
-from .solid import Solid, Surface
+from .solid import ConvexSolid, Solid, Surface
 
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"{__name__}.{_module.name}")
 
 _ALL = [c for c in Solid.registry.values() if issubclass(c, Solid) and c.__module__.startswith(f"{__name__}.")]
-SHAPES = [c for c in _ALL if c is not Solid and not issubclass(c, Surface)]
+SHAPES = [c for c in _ALL if c not in (Solid, ConvexSolid) and not issubclass(c, Surface)]
 """Every solid that a file of this folder defines; all are public."""
 SURFACES = [c for c in _ALL if c is not Surface and issubclass(c, Surface)]
 """Every shape without an inside; all are public."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-LENGTHS = {"HULL": (0,), "FIELD": (2, 3)}  # parameters that are lengths; of other kinds all are
+LENGTHS = {"HULL": (0,), "FIELD": (2, 3), "SOLID": (7,)}  # parameters that grow with the shape; of other kinds all do
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +35,8 @@ class Form:
         How many of the rows of ``vertex`` are corners; all if not given. The others do not grow with the shape.
     sides : int
         How many faces there are.
+    owner : type
+        The class of a ``"SOLID"``, which has its support function.
     """
 
     kind: str
@@ -46,6 +48,7 @@ class Form:
     face: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     corners: int | None = None
     sides: int = 0
+    owner: type | None = None
 
     def carried(self, p: np.ndarray, R: np.ndarray) -> Form:
         """The same, in a frame in which the shape's own lies at p with the axes R."""

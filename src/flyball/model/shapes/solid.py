@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -14,8 +16,12 @@ from ..element import Density, Element, Flag, Mass, Name, Point, positive
 from ..geometry import orientation_matrix, vector
 from ..orientation import Orientation
 from .form import Form
+from .surface import arc, lathe, on_axis
 
 FINE = 32  # corners of a circle in a picture
+MOST = 7  # parameters of a convex solid
+DIRECTIONS = tuple(d for d in itertools.product((-1.0, 0.0, 0.6, 1.0), repeat=3) if any(d))
+"""Directions in which a support function is tried: along axes, in their planes, and others."""
 OTHERWISE = (
     "give it contact=False, and the body shapes that can stand for it, such as Cylinder(..., looks=True, contact=True)"
 )
@@ -165,6 +171,83 @@ class Solid(Element):
         p, R = self.pose(n)
         v, f = self.surface(n)
         return p + v @ R.T, f
+
+
+@dataclass(frozen=True)
+class ConvexSolid(Solid):
+    """A convex shape of a user's own, described by its support function.
+
+    A subclass defines `parameters` and the static method ``support(par, d)``: the point of the solid (x, y, z), in its
+    own frame, that is farthest along the direction d, which has any length but zero. It touches every other shape in
+    space, at one point: for a solid with flat sides use a hull. A body with this shape needs ``mass`` and ``inertia``,
+    unless the class also defines ``volume`` and ``gyration`` (and ``centre``).
+    """
+
+    support: ClassVar[Callable[..., Any]]
+
+    def parameters(self, n: SimpleNamespace) -> tuple[Any, ...]:
+        """Up to seven numbers for the support function; ``n`` has the fields in SI units."""
+        return ()
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Itself, within a sphere about its bounding box.
+
+        Raises
+        ------
+        ModelError
+            If the support function is not finite in some direction, or there are too many parameters.
+        """
+        par = self.par(n)
+        for d in DIRECTIONS:
+            self._point(par, d)
+        box = np.array([[self._point(par, tuple(s * e))[k] for s in (-1.0, 1.0)] for k, e in enumerate(np.eye(3))])
+        return (Form("SOLID", (*par, 1.0), np.linalg.norm(np.abs(box).max(axis=1)), owner=type(self)),)
+
+    def volume(self, n: SimpleNamespace) -> Any:
+        """Not known.
+
+        Raises
+        ------
+        ModelError
+            Unless a subclass defines it.
+        """
+        raise ModelError(
+            f"{self.title}: {type(self).__name__} defines no volume and gyration, so it has no mass; give mass= and "
+            f"inertia= of the body"
+        )
+
+    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+        """Points that are farthest along directions all around."""
+        par = self.par(n)
+        v, f = lathe(on_axis(arc((0, 0), 1.0, -np.pi / 2, np.pi / 2, fine // 2)), fine)
+        return np.array([self._point(par, tuple(d)) for d in v.tolist()]), f
+
+    def par(self, n: SimpleNamespace) -> tuple[float, ...]:
+        """The parameters as the support function gets them: seven real numbers.
+
+        Raises
+        ------
+        ModelError
+            If there are more.
+        """
+        par = tuple(float(np.real(x)) for x in self.parameters(n))
+        if len(par) > MOST:
+            raise ModelError(f"{self.title}: parameters() gives {len(par)} numbers; a shape has up to {MOST}")
+        return (*par, *(0.0,) * (MOST - len(par)))
+
+    def _point(self, par: tuple[float, ...], d: tuple[float, ...]) -> tuple[float, ...]:
+        x: Any
+        try:
+            with np.errstate(all="ignore"):
+                x = type(self).support(par, d)
+        except ArithmeticError as error:
+            x = error
+        if not isinstance(x, tuple) or len(x) != 3 or not np.isfinite(x).all():
+            raise ModelError(
+                f"{self.title}: {type(self).__name__}.support gives {x!r} for the direction {d} and par = {par}; it "
+                f"must give a point, a tuple of three finite numbers, for every direction"
+            )
+        return x
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiler.layout import Float1, Float2, Float3, Int1, Int2, Record
+from ...errors import ModelError
 
 # what a guard's way means: which passing of zero is an event
 FALLING, EITHER, RISING = -1, 0, 1
@@ -109,9 +110,22 @@ def checks() -> np.ndarray:
 def kept_stages(c: np.ndarray, stages: int) -> tuple[list[int], list[int]]:
     """Stages of a method at which levels are kept, as evenly apart as there are, and at which guards are.
 
-    Not the first ones, whose order is low. One at least tells whether levels are what those kept let expect.
+    Not the first ones, whose order is low, unless there are no others. One at least tells whether levels are what
+    those kept let expect.
+
+    Raises
+    ------
+    ModelError
+        If a step has less than two stages between its ends.
     """
     good = [i for i in range(max(2, stages // 3), stages) if c[i] < 0.95]
+    if len(good) < 2:
+        good = [i for i in range(1, stages) if c[i] < 0.95]
+    if len(good) < 2:
+        raise ModelError(
+            f"the method of integration has {len(good)} stages between the ends of a step; to find events (of limits, "
+            f"friction, corners of laws) it needs two: take another method, such as rk45"
+        )
     found: list[int] = []
     for x in (0.25, 0.6, 0.857):
         best = min(good, key=lambda i: (abs(c[i] - x), -i))
@@ -119,7 +133,7 @@ def kept_stages(c: np.ndarray, stages: int) -> tuple[list[int], list[int]]:
             found.append(best)
     others = [i for i in good if all(abs(c[i] - c[k]) > 0.03 for k in found)]
     if not others:
-        others = [found.pop(1)]
+        others = [found.pop(1)] if len(found) > 1 else [i for i in good if i not in found][:1]
     return sorted(found, key=lambda i: c[i]), sorted({*found, *others}, key=lambda i: c[i])
 
 

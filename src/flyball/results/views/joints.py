@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...constraints.registry import KINDS
 from ...errors import ModelError
 from ...math.scalar import atan2, rounded
 from ...math.vec import dot, mtv, sub
@@ -37,9 +36,9 @@ class JointView(View):
         F, M = turned(r.frame(i), turn_i), turned(r.frame(j), turn_j)
         par: tuple[float, ...] = (*c.row.par[:6], 0.0, 0.0)
         hint: Any = 0.0
-        if KINDS[c.row.kind].turns:
+        if c.row.of_kind.turns:
             par, hint = (1.0, *par[1:]), self._turns(what, i, j)
-        value, f, tM, tF, second = KINDS[c.row.kind].row(par, F, M, hint, x.system.const)
+        value, f, tM, tF, second = c.row.of_kind.row(par, F, M, hint, x.system.const)
         rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
         offset = self.element.offset(x.numbers[self.element.name], what)
         return c.sign * value + offset, c.sign * rate, c.sign * second

@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...compiler.by_address import CodeTable, addresses, code_table
 from ...contact import kinds
 from ...contact import tables as ct
+from ...contact.narrow.shapes.solid import SIGNATURES
 from ...contact.surfaces import Surfaces
 from ...errors import ModelError
 from ...model.body import GROUND, Body
@@ -17,7 +19,7 @@ from ...model.element import resolve
 from ...model.ground import Ground, frame_of
 from ...model.model import Model
 from ...model.shapes.form import Form
-from ...model.shapes.solid import Solid
+from ...model.shapes.solid import ConvexSolid, Solid
 from ...model.touching import Owner
 from ..numbers import Numbers
 from .carriers import Carriers, carriers
@@ -41,6 +43,8 @@ class Touching:
         Names of what the shapes are of.
     part : (ns,)
         Of each shape, its place in ``parts``.
+    code : list of CodeTable or None
+        Of each shape of a user's own, its support function: their addresses stand in the geometry.
     """
 
     geometry: ct.Geometry
@@ -48,6 +52,7 @@ class Touching:
     carriers: Carriers
     parts: tuple[str, ...]
     part: np.ndarray
+    code: list[CodeTable | None]
 
     def name(self, shape: int) -> str:
         """What carries a shape, for messages: ``"floor"``, ``"crank"``, ``"balls[17]"``."""
@@ -91,9 +96,11 @@ def touching(model: Model, given: Numbers, names: Sequence[str]) -> Touching:
         _joined(rows.vertex, (0, 3)),
         _joined(rows.face, (0,), np.int64),
         apart,
+        addresses(rows.code),
     )
     check_curvature(geometry, surfaces.pair, [m or "" for _, m in rows.surfaces], model.planar)
-    return Touching(geometry, surfaces, at, tuple(e.name for e in owners), _joined(rows.part, (0,), np.int64))
+    part = _joined(rows.part, (0,), np.int64)
+    return Touching(geometry, surfaces, at, tuple(e.name for e in owners), part, rows.code)
 
 
 def _refuse_massless(owners: list[Owner], at: Carriers) -> None:
@@ -122,6 +129,7 @@ class _Rows:
         self.part: list[np.ndarray] = []
         self.vertex: list[np.ndarray] = []
         self.face: list[np.ndarray] = []
+        self.code: list[CodeTable | None] = []
         self._corners = self._places = 0
 
     def add(self, k: int, e: Owner) -> None:
@@ -141,6 +149,7 @@ class _Rows:
         self.reals.append(reals.reshape(-1, 24))
         self.own.append(np.broadcast_to(mine, (count, n, 2, 3)).reshape(-1, 2, 3))
         self.part.append(np.full(count * n, k))
+        self.code += [None if f.owner is None else code_table(f.owner, SIGNATURES) for _, f in forms] * count
 
     def _frame(self, e: Owner) -> tuple:
         """Frame in the world of what stands still, movers, sizes, centre of mass."""
@@ -154,6 +163,8 @@ class _Rows:
         """The parts of a shape, in the body's reference frame."""
         n = resolve(s, self.given.env)
         try:
+            if isinstance(s, ConvexSolid):
+                code_table(type(s), SIGNATURES, SIGNATURES)
             if self.model.planar:
                 return [g for f in s.outlines(n) for g in outlined(f)]
             p, R = s.pose(n)

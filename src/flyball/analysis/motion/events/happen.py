@@ -18,10 +18,10 @@ from ....tables.system import (
     G_PULL,
     G_SLIDES,
     G_TURNS,
+    HELD,
     OFF,
 )
 from .actions import act, act_at_start
-from .apart import put_apart
 from .branches import Corners
 from .doubtful import doubt, shared, shock
 from .failed import beyond, guard_names, no_end, no_forces, no_impulses, sunk
@@ -76,7 +76,7 @@ def happen(here: Here, fired: Sequence[int]) -> None:
     ----------
     here : Here
     fired : sequence of int
-        Rows of `System.guards`.
+        Rows of `System.guard_i`.
 
     Raises
     ------
@@ -260,3 +260,37 @@ def broken(n: Instant, found: Decided, guards: np.ndarray) -> list[int]:
     if n.shares and guards[last] < -BROKEN * n.here.group.size[0]:
         out.append(last)
     return out
+
+
+# Overlaps of rounding size at the start: bodies are put side by side, as assembly closes joints.
+
+
+SLIGHT = 1e-5  # of the mechanism's length, or of a radian: as positions are rounded in a description
+TOLD = 1e-7  # of the same: worth a word
+
+
+def put_apart(n: Instant) -> None:
+    """Take overlaps up to `SLIGHT` away, of contacts, stops and ropes; velocities stay."""
+    over = {}
+    for s in np.flatnonzero(n.kind == STOP).tolist():
+        lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
+        for side, depth in ((lower, lower - n.x[s]), (upper, n.x[s] - upper)):
+            if n.near[s] < depth <= SLIGHT * n.unit[s]:
+                over[s] = side, depth
+    if not over:
+        return
+    y, modes, hold = n.here.y.copy(), n.W.modes.mode.copy(), n.W.modes.hold.copy()
+    for s, (side, _) in over.items():
+        n.W.modes.mode[s], n.W.modes.hold[s] = HELD, side
+    n.arrive()
+    n.W.modes.mode[:], n.W.modes.hold[:] = modes, hold
+    n.here.v[:] = y[n.here.structure.nq : n.here.structure.nq + n.here.structure.nv]
+    n.arrive()  # velocities on the rows of joints, where they are now
+    n.look()
+    n.restored()
+    told = {s: x for s, (_, x) in over.items() if x > TOLD * n.unit[s]}
+    if told:
+        most = max(told, key=lambda s: told[s])
+        n.here.doubts.append(
+            f"the start overlaps by up to {told[most]:.2g} ({n.name(most)}); what is there was moved by as much"
+        )

@@ -147,7 +147,7 @@ class Instant:
             a = self.gradients(which) @ self.W.velocities.solved[:nv] + self.W.sensed[BIAS, self.m[which]]
             before = a if step == 0.0 else before
             out[which] = np.fmax(out[which], np.abs(a - before))
-        self.W.modes.mode = modes
+        self.W.modes.mode[:] = modes
         self.ask(MOTION)
         return out
 

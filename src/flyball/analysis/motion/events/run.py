@@ -38,21 +38,19 @@ from ..implicit.suited import IMPLICIT, explicit
 from ..later import unsolved
 from ..options import Integration
 from ..part import WEIGHT
+from ..samples import sampling
 from ..stiff import EXPLICIT, NOT_STIFF, STIFF, STRUCK, Pace, on_corner
 from .accumulating import Counts
 from .actions import expressions, say_never, stepped_over, true_already
-from .astray import astray
 from .failed import accumulating, endless
 from .happen import begin, happen
 from .here import Here
 from .idle import tie
 from .instant import instant_of
-from .legs import Legs, breaks
+from .legs import Legs, Pauses, breaks
 from .looked import DISTANCES, told
-from .pauses import Pauses
-from .sampling import sampling
 from .segments import Segments
-from .zeros import as_fired, as_grains, as_left, resume
+from .zeros import as_fired, as_grains, as_left, astray, resume
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events

@@ -6,9 +6,11 @@ import numpy as np
 
 from ....equations.watched import Loop
 from ....numerics.integrators.watching import END, FIRED, GRAIN_END, MARK, UNKNOWN
+from ....tables.system import G_CORNER
 from .actions import at_the_seam
 from .here import Here
 from .instant import instant_of
+from .looked import DISTANCES
 
 
 def as_fired(here: Here, loop: Loop) -> None:
@@ -43,3 +45,26 @@ def resume(here: Here, loop: Loop) -> None:
     for g, e in here.structure.events.items():
         desk.side[g] = 0.0 if e.name in told else here.sides.get(e.name) or np.sign(values[g]) or UNKNOWN
         desk.g[END, g], desk.g[FIRED, g] = values[g], here.zero.get(e.name, 0.0)
+
+
+# Switches whose guards were found beyond zero, where a step's end was looked at and no passing had been seen.
+
+
+HARDLY = 0.5  # of its rate at a stop, at the begin of the step: it began to move in between
+
+
+def astray(here: Here, loop: Loop) -> frozenset[int]:
+    """Switches that went where they should not be, unseen: stops crept past, corners on the other side.
+
+    At the step's begin such a stop hardly moved; what did hits it. On which side a law is then, what decides says.
+    """
+    S, out = here.c.system, set()
+    for g in loop.fired if loop.desk.count.away else ():
+        kind, s = int(S.guards.kind[g]), int(S.guards.of[g])
+        if kind == G_CORNER:
+            out.add(s)
+        elif kind in DISTANCES:
+            before, now = np.abs(loop.desk.moving[:, 1, S.switches.measured[s]])
+            if before <= HARDLY * now:
+                out.add(s)
+    return frozenset(out)

@@ -1,1 +1,0 @@
-"""Motions that are kept in a file on the way, and go on from it."""
