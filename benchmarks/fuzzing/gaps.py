@@ -145,8 +145,8 @@ def coordinate(x: Motion, name: str) -> Array | None:
     kind = type(e).__name__
     if what == "angle" and kind in ("Revolute", "Cylindrical", "Screw") and e.at is not None:
         try:
-            return turn(x, e.body_i, e.body_j, _axis(x, e)) + e.angle
-        except Uncounted:
+            return _as_driven(x, name, turn(x, e.body_i, e.body_j, _axis(x, e)) + e.angle)
+        except (Uncounted, KeyError):
             return None
     if (
         what == "displacement"
@@ -155,6 +155,13 @@ def coordinate(x: Motion, name: str) -> Array | None:
     ):
         return dots(_apart(x, e), x.direction(e.body_i, e.axis)) + e.displacement
     return None
+
+
+def _as_driven(x: Motion, name: str, angle: Array) -> Array:
+    """An angle with the whole turns that its driver's law counts at the start, whatever it is drawn with."""
+    for driver in (d for d in x.m.drivers if d.coordinate == name):
+        angle = angle + 2.0 * np.pi * np.rint((evaluated(driver.law, t=x.t)[0] - angle[0]) / (2.0 * np.pi))
+    return angle
 
 
 def evaluated(law: Any, **names: Array) -> Array:

@@ -189,8 +189,9 @@ def newton_euler(x: Motion) -> Iterator[Finding]:
     for name, (mass, inertia) in x.masses.items():
         if name in out.unknown or name not in out.force:
             continue
-        a = x.at_centre(name)[2]
-        allowed = BALANCED * (np.abs(mass * a).max() + largest) + stiff / size + 1e-12
+        _, v, a = x.at_centre(name)
+        rounding = EXACT * 1e-4 * mass * norms(v).max() ** 2 / size
+        allowed = BALANCED * (np.abs(mass * a).max() + largest) + stiff / size + rounding + 1e-12
         bad = np.abs(out.force[name] - mass * a).max()
         if not bad <= allowed:
             yield Finding("force = mass x acceleration", name, float(bad), allowed)

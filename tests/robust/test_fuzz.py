@@ -50,6 +50,7 @@ WAYS = [  # and the other way in which it was; none: by a judge of one motion
     *(("happenings", 700023, "coordinates"), ("sticking", 300046, "axes"), ("shaken", 500066, "radau"), ("shaken", 500092, "axes")),
     *(("sampled", 500011, "radau"), ("parallel_cranks", 500084, "coordinates"), ("parallel_cranks", 500084, "radau")),
     *(("windows", 500008, ""), ("windows", 500086, ""), ("stiff", 500049, ""), ("stiff", 500033, ""), ("sliding", 500023, "")),
+    *(("couplings", 600066, ""), ("extremes", 600020, ""), ("trees", 600007, ""), ("tables", 600057, "swap")),
 ]  # fmt: skip
 
 
