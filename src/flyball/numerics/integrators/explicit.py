@@ -24,7 +24,7 @@ FAR = 4.0  # times the error of a step, if that is more than the tolerance, that
 FARTHER = 8.0  # the same where accuracy limits steps, and of the tolerance: so it is there, now and then
 EDGE = 3.5  # h |lambda| of steps that stability may limit
 SOON = 20  # steps from one that is so refused to the next, by which the width of those to come is bounded
-EXTENDED_TO, CLEAR = 1, 2  # what c.count[EXTENDED] says: the stages of dense output are there; it is good
+EXTENDED_TO, CLEAR = 1, 2  # what c.count.extended says: the stages of dense output are there; it is good
 
 
 @formula
@@ -62,10 +62,10 @@ def within(derivative, S, W, R, c):
 
 @formula
 def clear(R, c):
-    """Whether the dense output is as good as steps are. If not, c.real[CLEARER] is a width at which it may be.
+    """Whether the dense output is as good as steps are. If not, c.real.clearer is a width at which it may be.
 
     Where stability limits steps, not accuracy, their ends are good and the dense output may be far off. A step that is
-    read within has to be narrower there, and where that comes again so have the next ones (c.real[CALM]). Elsewhere
+    read within has to be narrower there, and where that comes again so have the next ones (c.real.calm). Elsewhere
     it is off by a few tolerances, and steps are as they would be. Steps of fixed width are not judged.
     """
     if c.real.step > 0.0:

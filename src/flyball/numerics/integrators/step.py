@@ -38,7 +38,7 @@ def combine(y, K, weights, stages, h, out):
 def allowed(c, i, size):
     """Tolerance of component i of that size.
 
-    Of the first c.count[POSITIONS] what is beyond the size of what moves counts little: that a wheel has turned a
+    Of the first c.count.positions what is beyond the size of what moves counts little: that a wheel has turned a
     hundred times, or that the world's origin is far away, is no reason to be less accurate.
     """
     if i < c.count.positions:
@@ -135,7 +135,7 @@ def part(tangent, S, W, R, c, k, kept):
 
 @formula
 def accountable(c):
-    """Tolerance of the accounts: relative to all that stands in them and to c.real[LEDGER]."""
+    """Tolerance of the accounts: relative to all that stands in them and to c.real.ledger."""
     size = c.real.ledger
     for k in range(c.accounts.shape[0]):
         size += abs(c.y[NEW, c.accounts[k]])

@@ -4,7 +4,7 @@ Guards are numbers that depend on time and state; an event is where one of them 
 ``watch(t, y, S, W, row)``, ``note(S, W, row)`` and ``look(t, h, x, S, W, row)``, which write guards to a row of
 ``W.g``: with the equations, at the state last evaluated (which it also keeps), and as expected from what was kept.
 W is a `Watch`. It returns besides when a step ends on events; whoever calls changes the state as these want it, sets
-``c.count[STARTED]`` to 0 and calls again.
+``c.count.started`` to 0 and calls again.
 """
 
 from __future__ import annotations

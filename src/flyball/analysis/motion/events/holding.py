@@ -18,7 +18,7 @@ from ....tables.system import (
 from .here import Here
 
 CLOSED = 1e-6  # of the mechanism's length, or a radian: a joint that is let go holds again where it is closed
-GONE = 1.0  # in row SPARE of Work.switch: an element that was released; whatever it does, it does not
+GONE = 1.0  # in `Modes.released`: an element that was released; whatever it does, it does not
 
 
 def hold(here: Here, e: Event, a: Lock) -> str:

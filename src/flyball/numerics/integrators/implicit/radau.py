@@ -143,7 +143,7 @@ def pardon(K, c, h, error):
     """Where ever narrower steps miss the tolerance by as much, rounding decides: the widest of them is taken.
 
     So it is near a singular position, where it grows as steps get narrower. What is accepted so is told
-    (c.real[EXCESS]).
+    (c.real.excess).
     """
     if error < FALLS * c.real.best:
         c.real.best = error

@@ -311,7 +311,7 @@ def back(K, c):
 
 @formula
 def unsure(K, c, h):
-    """Error of the integrals in units of the tolerance: relative to all that stands in them and to c.real[LEDGER].
+    """Error of the integrals in units of the tolerance: relative to all that stands in them and to c.real.ledger.
 
     Within the step: at its end they are of a higher order, of the state too, but what lies between is told as well; and
     a fast beginning that the state forgets is not forgotten by its integrals.
