@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 
 from flyball.compiler.buffers import JoinedBuffer, StructBuffer, StructPool
-from flyball.compiler.layout import Complex1, Float1, Float2, Int1
+from flyball.compiler.layout import Complex1, Float1, Float2, Int1, Record
 
 
 class Inner(NamedTuple):
@@ -75,3 +76,28 @@ def test_joined_are_as_if_written_together():
     assert np.array_equal(both.words, seen.words)
     assert both.layout == seen.layout
     assert both.fields.right is right.fields
+
+
+class Widths(Record, kind="Float"):
+    least: float
+    most: float
+
+
+class WithRecord(NamedTuple):
+    table: Float1
+    widths: Widths
+
+
+def test_entries_of_a_record_have_names_in_every_copy():
+    new = WithRecord(np.zeros(3), Widths.blank())
+    new.widths.most = 2.0
+    pool = StructPool(new)
+    one, other = pool.new(), pool.new()
+    one.fields.widths.least, one.array("widths").most = 1.0, 3.0
+    assert one.fields.widths.tolist() == [1.0, 3.0]
+    assert (other.fields.widths.least, other.fields.widths.copy().most) == (0.0, 2.0)
+
+
+def test_names_that_arrays_have_are_refused():
+    with pytest.raises(TypeError, match="Sizes: arrays have an attribute 'shape'"):
+        type("Sizes", (Record,), {"__annotations__": {"shape": float}}, kind="Float")
