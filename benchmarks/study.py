@@ -1,8 +1,8 @@
 """Studies of Andrews' mechanism, 0.03 s a run: CPU time of a run against that of its compiled kernels.
 
-``kernel`` is the CPU time of the compiled loop in a run, ``run`` that of all of it in a study on one thread, ``simulate`` that
-of `m.simulate` with both curves read and the result judged. Stiffnesses and torques only forces see; with another length
-all tables are others, and made code serves only runs that have its numbers 0, 1 and -1.
+``kernel`` is the CPU time of the compiled loop in a run, ``run`` that of all of it in a study on one thread,
+``simulate`` that of `m.simulate` with both curves read and the result judged. Stiffnesses and torques only forces see;
+with another length all tables are others, and made code serves only runs that have its numbers 0, 1 and -1.
 Usage: ``python study.py [--runs 1000] [--vary stiffness d] [--repeats 3] [--engines made tables]``.
 """
 
