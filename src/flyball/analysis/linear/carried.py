@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
+from ...equations.over_time import OverTime
 from ...equations.tree import retract
 from ...equations.velocities import velocities
 from ...results.records import Records
@@ -39,7 +38,7 @@ def carried(
     q = positions(own, bodies, base.compiled.hints | base.compiled.turned(base.q))
     still = np.zeros((1, c.structure.nv))
     W = Records(own, q[None], still, still).W
-    v = velocities(own, bodies, SimpleNamespace(**{name: part[..., 0] for name, part in vars(W).items()}))
+    v = velocities(own, bodies, OverTime(*(part[..., 0] for part in W)))
     return tangent_rate(c, q.real, derivative(q)), derivative(v)
 
 
