@@ -97,7 +97,7 @@ def tables(x: Values) -> Tables:
             out[f"tree frames {b}"] = np.concatenate([x[b] for x in own])
     scaled = "scale of inverse" if X.excess_inertia.any() else "inverse"
     out |= {scaled: X.inverse_inertia, "scale of excess": X.excess_inertia}
-    out |= {"scale": np.r_[X.inverse_reference_inertia, S.length], "gravity": S.gravity}
+    out |= {"scale": np.r_[X.inverse_reference_inertia, S.scales.length], "gravity": S.gravity}
     out |= {"frames": np.column_stack([S.frames.position, S.frames.rotation])}
     out |= {name: getattr(S, name) for name in ("term_parameters", "force_parameters", "const")}
     return out | {"q": x.q, "v": x.v}

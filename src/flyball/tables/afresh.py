@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -16,9 +16,13 @@ from ..model.joint import Joint
 from ..model.model import Model
 from .numbers import Numbers
 from .specs import Structure
+from .system import changed
 
 if TYPE_CHECKING:
     from .values import Values
+
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -42,11 +46,11 @@ class Afresh:
         acting = model.kept.get("acting", None, 1, lambda: {e.name for e in (*model.forces, *model.controllers)})
         return cls(base, other.union(*(stand_on.get(name, ()) for name in other)), other <= acting)
 
-    def table(self, name: str, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
-        """A table of `System` to be filled in: with what is known, or empty."""
+    def table(self, name: str, new: T, dtype: Any) -> T:
+        """A table of `System` to be filled in: with what is known, or the ``new`` one."""
         if self.base is None:
-            return np.zeros(shape, dtype)
-        return getattr(self.base.system, name).astype(dtype)
+            return new
+        return changed(lambda _, x: x.astype(dtype), getattr(self.base.system, name))  # type: ignore[no-any-return]
 
     def state(self, name: str, n: int, dtype: Any) -> np.ndarray:
         """The same of the drawn coordinates, "q", or velocities, "v"."""

@@ -23,6 +23,7 @@ from ...numerics.integrators import clock as ex
 from ...numerics.integrators.refusal import afresh
 from ...tables.cost import cost
 from ...tables.specs import Structure
+from ...tables.system import arrays
 from ...tables.values import Values
 from ..compiled import Compiled
 
@@ -78,9 +79,9 @@ def kind(s: Structure) -> tuple[str, float]:
 
 def _hashed(s: Structure) -> str:
     digest = hashlib.blake2b(digest_size=16)
-    for name, table in sorted(s.tables.items()):
-        digest.update(f"{name}{table.shape}".encode())
-        digest.update(table.tobytes())
+    for table, of in sorted(s.tables.items()):
+        for name, x in arrays(of, table):
+            digest.update(f"{name}{x.shape}".encode() + x.tobytes())
     return digest.hexdigest()
 
 

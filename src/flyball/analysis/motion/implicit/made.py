@@ -6,7 +6,7 @@ import numpy as np
 
 from ....equations.alpha import AlphaMeans, AlphaWorkshop, alpha_steps
 from ....numerics.integrators import clock as ex
-from ....numerics.integrators.implicit.desk import AlphaDesk
+from ....numerics.integrators.implicit.desk import AlphaDesk, SolverReals
 from ...compiled import Compiled
 from ..options import Integration
 from .loop import EPS, Implicit
@@ -55,7 +55,7 @@ class Alpha(Implicit):
         self.rho = rho
         super().__init__(c, clock, index_3)
 
-    def _settle(self, real: np.ndarray, turns: bool) -> None:
+    def _settle(self, real: SolverReals, turns: bool) -> None:
         super()._settle(real, turns)
         steps = float(self.clock.real.span / self.clock.real.step)  # what each leaves to its iteration adds up
         real.newton = max(10.0 * EPS / real.rtol, min(0.1, 1.0 / steps))
