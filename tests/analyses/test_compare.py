@@ -22,7 +22,6 @@ from flyball.tables.names import velocity_names
 from flyball.tables.system import (
     COUPLED,
     SCHUR,
-    SOLVER,
 )
 from tests.mechanisms import EXAMPLES, G, bricard, circles, door, example, four_bar, planar_rod
 
@@ -233,7 +232,7 @@ def test_both_matrices_give_the_same_accelerations(make):
     found = []
     for coupled, solver in ((False, SCHUR), (True, COUPLED)):
         c = compiled(m, coupled=coupled)
-        assert c.structure.tables["kinds"][SOLVER] == solver
+        assert c.structure.tables["sizes"].solver == solver
         c.z = a.compiled.z.copy()
         assert c.at(0.0, a.q, a.v, MOTION)[0] == 0
         found.append((c.work.velocities.solved.copy(), c.jacobian().T @ c.work.rows.multiplier))

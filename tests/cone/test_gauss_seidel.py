@@ -8,8 +8,6 @@ import pytest
 from flyball.numerics.cone.gauss_seidel import gauss_seidel
 from flyball.numerics.cone.problem import (
     CONVERGED,
-    FORCE_RESIDUAL,
-    RESIDUAL,
 )
 from flyball.numerics.cone.rooms import rooms, unfilled
 from flyball.numerics.cone.solve import solve
@@ -115,7 +113,7 @@ def test_the_history_tells_every_sweep():
     solve(gauss_seidel, P, X, W, O, F)
     p = impulses(P, X)
     assert list(O.history[:, 0]) == list(range(1, 51))
-    assert O.history[-1, 1:3] == pytest.approx(O.real[[RESIDUAL, FORCE_RESIDUAL]])
+    assert O.history[-1, 1:3] == pytest.approx(np.array([O.real.residual, O.real.force_residual]))
     assert O.history[-1, 3] == pytest.approx(0.5 * p @ N @ p + b @ p)
     assert (np.diff(O.history[:, 3]) <= 1e-14).all()  # every visit is a descent in the convex form
 

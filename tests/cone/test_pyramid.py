@@ -10,7 +10,7 @@ import pytest
 from flyball.errors import AnalysisError
 from flyball.numerics.cone.gauss_seidel import gauss_seidel
 from flyball.numerics.cone.lemke import delassus, lemke, pyramid_by_lemke
-from flyball.numerics.cone.problem import BROKEN, CONVERGED, COULOMB, DIRECTIONS
+from flyball.numerics.cone.problem import BROKEN, CONVERGED
 from flyball.numerics.cone.pyramid import in_polygon, pyramid, sliding_share
 from flyball.numerics.cone.rooms import rooms, unfilled
 from flyball.numerics.cone.solve import solve
@@ -92,7 +92,7 @@ def test_a_slider_on_a_pyramid(d, angle):
     P.node[0, 0], P.at[0], P.mu[0], P.frame[0] = 1.0, (-1, 0), 0.3, (0, 0, 1, 1, 0, 0, 0, 1, 0)
     X, W, O, F = rooms(P)
     free = -500 * np.cos(angle), -500 * np.sin(angle), -1.0
-    X.v[0, :3], O.count[[DIRECTIONS, COULOMB]] = free, (d, 1)
+    X.v[0, :3], O.count.directions, O.count.coulomb = free, d, 1
     O.count.most, O.real.enough = 1000, 1e-14
     solve(pyramid, P, X, W, O, F)
     along, across = sliding_share(d, angle)

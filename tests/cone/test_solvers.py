@@ -17,8 +17,6 @@ from flyball.numerics.cone.operator import push, push_turning, seen, seen_turnin
 from flyball.numerics.cone.problem import (
     BROKEN,
     CONVERGED,
-    FORCE_RESIDUAL,
-    RESIDUAL,
 )
 from flyball.numerics.cone.projection import projected_turning
 from flyball.numerics.cone.residual import residuals
@@ -254,7 +252,7 @@ def test_the_units_of_residuals(name):
         X.v[:, :3] *= length
         O.count.most, O.real.enough = 20, 0.0
         solve(SOLVERS[name], P, X, W, O, F)
-        told.append(O.real[[RESIDUAL, FORCE_RESIDUAL]] / [length, 1.0])
+        told.append(np.array([O.real.residual, O.real.force_residual]) / [length, 1.0])
     if name != "apgd":  # which takes N - 1 for a vector to start from, whatever the unit of 1
         np.testing.assert_allclose(told[1:], [told[0]] * 2, rtol=1e-6)
     assert (np.array(told) > 0).all()
@@ -280,7 +278,7 @@ def test_the_history_tells_every_iteration(name):
     solve(SOLVERS[name], P, X, W, O, F)
     p = impulses(P, X)
     rows = O.history[: O.count[5]]
-    assert rows[-1, 1:3] == pytest.approx(O.real[[RESIDUAL, FORCE_RESIDUAL]])
+    assert rows[-1, 1:3] == pytest.approx(np.array([O.real.residual, O.real.force_residual]))
     assert rows[-1, 3] == pytest.approx(0.5 * p @ N @ p + b @ p)
     assert rows[-1, 1] < 0.5 * rows[0, 1]
 

@@ -68,7 +68,7 @@ def test_rows_that_let_go_are_measured_as_they_are(planar, tree):
     """Away from closed, the measured copy of each row of the joint has its value and gradient."""
     c = compiled(model(planar), tree=tree, switches=True)
     s, S = c.structure, c.system
-    c.work.modes.mode = HELD
+    c.work.modes.mode[:] = HELD
     rng = np.random.default_rng(3)
     q = c.values.q + 0.05 * rng.standard_normal(s.nq)
     v = rng.standard_normal(s.nv)

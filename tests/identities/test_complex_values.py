@@ -319,7 +319,7 @@ def test_one_complex_parameter_makes_all_complex():
     floats = {k: a.dtype for k, a in x.system._asdict().items() if isinstance(a, np.ndarray) and a.dtype.kind != "i"}
     assert set(floats.values()) == {np.dtype(complex)}
     assert x.q.dtype == x.v.dtype == work(s, x.system).G.dtype == complex
-    assert not x.system.frame_x.imag.any()
+    assert not x.system.frames.position.imag.any() and not x.system.frames.rotation.imag.any()
 
 
 def test_held_coordinates_may_be_complex():

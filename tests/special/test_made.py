@@ -215,8 +215,9 @@ def test_code_is_known_by_the_values_that_formulas_decided_by():
     """Of the same entries other values are another digest, others' values are not."""
     m = example("andrews.toml")
     x, other = (values_of(m, parameters=p)[0].system for p in (None, {"stiffness": 9000.0}))
-    changed = [("force_x", int(k)) for k in np.flatnonzero(x.force_x.ravel() != other.force_x.ravel())]
-    same = [("body_x", k) for k in range(4)]
+    of, others = x.force_parameters.ravel(), other.force_parameters.ravel()
+    changed = [("force_parameters", int(k)) for k in np.flatnonzero(of != others)]
+    same = [("bodies.inertia", k) for k in range(4)]
     assert changed
     assert keeping.digest(x, changed) != keeping.digest(other, changed)
     assert keeping.digest(x, same) == keeping.digest(other, same)

@@ -17,6 +17,7 @@ import numpy as np
 from ..compiler.store import DIGITS, cache_folder, read, remove_oldest, touch, write
 from ..tables.system import System
 from ..tables.values import Values
+from ..tracing.trace import traced_arrays
 from .machine import Loaded, assembled
 from .made import Made
 from .plan import GROWING, LOADING, LOOKING, MAKING, Plan
@@ -101,7 +102,8 @@ def _made(p: Plan, x: Values) -> Made:
 
 def digest(S: System, entries: list[Entry]) -> str:
     """Hash of the values of some entries of the tables, to the last bit."""
-    values = np.array([getattr(S, name).ravel()[k] for name, k in entries], float)
+    tables = traced_arrays(S) if entries else {}
+    values = np.array([tables[name].ravel()[k] for name, k in entries], float)
     return hashlib.sha256(repr(entries).encode() + values.tobytes()).hexdigest()[:DIGITS]
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compiler.layout import Float2, Int1, Int2, Record, Struct, struct
+from ..compiler.layout import Float2, Int1, Int2, Record, RecordLayout, Struct, struct
 from ..equations.tasks import Sheet
 from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.tableaux import Tableau
@@ -107,7 +107,12 @@ class Joined(NamedTuple):
 
 def _empty(layout: Struct) -> Any:
     """A named tuple of arrays without entries."""
-    parts = [_empty(x) if isinstance(x, Struct) else np.zeros((0,) * x.ndim, x.dtype) for _, x in layout.fields]
+    parts: list[Any] = []
+    for _, x in layout.fields:
+        if isinstance(x, Struct):
+            parts.append(_empty(x))
+        else:
+            parts.append(x.of.blank() if isinstance(x, RecordLayout) else np.zeros((0,) * x.ndim, x.dtype))
     return layout.of(*parts)
 
 

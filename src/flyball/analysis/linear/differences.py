@@ -99,7 +99,7 @@ def whole(model: Model, parameters: Mapping[str, float], name: str) -> float:
     scales = [(v.system.frames.position, length)]
     places = np.array([n.unit == "m" for n in velocity_names(c.structure)])
     scales += [(v.v[places], length), (v.v[~places], 1.0), (v.q, length)]
-    for table in ("bodies", "term_parameters", "force_parameters", "gravity", "length", "rate", "units"):
+    for table in ("bodies", "term_parameters", "force_parameters", "gravity", "units"):
         for _, x in arrays(getattr(v.system, table)):
             columns = np.atleast_2d(x.T)
             scales += [(x, np.abs(x.real).max()) for x in columns if len(x) and np.abs(x.real).max() > 0.0]

@@ -34,7 +34,7 @@ from ..motion.start import Start
 from ..simulate import run_clock
 from .loads import as_complex, pressing
 
-TABLES = ("bodies", "frames", "term_parameters", "force_parameters", "const", "gravity", "length", "rate", "units")
+TABLES = ("bodies", "frames", "term_parameters", "force_parameters", "const", "gravity", "scales", "units")
 FOR_THE_SOLVE = (
     "inverse_inertia", "excess_inertia", "inverse_mass", "inverse_reference_inertia", "excess_mass",
     "inverse_reference_mass",
