@@ -174,7 +174,7 @@ def test_a_poor_choice_is_mended(monkeypatch, coordinates):
         wanted = "D.displacement" if coordinates == "joint" else "slider.x"
         at = [n.name for n in velocity_names(c.structure)].index(wanted)
         size = np.abs(c.work.velocities.partition)
-        c.work.velocities.partition = size
+        c.work.velocities.partition[:] = size
         c.work.velocities.partition[at] = -size[at]
         starts.append(start)
 

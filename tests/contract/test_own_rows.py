@@ -47,7 +47,7 @@ class OnEllipse(ConstraintRow):
 
 
 @element
-class EllipticGuide(Joint):
+class EllipticTrack(Joint):
     """The origin of the second frame stays on an ellipse in the x-y plane of the first."""
 
     a: Length = 1.0
@@ -67,7 +67,7 @@ class EllipticGuide(Joint):
 A, B, START = 2.0, 1.0, 0.4
 
 
-def bead(joint=EllipticGuide, planar=True, inertia=0.1, **more):
+def bead(joint=EllipticTrack, planar=True, inertia=0.1, **more):
     """A bead on an ellipse in a vertical plane, let go at the parameter START."""
     third = () if planar else (0.0,)
     m = fb.Mechanism("bead", gravity=(0, -G, *third), planar=planar, parameters={"a": A})
@@ -128,7 +128,7 @@ def test_an_ellipse_that_turns():
     m.add(fb.Revolute("axle", "ground", "table", at=(0, 0)), fb.Driver("drive", coordinate="axle.angle", law="3*t"))
     x, y = A * np.cos(START), B * np.sin(START)
     m.add(fb.Body("bead", mass=2, inertia=0.1, position=(x, y), velocity=(-spin * y, spin * x)))
-    m.add(EllipticGuide("guide", "rail", "bead", a=A, b=B))
+    m.add(EllipticTrack("guide", "rail", "bead", a=A, b=B))
     r = m.simulate(1.5, outputs=16, rtol=1e-10, atol=1e-12)
     there, _ = on_ellipse(r.t, spin=spin, g=0.0)
     c, s = np.cos(spin * r.t), np.sin(spin * r.t)
@@ -141,7 +141,7 @@ def test_an_ellipse_that_turns_freely_keeps_energy_and_angular_momentum():
     m = fb.Mechanism("turntable", planar=True)
     m.add(fb.Body("table", mass=5, inertia=2, angular_velocity=1), fb.Frame("rail", "table"))
     m.add(fb.Body("bead", mass=2, inertia=0.1, position=(A * np.cos(START), B * np.sin(START))))
-    m.add(fb.Revolute("axle", "ground", "table", at=(0, 0)), EllipticGuide("guide", "rail", "bead", a=A, b=B))
+    m.add(fb.Revolute("axle", "ground", "table", at=(0, 0)), EllipticTrack("guide", "rail", "bead", a=A, b=B))
     r = m.simulate(3.0, outputs=31, rtol=1e-10, atol=1e-12)
     (x, y), (vx, vy) = r["bead"].position.T, r["bead"].velocity.T
     momentum = 2 * r["table"].angular_velocity + 2 * (x * vy - y * vx) + 0.1 * r["bead"].angular_velocity
@@ -292,7 +292,7 @@ def test_too_many_parameters():
 
 
 RIGHT = [
-    EllipticGuide("guide", "rail", "bead", a=2, b=1),
+    EllipticTrack("guide", "rail", "bead", a=2, b=1),
     fb.Revolute("hinge", "a", "b", at=(0.3, 0.2, 0.1), axis=(1, 2, 2)),
 ]
 
@@ -327,7 +327,7 @@ BROKEN = {
 @pytest.mark.parametrize("part", BROKEN)
 def test_a_wrong_row_is_caught_by_the_part_that_it_breaks(part):
     kind = element(
-        type("Guide", (EllipticGuide,), {"__module__": __name__, "__annotations__": {}, "blocks": (own("Own", BROKEN[part])(),),
+        type("Guide", (EllipticTrack,), {"__module__": __name__, "__annotations__": {}, "blocks": (own("Own", BROKEN[part])(),),
              "constants": lambda self, n, row, F, M: (n.a, n.b)})
     )  # fmt: skip
     with pytest.raises(ContractError, match=rf"Guide 'guide' fails the check '{part}': "):

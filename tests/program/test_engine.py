@@ -10,7 +10,7 @@ from flyball.compiler.formulas import call, formula
 from flyball.compiler.kernels import BoundKernel, kernel
 from flyball.equations.engine import ARRIVE, MOTION, REPORT, RESIDUAL, engine, motion_kernel
 from flyball.equations.tasks import Sheet
-from flyball.numerics.integrators.clock import Clock
+from flyball.numerics.integrators.clock import Clock, ClockCounts, ClockReals
 from flyball.numerics.integrators.tableaux import Tableau, tableau
 from flyball.tables.system import Bodies, System, Work
 from tests.layers import LAYERS
@@ -52,7 +52,7 @@ def desk(model, coordinates):
     s, S = c.structure, c.values.system
     n = len(start.y)
     clock = Clock(
-        np.zeros(10), np.zeros(9, np.int64), np.zeros(0), np.zeros((3, n)), np.zeros((1, n)), np.zeros(0, np.int64),
+        ClockReals.blank(), ClockCounts.blank(), np.zeros(0), np.zeros((3, n)), np.zeros((1, n)), np.zeros(0, np.int64),
         np.zeros((6, 0)),
     )  # fmt: skip
     clock.y[0] = start.y

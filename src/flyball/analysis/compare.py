@@ -255,8 +255,7 @@ def _run(
 ) -> tuple[ex.Clock, np.ndarray, float, Exception | None]:
     """Run the compiled loop from the start. Returns (clock, rows, time of the processor [s], why it failed)."""
     W = start.assembly.compiled.work
-    for x in W.counts:
-        x[0] = 0
+    W.counts[:] = 0
     W.options.position_violation = W.options.velocity_violation = 0.0
     if o.stabilization == "partitioning":
         partition.choose(job.model, start)

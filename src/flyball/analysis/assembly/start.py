@@ -243,7 +243,7 @@ def wind(c: Compiled, known: Mapping[str, float], q: np.ndarray) -> None:
         b = s.place[s.model.carrier(owner.name, owner)]
         if b >= 0:
             whole = np.round((value - c.values.poses.turned(owner)) / (2.0 * np.pi))
-            q[s.tables["body_i"][b, 2] + 2] += 2.0 * np.pi * whole
+            q[s.tables["tree"].q[b] + 2] += 2.0 * np.pi * whole
 
 
 def told(model: Model, env: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
