@@ -76,30 +76,31 @@ class StructBuffer:
         other = copy(self)
         other.fields, other.words = fields, self.words.copy()
         other.address = address_of(other.words)
-        at = 0
-        for old, new, (name, layout) in zip(self.fields, fields, self.layout.fields, strict=True):
-            if new is not old:
-                words: list[int] = []
-                _describe_one(new, layout, name, self.layout, {}, words)
-                other.words[at : at + len(words)] = words
-            at += layout.size // 8
+        _describe_changed(self.fields, fields, self.layout, other.words, 0)
         return other
 
 
 def _describe(fields: Any, layout: Struct, known: dict[int, StructBuffer], words: list[int]) -> None:
     for x, (name, of) in zip(fields, layout.fields, strict=True):
-        _describe_one(x, of, name, layout, known, words)
+        if not isinstance(x, tuple):
+            words += described(x, of, f"{layout.of.__name__}.{name}")
+            if isinstance(of, CodeTables) and x.any():
+                make_ready(x, layout.complex)
+        elif (there := known.get(id(x))) is not None:
+            words += there.words.tolist()
+        else:
+            _describe(x, of, known, words)
 
 
-def _describe_one(x: Any, of: Any, name: str, layout: Struct, known: dict[int, StructBuffer], words: list[int]) -> None:
-    if not isinstance(x, tuple):
-        words += described(x, of, f"{layout.of.__name__}.{name}")
-        if isinstance(of, CodeTables) and x.any():
-            make_ready(x, layout.complex)
-    elif (there := known.get(id(x))) is not None:
-        words += there.words.tolist()
-    else:
-        _describe(x, of, known, words)
+def _describe_changed(old: Any, new: Any, layout: Struct, words: np.ndarray, at: int) -> None:
+    for before, x, (name, of) in zip(old, new, layout.fields, strict=True):
+        if x is not before and isinstance(x, tuple):
+            _describe_changed(before, x, of, words, at)
+        elif x is not before:
+            words[at : at + of.size // 8] = described(x, of, f"{layout.of.__name__}.{name}")
+            if isinstance(of, CodeTables) and x.any():
+                make_ready(x, layout.complex)
+        at += of.size // 8
 
 
 def described(x: np.ndarray, of: Array | RecordLayout, name: str) -> tuple[int, ...]:

@@ -95,7 +95,7 @@ class Instant:
         seen = np.zeros((here.clock.seen.shape[0], 0))
         self.desk = Clock(ClockReals.blank(), ClockCounts.blank(), np.zeros(0), y, np.zeros((1, ny)), none, seen)
         R, self.sheet = tableau("rk45"), Sheet(np.zeros((4, width)))
-        self.tables = StructBuffer(S), StructBuffer(self.W)
+        self.tables = c.buffers
         self.engine = BoundKernel(
             engine, *self.tables, StructBuffer(R), StructBuffer(self.desk), StructBuffer(self.sheet)
         )
@@ -268,7 +268,7 @@ class Instant:
         self.ask(WATCH)
         out = self.sheet.rows[0, : len(self.S.guards.kind)].copy()
         if self.shares:
-            out[-1] = margin_kernel(self.S, self.W, self.here.t, self.here.group)
+            out[-1] = margin_kernel(*self.tables, self.here.t, self.here.group)
         return out
 
     def name(self, s: int) -> str:
