@@ -23,7 +23,7 @@ METHODS = {
 
 
 @pytest.fixture(autouse=True)
-def _defined():
+def _defined(built_in_methods):
     for name, given in METHODS.items():
         runge_kutta(name, **given)
 

@@ -49,7 +49,7 @@ class Pebble(ConvexSolid):
 
 
 @element
-class Lens(ConvexSolid):
+class Lentil(ConvexSolid):
     """What two balls have in common whose centres are at (0, 0, offset) and (0, 0, -offset)."""
 
     radius: Length = 1.0
@@ -108,7 +108,7 @@ OTHERS = {
     "hemisphere": fb.Hemisphere(radius=0.6),
     "hull": fb.Hull(vertices=CUBE),
     "field": fb.HeightField(heights=((0, 0.1, 0), (0.2, 0, 0.1), (0, 0.3, 0.1)), dx=0.8),
-    "lens": Lens(radius=0.6, offset=0.2),
+    "lens": Lentil(radius=0.6, offset=0.2),
 }
 
 
@@ -152,7 +152,7 @@ def test_a_lens_rocks():
     R, c, mass, I, lean = 1.0, 0.5, 2.0, 0.3, 0.05
     m = fb.Mechanism("rocking", gravity=(0, 0, -9.81))
     turned = (np.cos(lean / 2), 0, np.sin(lean / 2), 0)
-    lens = fb.Body("lens", shape=Lens(radius=R, offset=c), mass=mass, inertia=(I, I, 0.5), orientation=turned,
+    lens = fb.Body("lens", shape=Lentil(radius=R, offset=c), mass=mass, inertia=(I, I, 0.5), orientation=turned,
                    position=(0, 0, R - c * np.cos(lean)))  # fmt: skip
     m.add(lens, fb.Ground("floor", shape=fb.Plane()), fb.Contact(friction=0.8))
     r = m.simulate(3.0, outputs=301)
@@ -245,11 +245,23 @@ def test_what_is_wrong_is_said_by_name(case):
 
 def test_without_a_volume_the_mass_has_to_be_given():
     m = fb.Mechanism("m")
-    with pytest.raises(fb.ModelError, match="Lens defines no volume and gyration, so it has no mass; give mass= and"):
-        m.add(fb.Body("b", shape=Lens(), density=1000))
+    with pytest.raises(fb.ModelError, match="Lentil defines no volume and gyration, so it has no mass; give mass= and"):
+        m.add(fb.Body("b", shape=Lentil(), density=1000))
 
 
-RIGHT = [Pebble(semi_axes=HALF), Lens(radius=0.6, offset=0.2), SuperEllipsoid(semi_axes=HALF, exponent=3)]
+def test_a_type_that_two_modules_define_is_no_type_of_a_file(tmp_path):
+    for module in ("one", "two"):
+        element(type("Cobble", (Pebble,), {"__module__": module, "__annotations__": {}}))
+    m = fb.Mechanism("m", gravity=(0, 0, -10))
+    m.add(fb.Body("b", shape=Pebble.registry["Cobble"](semi_axes=HALF), mass=1, inertia=(1, 1, 1)))
+    m.save(tmp_path / "cobble.toml")
+    with pytest.raises(
+        fb.ModelError, match=r"'b'.*type 'Cobble' is defined by several modules, one, two; a file knows"
+    ):
+        fb.load(tmp_path / "cobble.toml")
+
+
+RIGHT = [Pebble(semi_axes=HALF), Lentil(radius=0.6, offset=0.2), SuperEllipsoid(semi_axes=HALF, exponent=3)]
 
 
 @pytest.mark.parametrize("e", RIGHT, ids=lambda e: type(e).__name__)

@@ -38,11 +38,11 @@ def _solids(value: Any) -> Any:
     """Shapes, or plain data of a model file that says their type."""
     if isinstance(value, dict):
         kind = value.get("type")
-        known = {c.__name__: c for c in Element.registry.values() if issubclass(c, Solid) and c is not Solid}
+        known = [k for k, c in Element.registry.items() if issubclass(c, Solid) and c is not Solid]
         if kind not in known:
             problem = "a shape has no type" if kind is None else f"unknown shape type {kind!r}"
             raise ModelError(f"{problem}; there are {', '.join(sorted(known))}")
-        return known[kind](**{k: v for k, v in value.items() if k != "type"})
+        return Element.of_type(kind)(**{k: v for k, v in value.items() if k != "type"})
     if isinstance(value, (list, tuple)):
         return tuple(_solids(v) for v in value)
     if value is not None and not isinstance(value, Solid):

@@ -251,6 +251,22 @@ class Element:
         Element.registry[cls.__name__] = cls
         Element.modules.setdefault(cls.__name__, set()).add(cls.__module__)
 
+    @staticmethod
+    def of_type(name: str, where: str = "") -> type[Element]:
+        """The class that a ``type`` in a model file names.
+
+        Raises
+        ------
+        ModelError
+            If several modules define a class of that name; it begins with ``where``.
+        """
+        if len(modules := Element.modules[name]) > 1:
+            raise ModelError(
+                f"{where}type {name!r} is defined by several modules, {', '.join(sorted(modules))}; a file knows a "
+                f"type by its name: give the classes different names, or import one of the modules only"
+            )
+        return Element.registry[name]
+
     @property
     def title(self) -> str:
         """Kind and name, for messages."""

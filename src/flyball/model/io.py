@@ -339,12 +339,7 @@ def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
         problem = "it has no type" if name is None else f"unknown type {name!r}{suggest(str(name), known)}"
         hint = "" if name is None else ". A type of your own is known once the Python file that defines it is imported"
         raise ModelError(f"{where}: {_elsewhere(name) or problem}; {category} are {', '.join(known)}{hint}")
-    if len(modules := Element.modules[name]) > 1:
-        raise ModelError(
-            f"{where}: type {name!r} is defined by several modules, {', '.join(sorted(modules))}; a file knows a type "
-            f"by its name: give the classes different names, or import one of the modules only"
-        )
-    return Element.registry[name]
+    return Element.of_type(name, f"{where}: ")
 
 
 def _elsewhere(name: Any) -> str:
