@@ -215,7 +215,12 @@ def other_coordinates(b: Base, dice: random.Random) -> tuple:
     if "coordinates" in b.options or isinstance(b.options.get("method"), fb.Stepping):
         raise Unsupported("coordinates are given")
     used = "joint" if str(b.run.health.coordinates).startswith("joint") else "absolute"
-    return _again(b, b.mechanism, coordinates="absolute" if used == "joint" else "joint")
+    try:
+        return _again(b, b.mechanism, coordinates="absolute" if used == "joint" else "joint")
+    except fb.AnalysisError as error:
+        if "has no motion of its own in joint coordinates" not in str(error):
+            raise
+        raise Unsupported("friction follows reactions that rows leave open") from error
 
 
 def _method(name: str) -> Relation:
@@ -224,7 +229,12 @@ def _method(name: str) -> Relation:
             raise Unsupported("radau projects")
         if name == "radau" and has_functions(b.mechanism):
             raise Unsupported("Python functions have no derivatives")
-        return _again(b, b.mechanism, method=name)
+        try:
+            return _again(b, b.mechanism, method=name)
+        except fb.SimulationError as error:
+            if name == "radau" or "steps were taken by t =" not in str(error):
+                raise
+            raise Unsupported("stiff: by explicit steps it takes too many") from error
 
     return relation
 
