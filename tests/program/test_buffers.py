@@ -101,3 +101,30 @@ def test_entries_of_a_record_have_names_in_every_copy():
 def test_names_that_arrays_have_are_refused():
     with pytest.raises(TypeError, match="Sizes: arrays have an attribute 'shape'"):
         type("Sizes", (Record,), {"__annotations__": {"shape": float}}, kind="Float")
+
+
+CHANGES = {
+    "nothing": lambda new: new,
+    "an array": lambda new: new._replace(table=np.zeros(9)),
+    "an array of an inner tuple": lambda new: new._replace(inner=new.inner._replace(x=np.zeros(5, complex))),
+    "all": lambda new: outer(),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_changed_tuple_is_described_as_if_it_were_new(change):
+    new = outer()
+    first = StructBuffer(new)
+    before = first.words.copy()
+    changed = CHANGES[change](new)
+    again = first.of(changed)
+    assert again.words.tolist() == StructBuffer(changed).words.tolist()
+    assert again.fields is changed
+    assert again.address != first.address
+    assert first.words.tolist() == before.tolist()
+
+
+def test_a_changed_tuple_is_refused_with_an_array_of_another_type():
+    new = outer()
+    with pytest.raises(TypeError, match=r"Inner\.n: an array of int64"):
+        StructBuffer(new).of(new._replace(inner=new.inner._replace(n=np.zeros(3))))

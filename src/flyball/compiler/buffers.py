@@ -83,23 +83,28 @@ class StructBuffer:
 def _describe(fields: Any, layout: Struct, known: dict[int, StructBuffer], words: list[int]) -> None:
     for x, (name, of) in zip(fields, layout.fields, strict=True):
         if not isinstance(x, tuple):
-            words += described(x, of, f"{layout.of.__name__}.{name}")
-            if isinstance(of, CodeTables) and x.any():
-                make_ready(x, layout.complex)
+            words += _described_field(x, of, name, layout)
         elif (there := known.get(id(x))) is not None:
             words += there.words.tolist()
         else:
             _describe(x, of, known, words)
 
 
+def _described_field(x: np.ndarray, of: Any, name: str, layout: Struct) -> tuple[int, ...]:
+    """The words that describe an array of a structure; code that it has the addresses of is made ready."""
+    words = described(x, of, f"{layout.of.__name__}.{name}")
+    if isinstance(of, CodeTables) and x.any():
+        make_ready(x, layout.complex)
+    return words
+
+
 def _describe_changed(old: Any, new: Any, layout: Struct, words: np.ndarray, at: int) -> None:
+    """Write anew the words, from ``at`` on, of the arrays that are not those of ``old``."""
     for before, x, (name, of) in zip(old, new, layout.fields, strict=True):
         if x is not before and isinstance(x, tuple):
             _describe_changed(before, x, of, words, at)
         elif x is not before:
-            words[at : at + of.size // 8] = described(x, of, f"{layout.of.__name__}.{name}")
-            if isinstance(of, CodeTables) and x.any():
-                make_ready(x, layout.complex)
+            words[at : at + of.size // 8] = _described_field(x, of, name, layout)
         at += of.size // 8
 
 

@@ -33,9 +33,7 @@ SLIGHT = 1e-6  # part of the energy that lifts all bodies by one's size, which t
 PIECES, ROWS = 64, 4  # stretches that the balance is judged by at most, and rows of output in each at least
 SEEN = 0.1  # part of the energy that accelerations tell of; where less stands in rows they miss the motion
 OPEN = 1e-6  # part of the mechanism's length above which violated constraints are
-UNSOLVED = (
-    1e-8  # part of the accelerations by which they may miss the constraints; reactions miss by up to 1e4 times it
-)
+UNSOLVED = 1e-8  # part by which accelerations may miss the constraints: reactions miss by up to 1e4 times it
 AT_REST = 1e-7  # lengths of the mechanism a second that count as rest
 CREPT = 1e-3  # part of the mechanism's length above which creep is
 
