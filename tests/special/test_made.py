@@ -23,9 +23,10 @@ from flyball.equations.within import ROWS
 from flyball.numerics.integrators import clock as ex
 from flyball.numerics.integrators.tableaux import tableau
 from flyball.special import keeping
-from flyball.special.recorder import TERMS, Recorder
+from flyball.special.recorder import Recorder
 from flyball.tables.system import (
     RATE,
+    TERMS,
     VALUE,
 )
 from tests.contract.zoo import PLANAR, SPATIAL, joined

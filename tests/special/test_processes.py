@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from flyball.analysis.motion.engines import Engine
 from flyball.analysis.motion.start import begin
 from tests.mechanisms import four_bar
 
+ROOT = Path(__file__).resolve().parents[2]
 WISH = {"specialize": True, "progress": False, "outputs": 21}
 
 
@@ -72,7 +74,7 @@ def test_other_processes_find_it_on_disk():
 
 def _elsewhere() -> list[str]:
     said = subprocess.run(
-        [sys.executable, "-c", CODE.format(path=sys.path)], capture_output=True, text=True, timeout=120
+        [sys.executable, "-c", CODE.format(path=[str(ROOT), *sys.path])], capture_output=True, text=True, timeout=120
     )
     return said.stdout.splitlines()
 

@@ -12,12 +12,12 @@ d), four arrays among them, and returns a float:
     FACTOR, REUSE                               `solve.factor`, 0 or 1 + a guilty unknown; `solve.reuse`
     STEP           a: f, b: gamma, c: x, d: lam  begin of a solve; without rows all of it
     STEP_UNLOADED  the same with f = 0
-    REFINE         the same                     a pass for what is left; what is left then, and its size
+    REFINE         the same                     a pass; `solve.remainder_coupled`: one returned, the others in W.flat
     FINISH         a: state, b: its derivative, c: x, d: lam   the derivative from the solution; 0, or it is not finite
     SHOW           a: q                         poses of frames that only ends of steps look at
     SAMPLED        no address: where those of the laws that `within.sample` asks for begin in `System.flat`, in the
-                   order of `within.law_at`; t and a: sensors, inputs of a force in W.flat[2:4]
-    DRIFT          a: v, b: nu - G v            `projection.drift`: the largest; the size of its terms in W.flat[0]
+                   order of `within.law_at`; t and a: sensors, inputs of a force in W.flat
+    DRIFT          a: v, b: nu - G v            `projection.drift`: the largest; the size of its terms in W.flat
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from ..tables.system import (
     MOVE,
     PLACE,
     SHOW,
+    TERMS,
 )
 from .dispatch import row_biases, row_values
 from .kinematics import motions, poses
@@ -89,7 +90,7 @@ def drift(S, W, v, out):
     """Largest |G v - nu|, the size of its largest term, and nu - G v into ``out``."""
     if W.made[DRIFT] != 0:
         worst = run(W.made[DRIFT], S, W, 0.0, v, out, v, out)
-        return worst, W.flat[0]
+        return worst, W.flat[TERMS]
     worst = 0.0
     size = 0.0
     for k in range(out.shape[0]):

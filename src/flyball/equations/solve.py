@@ -19,8 +19,11 @@ from ..numerics.ldl import ldl_factor, ldl_solve
 from ..tables.system import (
     COUPLED,
     FACTOR,
+    LOAD_RESIDUAL,
+    LOAD_SIZE,
     REFINE,
     REUSE,
+    ROW_SIZE,
     SCHUR,
     STEP,
     STEP_UNLOADED,
@@ -196,8 +199,12 @@ def solve_made(S, W, f, gamma, x, lam, loaded, refinements):
     """By code made for the mechanism: passes for what is left, until that passes or stops falling."""
     worst = run(W.made[(STEP if loaded else STEP_UNLOADED)], S, W, 0.0, f, gamma, x, lam)
     last = 1e300
+    wide = size = 1e-300
     for _ in range(refinements + 1 if W.made[REFINE] != 0 else 0):
-        worst = run(W.made[REFINE], S, W, 0.0, f, gamma, x, lam)
+        off = run(W.made[REFINE], S, W, 0.0, f, gamma, x, lam)
+        wide = larger(wide, W.flat[ROW_SIZE].real)
+        size = larger(size, W.flat[LOAD_SIZE].real)
+        worst = larger(off / wide, W.flat[LOAD_RESIDUAL].real / size)
         if not worst > W.options.solve_tolerance or worst > STALLED * last:
             break
         last = worst
@@ -219,11 +226,12 @@ def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
     pass_schur(S, W, rhs, x, lam, semidefinite)
     worst = 0.0
     last = 1e300
+    wide = size = 1e-300
     for _ in range(refinements):
-        if lam.shape[0] > 0:
-            worst = residual(S, W, gamma, x)
-        if semidefinite:
-            worst = larger(worst, excess(S, W.velocities.scratch_1, rhs, x))
+        off, row_size, short, load_size = remainder_schur(S, W, gamma, x, rhs, semidefinite)
+        wide = larger(wide, row_size)
+        size = larger(size, load_size)
+        worst = larger(off / wide, short / size)
         if not worst > W.options.solve_tolerance or worst > STALLED * last:
             break
         last = worst
@@ -263,12 +271,16 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
     """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving."""
     rhs = W.velocities.scratch_2
     worst, last = 1.0, 1e300
+    wide = size = 1e-300
     for d in range(x.shape[0]):
         rhs[d] = 0.0
     if loaded:
-        remainder(S, W, f, gamma, x, lam, rhs, loaded)
+        remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded)
     for attempt in range(refinements):
-        worst = pass_coupled(S, W, f, gamma, x, lam, rhs, loaded)
+        off, row_size, short, load_size = pass_coupled(S, W, f, gamma, x, lam, rhs, loaded)
+        wide = larger(wide, row_size)
+        size = larger(size, load_size)
+        worst = larger(off / wide, short / size)
         if not worst > W.options.solve_tolerance or (attempt > 0 and worst > STALLED * last):
             break
         last = worst
@@ -277,7 +289,7 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
 
 @formula
 def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
-    """Add to x and lam one solve for what is left of both lines; what is left then, and its size."""
+    """Add to x and lam one solve for what is left of both lines; returns what `remainder_coupled` does."""
     z = W.D[2]
     nv = x.shape[0]
     for d in range(nv):
@@ -289,12 +301,22 @@ def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
         x[d] += z[S.ldl.perm[d]]
     for k in range(lam.shape[0]):
         lam[k] -= z[S.ldl.perm[nv + k]]
-    return remainder(S, W, f, gamma, x, lam, rhs, loaded)
+    return remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded)
+
+
+@formula
+def remainder_schur(S, W, gamma, x, rhs, semidefinite):
+    """What a pass through S leaves of both lines, in the form of `remainder_coupled`."""
+    off, wide = residual(S, W, gamma, x)
+    short, size = 0.0, 1e-300
+    if semidefinite:
+        short, size = excess(S, W.velocities.scratch_1, rhs, x)
+    return off, wide, short, size
 
 
 @formula
 def residual(S, W, gamma, x):
-    """R = gamma - G x into `W.rows.scratch_1`; returns its largest entry relative to what was subtracted."""
+    """R = gamma - G x into `W.rows.scratch_1`; returns its largest entry and the largest sum of its terms' sizes."""
     worst = 0.0
     size = 1e-300
     for k in range(gamma.shape[0]):
@@ -307,15 +329,15 @@ def residual(S, W, gamma, x):
         W.rows.scratch_1[k] = s
         worst = larger(worst, magnitude(s))
         size = larger(size, a)
-    return worst / size
+    return worst, size
 
 
 @formula
-def remainder(S, W, f, gamma, x, lam, rhs, loaded):
+def remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded):
     """Both lines of the coupled equations: gamma - G x into `W.rows.scratch_1`, f - M x + G^T lam into rhs.
 
-    Returns the largest entry of either relative to its terms. What is left in the lines of prescribed velocities is
-    what their drivers have to do: it goes to `W.velocities.effort`.
+    Returns the largest entry and the size of the terms, of the first line and of the second. What is left in the lines
+    of prescribed velocities is what their drivers have to do: it goes to `W.velocities.effort`.
     """
     size = 1e-300
     for d in range(x.shape[0]):
@@ -352,12 +374,12 @@ def remainder(S, W, f, gamma, x, lam, rhs, loaded):
     worst = 0.0
     for d in range(x.shape[0]):
         worst = larger(worst, magnitude(rhs[d]))
-    return larger(worst / size, off / wide)
+    return off, wide, worst, size
 
 
 @formula
 def excess(S, dx, rhs, x):
-    """Rhs = E dx: what the regularised mass of the last step has to give back. Returns its size relative to M x."""
+    """Rhs = E dx: what the regularised mass of the last step has to give back. Returns its size and that of M x."""
     worst = 0.0
     size = 1e-300
     for b in range(S.tree.parent.shape[0]):
@@ -376,4 +398,4 @@ def excess(S, dx, rhs, x):
             rhs[v0 + i] = S.bodies.excess_mass[b] * dx[v0 + i]
             worst = larger(worst, magnitude(rhs[v0 + i]) * S.scales.length)
             size = larger(size, S.bodies.mass[b] * magnitude(x[v0 + i]) * S.scales.length)
-    return worst / size
+    return worst, size

@@ -21,6 +21,8 @@ from ..numerics.integrators.clock import AT_END, AT_START, FROM, FROM_RATE, TO, 
 from ..tables.system import (
     ALONG,
     BETWEEN,
+    LAW_INPUT,
+    LAW_INPUT_RATE,
     RATE,
     SAMPLED,
     SLIDING,
@@ -246,7 +248,7 @@ def sample(S, W, k, law, t, h, x, seen):
         return evaluate_jet(S.code, S.const, law, W.stack, s, seen, BY_TIME)[2]
     a, b = between(seen, nm + k // LAWS, x, h)
     if made != 0:
-        W.flat[2], W.flat[3] = a, b
+        W.flat[LAW_INPUT], W.flat[LAW_INPUT_RATE] = a, b
         return run(S.flat[made + k], S, W, s, seen[WITHIN], seen[WITHIN], seen[WITHIN], seen[WITHIN])
     return evaluate(S.code, S.const, law, W.stack, (s, a, b), seen)
 

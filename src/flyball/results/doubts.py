@@ -212,7 +212,7 @@ def _rest(x: Ledger) -> float:
     rows have them.
     """
     length, t = x.result.values.length, x.result.t
-    rounding = 1e-12 * (float(np.abs(x.stored[0] + x.stored[1]).max(initial=0.0)) + x.weight * length)
+    rounding = 1e-11 * (float(np.abs(x.stored[0] + x.stored[1]).max(initial=0.0)) + x.weight * length)
     least = rounding + float(x.mass.sum()) * (AT_REST * length) ** 2
     span = float(np.ptp(t)) if len(t) else 0.0
     if not x.works or not span > 0.0:

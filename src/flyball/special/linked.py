@@ -13,8 +13,7 @@ from ..graph.operations import MULTIPLY, NUMBER, SYMBOL
 from ..graph.printers.llvm import Place, Procedure
 from ..graph.printers.llvm_order import operations
 from ..graph.printers.llvm_spline import Head, asked, head
-from ..tables.system import ARTICULATED, FLAT
-from .recorder import FIRST_FREE
+from ..tables.system import ARTICULATED, FIRST_FREE, FLAT
 from .stages import Stages
 
 BEFORE: dict[str, tuple[str, ...]] = {

@@ -23,9 +23,6 @@ SOLVES = (
     "REFINE",
     "DRIFT",
 )  # best in the order in which they are made
-FIRST_FREE = 4  # of Work.flat: some entries have a meaning of their own
-TERMS, LOADED, INPUT, INPUT_RATE = range(4)
-"""The size of the terms that `DRIFT` has met; whether the solve that goes on is loaded; what a law depends on."""
 
 
 def symbols(S: System, graph: Graph, known: Sequence[tuple[str, int]] = ()) -> tuple[System, dict[int, Place]]:

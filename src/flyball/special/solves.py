@@ -9,15 +9,28 @@ import numpy as np
 from ..equations.articulated import articulated_solve
 from ..equations.projection import drift
 from ..equations.rows import row_times
-from ..equations.solve import excess, factor, inverse_mass, pass_coupled, pass_schur, remainder, residual, turn_rows
+from ..equations.solve import (
+    factor,
+    inverse_mass,
+    pass_coupled,
+    pass_schur,
+    remainder_coupled,
+    remainder_schur,
+    turn_rows,
+)
 from ..graph.printers.llvm import Place
-from ..math.scalar import choose, larger
+from ..math.scalar import choose
 from ..tables.system import (
     ARTICULATED,
     COUPLED,
+    LOAD_RESIDUAL,
+    LOAD_SIZE,
+    LOADED,
+    ROW_SIZE,
     SCHUR,
+    TERMS,
 )
-from .recorder import LOADED, TERMS, Recorder
+from .recorder import Recorder
 
 
 class Solves(Recorder):
@@ -64,7 +77,7 @@ class Solves(Recorder):
                 inverse_mass(S, b, f, S.tree.v[b], x, S.tree.v[b])
             W.rows.scratch_1[:] = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]
         elif S.sizes.solver == COUPLED and is_loaded:
-            remainder(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
+            remainder_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
         elif S.sizes.solver == ARTICULATED:
             articulated_solve(S, W, f, x, W.velocities.effort)
         stores = [*self.solution(x, lam), (("W_flat", LOADED), 1.0 if is_loaded else 0.0)]
@@ -88,14 +101,6 @@ class Solves(Recorder):
         """Whether something stands in for missing masses."""
         return bool(self.S.scales.semidefinite > 0.0)
 
-    def schur_left(self, gamma: np.ndarray, x: np.ndarray) -> Any:
-        """What is left after a pass, and its size."""
-        S, W = self.S, self.W
-        worst = residual(S, W, gamma, x) if self.nr else 0.0
-        return (
-            larger(worst, excess(S, W.velocities.scratch_1, W.velocities.scratch_2, x)) if self.semidefinite else worst
-        )
-
     def refined(self, reads: dict[int, Place]) -> None:
         """A pass for what is left."""
         S, W = self.S, self.W
@@ -108,13 +113,14 @@ class Solves(Recorder):
         x, lam = x.copy(), lam.copy()
         if S.sizes.solver == SCHUR:
             pass_schur(S, W, W.velocities.scratch_2, x, lam, self.semidefinite)
-            worst = self.schur_left(gamma, x)
+            off, *sizes = remainder_schur(S, W, gamma, x, W.velocities.scratch_2, self.semidefinite)
         else:
             is_loaded = self.graph.symbol("loaded")
             reads[is_loaded.index] = ("W_flat", LOADED)
             f = np.array([choose(is_loaded, y, 0.0) for y in f] or [0.0], object)[: self.nv]
-            worst = pass_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
-        self.add("REFINE", reads, self.solution(x, lam), worst)
+            off, *sizes = pass_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
+        places = [("W_flat", k) for k in (ROW_SIZE, LOAD_RESIDUAL, LOAD_SIZE)]
+        self.add("REFINE", reads, self.solution(x, lam) + list(zip(places, sizes, strict=True)), off)
 
     def drifted(self) -> None:
         """What is missing of the velocities' constraints."""

@@ -25,13 +25,13 @@ from ..laws.manner import brief
 from ..tables.specs import Structure
 from ..tables.system import (
     BIAS,
+    LAW_INPUT,
     LOAD,
     RATE,
     VALUE,
     System,
     Work,
 )
-from .recorder import INPUT
 from .solves import Solves
 
 
@@ -193,6 +193,6 @@ class Stages(Solves):
             else:
                 value = evaluate_jet(S.code, S.const, law, W.stack, self.t, sensed, BY_TIME)[2]
             reads = {**self.time, **self.given("a", values)}
-            reads |= {x.index: ("W_flat", INPUT + n) for n, x in enumerate(inputs[1:])}
+            reads |= {x.index: ("W_flat", LAW_INPUT + n) for n, x in enumerate(inputs[1:])}
             self.laws[k] = f"LAW{k}"
             self.add(self.laws[k], reads, [], value)
