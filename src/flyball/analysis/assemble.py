@@ -11,7 +11,6 @@ from collections.abc import Mapping
 
 from ..model.model import Model
 from .assembly.start import Assembly, assembled
-from .freedom.contradiction import story
 
 
 def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | None = None) -> Assembly:
@@ -35,4 +34,6 @@ def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | 
         If no closed position, or no consistent velocity, is found; the message names the joints that disagree, by how
         much, and why.
     """
+    from .freedom.contradiction import story  # mobility stands on assembly
+
     return assembled(model, t=t, parameters=parameters, why=story)

@@ -27,7 +27,6 @@ from .linear.search import LONGEST, descent, failure, newton, pushed
 from .linear.spectrum import spectrum
 from .linear.stability import by_eigenvalues, stability
 from .linear.turning import turning as turn
-from .linearize import LinearizeOptions, small_motions, without_inputs
 from .motion.start import begin as begin_motion
 from .options import Options
 from .resting.rest import rest
@@ -103,6 +102,8 @@ def _controlled(model: Model, o: EquilibriumOptions) -> Equilibrium:
     at = dict(zip((x.name for x in c.structure.controls), z, strict=False))
     q, way = found_rest(model.snapshot(), c, a.t, begin.q, at)
     out = finished(Rest.at(c, a.t, q), {}, way)
+    from .linearize import LinearizeOptions, small_motions  # linear models stand on statics
+
     linear, out.stability = small_motions(model, LinearizeOptions(about=out, **ABOUT))
     out.judged_by = MULTIPLIERS if linear.period else EIGENVALUES
     return out
@@ -174,6 +175,8 @@ def _far(x: Rest, y: Rest) -> bool:
 
 def _steady(a: Assembly, described: Assembly, names: Sequence[str]) -> Equilibrium:
     """A steady motion; its stability by its eigenvalues, of which those of the turning itself are zero."""
+    from .linearize import without_inputs
+
     c = a.compiled
     found = turn(a, described, names, c.parameters)
     x = found.state

@@ -29,7 +29,6 @@ from ...tables.system import (
 )
 from ...tables.values import Values, values
 from ..compiled import Compiled
-from ..motion.reasons import broken_force, no_solution
 from .loads import STEP, as_complex, by_reactions, complex_tables, derivative
 
 CHUNK = 128  # directions a call
@@ -58,6 +57,8 @@ class State:
             If they give none.
         """
         if c.at(t, q, v, MOTION)[0] != 0:
+            from ..motion.reasons import no_solution  # simulation stands on derivatives
+
             raise AnalysisError(f"{c.structure.model.name!r} at t = {t:.6g} s, {no_solution(c, t, abs(t))}")
         W = c.work
         return cls(
@@ -167,6 +168,8 @@ class Equations:
 
     def _not_finite(self, stack: np.ndarray) -> AnalysisError:
         """The error that names what is no number; ``stack`` is the laws' scratch."""
+        from ..motion.reasons import broken_force
+
         x = self.state
         x.c.at(x.t, x.q, x.v, MOTION)
         missed = x.c.structure.missed(stack)
