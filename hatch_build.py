@@ -32,9 +32,9 @@ class ObjectsHook(BuildHookInterface):
         if not wanted or version == "editable":
             return
         sys.path.insert(0, str(ROOT / "src"))
-        from flyball.compiler.ahead import all_kernels, compile_all
-        from flyball.compiler.machine import baselines
-        from flyball.compiler.store import file_name
+        from flyball.compiler.ahead_of_time import all_kernels, compile_all
+        from flyball.compiler.object_code import baselines
+        from flyball.compiler.object_code import file_name
 
         cpus = baselines() if wanted == "1" else tuple(wanted.split(","))
         folder = ROOT / "build" / "objects"  # what is there of the same sources is taken

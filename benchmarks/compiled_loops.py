@@ -11,14 +11,20 @@ import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 
 from flyball.compiler.kernels import kernel
-from flyball.compiler.layout import Float1
-from flyball.equations.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivative, prepare, remember, settle
-from flyball.equations.solve import REFINEMENTS, factor, solve
-from flyball.equations.tree import retract
-from flyball.tables.system import (
-    System,
-    Work,
+from flyball.compiler.struct_layout import Float1
+from flyball.engine.kinematics import retract
+from flyball.engine.motion import (
+    STAGES,
+    TIGHT_G,
+    TIGHT_V,
+    derivative,
+    project_and_evaluate,
+    project_state,
+    remember,
+    set_prescribed,
 )
+from flyball.engine.solve import MAX_REFINEMENTS, factor, solve
+from flyball.tables.table_definitions import System, Work
 
 RIGHT_HAND_SIDE, KINEMATICS, REACTIONS = range(3)
 
@@ -45,14 +51,14 @@ def follow(S: System, W: Work, times: Float1, y: Float1, dy: Float1, task: int) 
                     v[d] += h * a[d]
                 retract(S, q, step)
             if task == REACTIONS:
-                status = arrive(times[k], y, dy, S, W)[0]
+                status = project_and_evaluate(times[k], y, dy, S, W)[0]
             else:
-                prepare(S, W, times[k], q, v)
-                status, _, factored = settle(S, W, times[k], q, v, z, TIGHT_G * S.scales.length, TIGHT_V)
+                set_prescribed(S, W, times[k], q, v)
+                status, _, factored = project_state(S, W, times[k], q, v, z, TIGHT_G * S.scales.length, TIGHT_V)
                 remember(S, W, z)
                 if not factored:
                     factor(S, W)
-                solve(S, W, W.velocities.applied, W.rows.gamma, a, W.rows.multiplier, False, REFINEMENTS)
+                solve(S, W, W.velocities.applied, W.rows.gamma, a, W.rows.multiplier, False, MAX_REFINEMENTS)
         if status != 0:
             return status
     return 0

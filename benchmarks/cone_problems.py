@@ -8,10 +8,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from flyball.numerics.cone.gauss_seidel import gauss_seidel
-from flyball.numerics.cone.problem import Problem
-from flyball.numerics.cone.rooms import rooms, unfilled
-from flyball.numerics.cone.solve import solve
+from flyball.numerics.complementarity.contact_problem import (
+    ContactProblem,
+    allocate_solver,
+    empty_problem,
+    solve_contacts,
+)
+from flyball.numerics.complementarity.gauss_seidel import gauss_seidel
 
 STEP, GRAVITY = 5e-3, 9.81
 RADIUS, DENSITY = 0.1, 1000.0
@@ -25,10 +28,10 @@ def frames(normals: np.ndarray) -> np.ndarray:
     return np.hstack([normals, t, np.cross(normals, t)])
 
 
-def stack(masses: list[float]) -> tuple[Problem, np.ndarray, np.ndarray]:
+def stack(masses: list[float]) -> tuple[ContactProblem, np.ndarray, np.ndarray]:
     """Cubes of 1 m on one another; problem, velocities of nodes, of groups."""
     n = len(masses)
-    P = unfilled(4 * n, n)
+    P = empty_problem(4 * n, n)
     for i, m in enumerate(masses):
         P.node[i] = 1 / m, *[6 / m] * 3, 0, 0, 0, 1
         for k, (x, y) in enumerate(((-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5))):
@@ -55,10 +58,10 @@ def touching(x: np.ndarray, half: float, reach: float) -> tuple[np.ndarray, np.n
     return np.vstack(at), np.vstack(normal), np.concatenate(gap)
 
 
-def balls(x: np.ndarray, half: float) -> tuple[Problem, np.ndarray]:
+def balls(x: np.ndarray, half: float) -> tuple[ContactProblem, np.ndarray]:
     """The contacts of balls at these places, and their gaps."""
     at, normal, gap = touching(x, half, 0.02 * RADIUS)
-    P = unfilled(len(at), len(x))
+    P = empty_problem(len(at), len(x))
     m = DENSITY * 4 / 3 * np.pi * RADIUS**3
     P.node[:] = 1 / m, *[1 / (0.4 * m * RADIUS**2)] * 3, 0, 0, 0, 1
     P.at[:], P.frame[:], P.mu[:] = at, frames(normal), 0.3
@@ -67,7 +70,7 @@ def balls(x: np.ndarray, half: float) -> tuple[Problem, np.ndarray]:
     return P, gap
 
 
-def pile(count: int = 1000, time: float = 1.5) -> tuple[Problem, np.ndarray, np.ndarray]:
+def pile(count: int = 1000, time: float = 1.5) -> tuple[ContactProblem, np.ndarray, np.ndarray]:
     """Balls let fall into a box: velocities first, overlaps by a second solve without friction."""
     side = round(count ** (1 / 3))
     pitch, rng = 2.2 * RADIUS, np.random.default_rng(0)
@@ -77,19 +80,19 @@ def pile(count: int = 1000, time: float = 1.5) -> tuple[Problem, np.ndarray, np.
     half, v, known = 0.5 * pitch * side + 0.01, np.zeros((count, 8)), (np.zeros(0, int), np.zeros((0, 3)))
     for _ in range(round(time / STEP)):
         P, gap = balls(x, half)
-        X, W, O, F = rooms(P)
+        X, W, O, F = allocate_solver(P)
         v[:, 2] -= STEP * GRAVITY
         key = (P.at[:, 0] + 1) * 6 * count + P.at[:, 1] * 6 + np.argmax(P.frame[:, :3], 1) * (P.at[:, 0] < 0)
         known = warm(X.p, P.frame, key, known)
         X.v[:], O.count.most, O.real.enough, O.count.coulomb = v, 50, 1e-4, 1
-        solve(gauss_seidel, P, X, W, O, F)
+        solve_contacts(gauss_seidel, P, X, W, O, F)
         v, known = X.v.copy(), (key, world(X.p, P.frame))
-        moved = rooms(P)[0]
+        moved = allocate_solver(P)[0]
         i, j = P.at[:, 0], P.at[:, 1]
         rate = ((v[j, :3] - v[i, :3] * (i >= 0)[:, None]) * P.frame[:, :3]).sum(1)
         P.bias[:, 0], P.mu[:] = gap / STEP + rate, 0.0
         O.count.coulomb = 0
-        solve(gauss_seidel, P, moved, W, O, F)
+        solve_contacts(gauss_seidel, P, moved, W, O, F)
         x += STEP * (v[:, :3] + moved.v[:, :3])
     P, _ = balls(x, half)
     v[:, 2] -= STEP * GRAVITY
@@ -112,7 +115,7 @@ def warm(p: np.ndarray, frame: np.ndarray, key: np.ndarray, known: tuple[np.ndar
     return known
 
 
-def chain(links: int = 20, tip: float = 100.0) -> tuple[Problem, np.ndarray, np.ndarray]:
+def chain(links: int = 20, tip: float = 100.0) -> tuple[ContactProblem, np.ndarray, np.ndarray]:
     """Rods of 1 kg and 1 m by spherical joints, zigzag, ends on the ground; the last weighs ``tip`` times as much."""
     n = 6 * links
     mass = np.ones(links)
@@ -135,7 +138,7 @@ def chain(links: int = 20, tip: float = 100.0) -> tuple[Problem, np.ndarray, np.
 
     G = np.vstack([point(i, along[i] / 2) - point(i + 1, -along[i + 1] / 2) for i in range(links - 1)])
     inverse -= inverse @ G.T @ np.linalg.solve(G @ inverse @ G.T, G @ inverse)
-    P = unfilled(2 * links, 0, 1, 0, 2 * links * 3 * n)
+    P = empty_problem(2 * links, 0, 1, 0, 2 * links * 3 * n)
     P.group[1] = n
     q = np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]])
     for c in range(2 * links):

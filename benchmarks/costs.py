@@ -1,4 +1,4 @@
-"""The weights of ``flyball.tables.cost``: fitted to the time of a stage of the integration in both coordinate layers.
+"""The weights of ``flyball.tables.coordinate_choice``: fitted to the time of a stage of the integration in both coordinate layers.
 
 Prints measured and estimated microseconds a stage, which layer is faster, which one the estimate takes, and the fitted
 weights. Usage: ``python costs.py [--fit]``.
@@ -42,27 +42,27 @@ def cases() -> Iterator[tuple[str, Any]]:
 
 def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], Any]:
     """(microseconds a stage, counts, start) of one mechanism."""
-    from flyball.analysis.motion.options import projected
-    from flyball.analysis.motion.start import begin
-    from flyball.analysis.progress import unwatched
-    from flyball.analysis.simulate import clock_for, run_clock
-    from flyball.equations.engine import INTEGRATE
-    from flyball.numerics.integrators.tableaux import tableau
-    from flyball.tables.cost import counts
+    from flyball.engine.entry_point import INTEGRATE
+    from flyball.numerics.integrators.butcher_tableaux import tableau
+    from flyball.progress import no_progress
+    from flyball.simulation.initial_state import find_initial_state
+    from flyball.simulation.integration_options import default_integration
+    from flyball.simulation.simulate import clock_for, run_clock
+    from flyball.tables.coordinate_choice import work_counts
 
     model = model.snapshot()
-    start = begin(model, 0.0, None, None, coordinates)
-    options = projected(coordinates, 1e-7, 1e-9, STEPS)
+    start = find_initial_state(model, 0.0, None, None, coordinates)
+    options = default_integration(coordinates, 1e-7, 1e-9, STEPS)
     found = []
     spent = 0.0
     while spent < CPU or len(found) < 3:
         clock = clock_for(start, 0.0, 10.0, np.array([10.0]), options)
         begun = time.process_time()
-        run_clock(start.assembly, clock, tableau("dop853"), unwatched, INTEGRATE)
+        run_clock(start.assembly, clock, tableau("dop853"), no_progress, INTEGRATE)
         seconds = time.process_time() - begun
         spent += seconds
         found.append(seconds / (clock.count.accepted + clock.count.rejected) / STAGES)
-    return 1e6 * float(np.median(found)), counts(start.assembly.compiled.structure), start
+    return 1e6 * float(np.median(found)), work_counts(start.assembly.compiled.structure), start
 
 
 def measure() -> list[dict[str, Any]]:
@@ -119,9 +119,9 @@ def main() -> None:
         print({k: round(v, 1) for k, v in weights.items()})
         compare(rows, lambda n: sum(weights[k] * n[k] for k in n))
     else:
-        from flyball.tables.cost import estimate
+        from flyball.tables.coordinate_choice import estimated_time
 
-        compare(rows, estimate)
+        compare(rows, estimated_time)
 
 
 if __name__ == "__main__":

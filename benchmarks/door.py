@@ -24,10 +24,10 @@ from tests.program.test_engine import classical_kernel, desk
 import flyball as fb
 from flyball.compiler.formulas import formula
 from flyball.compiler.kernels import kernel
-from flyball.equations.engine import MOTION, engine, motion_kernel
-from flyball.equations.motion import derivative
-from flyball.numerics.integrators.clock import Clock
-from flyball.tables.system import System, Work
+from flyball.engine.entry_point import MOTION, engine, run_task
+from flyball.engine.motion import derivative
+from flyball.numerics.integrators.time_loop import StepState
+from flyball.tables.table_definitions import System, Work
 
 CALLS = 100_000
 
@@ -40,7 +40,7 @@ def again(S, W, clock, n):
 
 
 @kernel
-def contained_kernel(S: System, W: Work, clock: Clock, n: int) -> None:
+def contained_kernel(S: System, W: Work, clock: StepState, n: int) -> None:
     again(S, W, clock, n)
 
 
@@ -54,7 +54,7 @@ def spent(work) -> float:
 def main() -> None:
     began = time.process_time()
     _, S, W, R, clock, sheet = desk(fb.load("examples/andrews.toml"), "absolute")  # assembling asks the engine
-    motion_kernel(S, W, R, clock, sheet.rows, MOTION)
+    run_task(S, W, R, clock, sheet.rows, MOTION)
     print(f"engine compiled and called   {time.process_time() - began:8.2f} s")
     address = engine.address
     loop = lambda n: classical_kernel(address, S, W, R, clock, sheet, 1e-9, n)  # noqa: E731

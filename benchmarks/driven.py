@@ -15,7 +15,7 @@ import numpy as np
 from compiled_loops import KINEMATICS, REACTIONS, clock
 
 import flyball as fb
-from flyball.equations.engine import FOLLOW
+from flyball.engine.entry_point import FOLLOW
 from mechanisms import GRAVITY, Kernel, example, simulate, started
 
 T_END, OUTPUTS, REPEATS = 10.0, 501, 7

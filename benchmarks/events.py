@@ -18,7 +18,7 @@ from typing import Any
 
 import flyball as fb
 import mechanisms
-from flyball.analysis.motion.events import run as eventful
+from flyball.simulation.events import event_loop as eventful
 
 EXAMPLES = {
     "bouncing_ball.toml": 4.0,
@@ -78,7 +78,7 @@ def decided(name: str, seconds: float, rounds: int) -> tuple[float, float, int]:
     """CPU seconds of a whole call and of one instant in it, the least of some rounds; how many instants there are."""
     m = mechanisms.example(name)
     m.simulate(seconds, outputs=2)
-    happen, spent = eventful.happen, [0.0, 0.0]
+    happen, spent = eventful.resolve_event, [0.0, 0.0]
 
     def timed(*given: Any) -> None:
         begun = time.process_time()
@@ -87,7 +87,7 @@ def decided(name: str, seconds: float, rounds: int) -> tuple[float, float, int]:
         spent[1] += 1.0
 
     call, one = 1e9, 1e9
-    eventful.happen = timed
+    eventful.resolve_event = timed
     try:
         for _ in range(rounds):
             spent[:] = 0.0, 0.0
@@ -95,7 +95,7 @@ def decided(name: str, seconds: float, rounds: int) -> tuple[float, float, int]:
             m.simulate(seconds, outputs=2)
             call, one = min(call, time.process_time() - begun), min(one, spent[0] / max(spent[1], 1.0))
     finally:
-        eventful.happen = happen
+        eventful.resolve_event = happen
     return call, one, int(spent[1])
 
 

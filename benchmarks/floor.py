@@ -120,10 +120,10 @@ def objects(a: np.ndarray) -> np.ndarray:
 
 def scope() -> dict[str, Any]:
     """The formulas that the parts call, by name."""
-    from flyball.equations import dispatch, kinematics, loads, motion, solve
+    from flyball.engine import element_dispatch, kinematics, loads, motion, solve
 
     names = {}
-    for module in (dispatch, kinematics, loads, motion, solve):
+    for module in (element_dispatch, kinematics, loads, motion, solve):
         names |= {k: v for k, v in vars(module).items() if callable(v)}
     return names
 
@@ -168,7 +168,7 @@ def compiled_loop(part: str) -> Callable:
     """A part again and again, compiled as the kernels are."""
     if part not in _loops:
         from flyball.compiler.kernels import kernel
-        from flyball.tables.system import System, Work
+        from flyball.tables.table_definitions import System, Work
 
         names = scope() | {"System": System, "Work": Work}
         arrays = ", ".join(f"{x}: Float1" for x in ("y", "q", "v", "z", "dy"))
@@ -222,16 +222,16 @@ def mechanisms() -> dict[str, Any]:
 
 
 def main() -> None:
-    from flyball.analysis.motion.start import begin
-    from flyball.equations.engine import MOTION
-    from flyball.equations.motion import STAGES
+    from flyball.engine.entry_point import MOTION
+    from flyball.engine.motion import STAGES
+    from flyball.simulation.initial_state import find_initial_state
 
     per_ns = rate()
     print(f"compiled scalar code at its best: {per_ns:.1f} operations a nanosecond\n")
     found = []
     for name, model in mechanisms().items():
         for layer in ("absolute", "joint"):
-            start = begin(model.snapshot(), 0.0, None, None, layer)
+            start = find_initial_state(model.snapshot(), 0.0, None, None, layer)
             c = start.assembly.compiled
             c.at(0.0, start.assembly.q, start.assembly.v, MOTION)
             S, W = c.values.system, c.work

@@ -9,12 +9,11 @@ import contact_scenes as cs
 import numpy as np
 
 import flyball as fb
-from flyball.analysis.assemble import assemble
-from flyball.analysis.motion.impulse.parts import parts
-from flyball.analysis.motion.impulse.scene import begin, placed
-from flyball.contact.tables import FOUND, GAP
-from flyball.stepping.tables import WORST_OVERLAP
-from flyball.tables.contact import touching
+from flyball.assembly.assemble import assemble
+from flyball.collision.tables import FOUND, GAP
+from flyball.simulation.impulse_stepping.setup import make_stepper, movers_of_assembly, partition_bodies
+from flyball.simulation.impulse_stepping.stepping_tables import WORST_OVERLAP
+from flyball.tables.contact_tables import contact_tables
 
 
 def shape(kind: str) -> Any:
@@ -77,10 +76,10 @@ class Run:
         model = model.snapshot()
         base = assemble(model, t=0.0)
         values = base.compiled.values
-        found = parts(model, values)
-        scene = touching(model, values.given, (*found.free, *found.held))
+        found = partition_bodies(model, values)
+        scene = contact_tables(model, values.given, (*found.free, *found.held))
         self.scene = scene
-        self.stepper = begin(scene, placed(scene, base), values, options)
+        self.stepper = make_stepper(scene, movers_of_assembly(scene, base), values, options)
 
     def step(self) -> float:
         """One step; its CPU seconds."""
@@ -92,7 +91,7 @@ class Run:
         """Contacts, deepest overlap now and ever [mm], kinetic energy [J]."""
         s = self.stepper
         C, _ = s.last()
-        v, m = s.rooms.X.v, self.scene.carriers.mass
+        v, m = s.workspaces.X.v, self.scene.carriers.mass
         R = s.movers.pose[:, 3:].reshape(-1, 3, 3)
         w = np.einsum("bij,bi->bj", R, v[:, 3:6])
         kinetic = 0.5 * m @ (v[:, :3] ** 2).sum(axis=1) + 0.5 * np.einsum(

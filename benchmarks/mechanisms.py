@@ -21,12 +21,12 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
-from flyball.analysis.motion.options import MOST, projected
-from flyball.analysis.motion.start import begin
-from flyball.analysis.progress import unwatched
-from flyball.analysis.simulate import clock_for, run_clock
-from flyball.equations.engine import INTEGRATE
-from flyball.numerics.integrators.tableaux import tableau
+from flyball.engine.entry_point import INTEGRATE
+from flyball.numerics.integrators.butcher_tableaux import tableau
+from flyball.progress import no_progress
+from flyball.simulation.initial_state import find_initial_state
+from flyball.simulation.integration_options import MOST_STEPS, default_integration
+from flyball.simulation.simulate import clock_for, run_clock
 
 GRAVITY = 9.81
 ROD = 1.0 / 12.0  # moment of inertia of a uniform rod of 1 m and 1 kg [kg m^2]
@@ -43,7 +43,7 @@ def simulate(model: fb.Mechanism, t_end: float, *, coordinates: str = "auto", **
 
 def started(model: fb.Mechanism, coordinates: str = "auto") -> tuple[Any, Any]:
     """(compiled mechanism, state at the start) in the coordinates asked for."""
-    start = begin(model.snapshot(), 0.0, None, None, coordinates)
+    start = find_initial_state(model.snapshot(), 0.0, None, None, coordinates)
     return start.assembly.compiled, start.y
 
 
@@ -57,9 +57,9 @@ class Kernel:
     def __init__(
         self, model: fb.Mechanism, t_end: float, outputs: int, *, task: int = INTEGRATE, **options: Any
     ) -> None:
-        o = {"method": "dop853", "coordinates": "auto", "rtol": RTOL, "atol": None, "max_steps": MOST} | options
-        self.start = begin(model.snapshot(), 0.0, None, None, o["coordinates"])
-        made = projected(o["coordinates"], o["rtol"], o["atol"], o["max_steps"])
+        o = {"method": "dop853", "coordinates": "auto", "rtol": RTOL, "atol": None, "max_steps": MOST_STEPS} | options
+        self.start = find_initial_state(model.snapshot(), 0.0, None, None, o["coordinates"])
+        made = default_integration(o["coordinates"], o["rtol"], o["atol"], o["max_steps"])
         self.asked = replace(made, method=o["method"]).sized(self.start.base.compiled.values.length)
         self.times, self.task = np.linspace(0.0, t_end, outputs), task
 
@@ -68,7 +68,7 @@ class Kernel:
         clock = clock_for(self.start, 0.0, self.times[-1], self.times, self.asked)
         method = tableau(self.asked.method)
         begun = time.process_time()
-        run_clock(self.start.assembly, clock, method, unwatched, self.task)
+        run_clock(self.start.assembly, clock, method, no_progress, self.task)
         return time.process_time() - begun
 
 

@@ -18,7 +18,7 @@ import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 
 import flyball as fb
-from flyball.tables.cost import counts
+from flyball.tables.coordinate_choice import work_counts
 from flyball.tables.structure import structure
 
 T_END = 0.3
@@ -99,7 +99,7 @@ def motion(m: fb.Mechanism, t_end: float) -> tuple[float, fb.Result]:
 def row(build: Callable[[int, bool], fb.Mechanism], n: int, planar: bool, last: dict[str, Any]) -> dict[str, Any]:
     """Figures of one net; ``last``: those of the smaller one."""
     begin = time.process_time()
-    work = counts(structure(build(n, planar)))
+    work = work_counts(structure(build(n, planar)))
     made = time.process_time() - begin
     m = build(n, planar)
     start, _ = motion(m, 1e-9)

@@ -9,13 +9,11 @@ import time
 
 import numpy as np
 
-from flyball.compiler.formulas import call, formula
-from flyball.compiler.kernels import kernel
-from flyball.contact.broad.desk import AFRESH_SO_FAR, REMADE, Search
-from flyball.contact.broad.search import AFRESH, STEP
-from flyball.contact.finder import Finder, no_movers
-from flyball.contact.kinds import PLANE, SPHERE
-from flyball.contact.tables import (
+from flyball.collision.broad_phase.workspace import ENVELOPES_RENEWED, REBUILDS, Search
+from flyball.collision.contact_finder import ContactFinder, no_movers
+from flyball.collision.contact_search import REBUILD, STEP
+from flyball.collision.shape_kinds import PLANE, SPHERE
+from flyball.collision.tables import (  # fmt: skip
     AXES,
     FOUND,
     GAP,
@@ -30,7 +28,9 @@ from flyball.contact.tables import (
     Contacts,
     Geometry,
     Movers,
-)  # fmt: skip
+)
+from flyball.compiler.formulas import call, formula
+from flyball.compiler.kernels import kernel
 
 R, H, MARGIN = 0.1, 5e-3, 2e-3
 
@@ -115,14 +115,14 @@ def main():
     print("spheres  pairs  contacts  step ms  all pairs ms  made anew a step")
     for n in map(int, sys.argv[1:] or ["1000", "4000", "16000"]):
         G, M = box_of_spheres(n)
-        F = Finder(G, margin=MARGIN, ahead=H)
+        F = ContactFinder(G, margin=MARGIN, ahead=H)
         pour(F, G, M, 40)
         M.twist[:, :3] = 5e-3 * np.random.default_rng(1).standard_normal((n, 3))
         F.find(M)
-        everything = timed(F, M, AFRESH, runs=3, steps=4)
-        made, afresh = F.search.count[REMADE], F.search.count[AFRESH_SO_FAR]
+        everything = timed(F, M, REBUILD, runs=3, steps=4)
+        made, afresh = F.search.count[ENVELOPES_RENEWED], F.search.count[REBUILDS]
         step = timed(F, M, STEP)
-        made, afresh = F.search.count[REMADE] - made, F.search.count[AFRESH_SO_FAR] - afresh
+        made, afresh = F.search.count[ENVELOPES_RENEWED] - made, F.search.count[REBUILDS] - afresh
         print(
             f"{n:7d} {F.now.count[PAIRS]:6d} {F.now.count[FOUND]:9d} {step:8.3f} {everything:13.3f} "
             f"{made / 100:8.1f} ({afresh} times all)"

@@ -17,17 +17,20 @@ import contest
 import numpy as np
 
 import flyball as fb
-from flyball.analysis.linear.begun import start_changes
-from flyball.analysis.linear.carried import carried
-from flyball.analysis.linear.derivatives import Equations, State, stepped_values
-from flyball.analysis.linear.differences import whole
-from flyball.analysis.linear.tangent import Direction, Linear
-from flyball.analysis.linear.variation import Variation
-from flyball.analysis.motion.options import projected
-from flyball.analysis.motion.start import begin
-from flyball.analysis.simulate import clock_for, run_clock
-from flyball.equations.engine import INTEGRATE
-from flyball.numerics.integrators.tableaux import tableau
+from flyball.derivatives.equation_derivatives import EquationDerivatives, MechanismState, values_with_complex_step
+from flyball.engine.entry_point import INTEGRATE
+from flyball.numerics.integrators.butcher_tableaux import tableau
+from flyball.sensitivity.parameter_derivatives import (
+    ConstrainedSystem,
+    ParameterDirection,
+    changes_in_motion_coordinates,
+    initial_changes,
+    parameter_scale,
+)
+from flyball.sensitivity.variational_equations import VariationalIntegration
+from flyball.simulation.initial_state import find_initial_state
+from flyball.simulation.integration_options import default_integration
+from flyball.simulation.simulate import clock_for, run_clock
 from mechanisms import example
 
 RTOL, ATOL = 1e-9, 1e-11
@@ -91,19 +94,24 @@ def mechanism(name: str) -> fb.Mechanism:
 def kernels(m: fb.Mechanism, to: Sequence[str], t_end: float, coordinates: str) -> tuple[float, float, str]:
     """Seconds of the compiled loop of one run, of that with changes, and the steps of both."""
     m, times = m.snapshot(), np.array([0.0, t_end])
-    o = projected(coordinates, RTOL, ATOL)
-    start = begin(m, 0.0, None, None, coordinates)
+    o = default_integration(coordinates, RTOL, ATOL)
+    start = find_initial_state(m, 0.0, None, None, coordinates)
     base, layer = start.base, start.assembly.compiled
-    x = State.moving(base.compiled, 0.0, base.q, base.v)
-    e = Equations(x)
-    directions = [Direction(e, name) for name in to]
-    values = [d.values if layer is base.compiled else stepped_values(layer, d.name) for d in directions]
-    pairs = start_changes(m, {}, base, x, directions, Linear(x))
+    x = MechanismState.moving(base.compiled, 0.0, base.q, base.v)
+    e = EquationDerivatives(x)
+    directions = [ParameterDirection(e, name) for name in to]
+    values = [d.values if layer is base.compiled else values_with_complex_step(layer, d.name) for d in directions]
+    pairs = initial_changes(m, {}, base, x, directions, ConstrainedSystem(x))
     changes = [
         np.array(c)
-        for c in zip(*(carried(start, *of) for of in zip(directions, values, pairs, strict=True)), strict=True)
+        for c in zip(
+            *(changes_in_motion_coordinates(start, *of) for of in zip(directions, values, pairs, strict=True)),
+            strict=True,
+        )
     ]
-    loop = Variation(start, clock_for(start, 0.0, t_end, times, o), values, [whole(m, {}, name) for name in to])
+    loop = VariationalIntegration(
+        start, clock_for(start, 0.0, t_end, times, o), values, [parameter_scale(m, {}, name) for name in to]
+    )
     steps = []
 
     def plain() -> None:
@@ -123,7 +131,7 @@ def differences(m: fb.Mechanism, to: Sequence[str], of: Sequence[str], t_end: fl
     env = m.environment()
     out = []
     for name in to:
-        size = whole(m, {}, name)
+        size = parameter_scale(m, {}, name)
         sides = [
             m.simulate(t_end, outputs=2, rtol=RTOL, atol=ATOL, parameters={name: env[name] + s * h * size})
             for s in (1, -1)
@@ -136,7 +144,7 @@ def row(name: str, t_end: float, of: Sequence[str], count: int, coordinates: str
     """One case."""
     m = mechanism(name)
     to = list(m.environment())[:count]
-    sizes = np.array([whole(m, {}, p) for p in to])
+    sizes = np.array([parameter_scale(m, {}, p) for p in to])
     plain, varied, steps = kernels(m, to, t_end, coordinates)
     asked = {"analysis": "motion", "t_end": t_end, "outputs": 2, "coordinates": coordinates}
     tried = [0]

@@ -21,11 +21,10 @@ import matplotlib as mpl
 import numpy as np
 from cone_problems import chain, pile, stack
 
-from flyball.numerics.cone.problem import SMALL, Factor
-from flyball.numerics.cone.pyramid import sliding_share
-from flyball.numerics.cone.registry import FACTORED, SOLVERS, room_for_all
-from flyball.numerics.cone.residual import residuals
-from flyball.numerics.cone.rooms import rooms
+from flyball.numerics.complementarity.contact_operator import residuals
+from flyball.numerics.complementarity.contact_problem import STORAGE_TOO_SMALL, FactorStorage, allocate_solver
+from flyball.numerics.complementarity.friction_pyramid import pyramid_sliding_friction
+from flyball.numerics.complementarity.solver_choice import FACTORISING_SOLVERS, SOLVERS, allocate_island_solver
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -46,14 +45,14 @@ SHOWN = {
 
 def points(name: str, P, v: np.ndarray, wide: np.ndarray) -> list[tuple[float, float, float, float]]:
     """Iterations, milliseconds, residual [m/s] and force residual of solves cut one after the other."""
-    X, W, O, F = rooms(P)
+    X, W, O, F = allocate_solver(P)
     out = []
-    room = room_for_all(P, O, True) if name in FACTORED else F
-    F = Factor(room.numbers, room.places)
+    room = allocate_island_solver(P, O, True) if name in FACTORISING_SOLVERS else F
+    F = FactorStorage(room.numbers, room.places)
     solver = SOLVERS[name]
     solver(P, X, W, O, F, 0)
-    if O.count.ended == SMALL:
-        F = Factor(np.zeros(O.count.needed_numbers), np.zeros(O.count.needed_places, np.int64))
+    if O.count.ended == STORAGE_TOO_SMALL:
+        F = FactorStorage(np.zeros(O.count.needed_numbers), np.zeros(O.count.needed_places, np.int64))
     for cut in CUTS:
         spent, used = np.inf, 0
         for _ in range(3):
@@ -101,7 +100,7 @@ def draw_pyramid() -> None:
     angle = np.linspace(0, 2 * np.pi, 721)
     figure, axes = plt.subplots(1, 2, figsize=(8, 3.2), layout="constrained")
     for k, d in enumerate((3, 4, 8, 16)):
-        share = np.array([sliding_share(d, a) for a in angle])
+        share = np.array([pyramid_sliding_friction(d, a) for a in angle])
         half = np.pi / d
         stick = np.cos(half) / np.cos((angle % (2 * half)) - half)
         axes[0].plot(stick * np.cos(angle), stick * np.sin(angle), f"C{k}", label=f"d = {d}")

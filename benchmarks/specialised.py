@@ -12,13 +12,13 @@ from typing import Any
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 
-from flyball import special
+from flyball import codegen
 from flyball.compiler.formulas import formula
 from flyball.compiler.kernels import kernel
-from flyball.compiler.layout import Float1
-from flyball.equations.motion import STAGES, derivative
-from flyball.equations.scratch import work
-from flyball.tables.system import SAMPLED, System, Work
+from flyball.compiler.struct_layout import Float1
+from flyball.engine.entry_point import allocate_work
+from flyball.engine.motion import STAGES, derivative
+from flyball.tables.table_definitions import SAMPLED, System, Work
 from mechanisms import Kernel, example
 
 MECHANISMS = {
@@ -53,7 +53,7 @@ def right_hand_sides(S: System, W: Work, y: Float1, dy: Float1, n: int) -> int:
 
 def microseconds(s: Any, S: Any, y: np.ndarray, calls: int = 20000) -> tuple[float, np.ndarray]:
     """Of a right-hand side, and what it is."""
-    W, dy = work(s, S), np.zeros(len(y))
+    W, dy = allocate_work(s, S), np.zeros(len(y))
     W.made[1:SAMPLED] = S.flat[1:SAMPLED]
     (
         W.options.stabilization,
@@ -72,7 +72,7 @@ def row(name: str, t_end: float) -> dict[str, Any]:
     loops = [Kernel(example(name), t_end, 20) for _ in range(2)]
     c = loops[1].start.assembly.compiled
     x, y = c.values, loops[1].start.y
-    made, _ = special.code(special.plan(x), x)
+    made, _ = codegen.code(codegen.plan(x), x)
     S = made.system(x.system)
     tables, dy = microseconds(x.structure, x.system, y)
     code, own = microseconds(x.structure, S, y)

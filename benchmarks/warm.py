@@ -43,9 +43,9 @@ def stewart() -> fb.Mechanism:
 
 def fields(e: Any, **other: Any) -> dict[str, Any]:
     """Fields of an element as written, some of them changed."""
-    from flyball.model.element import written
+    from flyball.model.element import written_fields
 
-    return {k: v for k, v in (written(e) | other).items() if k not in ("name", "shape")} | {"shape": e.shape}
+    return {k: v for k, v in (written_fields(e) | other).items() if k not in ("name", "shape")} | {"shape": e.shape}
 
 
 MECHANISMS: dict[str, tuple[Callable[[], fb.Mechanism], str]] = {

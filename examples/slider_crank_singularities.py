@@ -104,11 +104,11 @@ def pictures(found: dict, path: str) -> None:
     """The mechanism in every case."""
     import matplotlib.pyplot as plt
 
-    from flyball.view.singular import sketch
+    from flyball.view.singularity_plots import plot_sketch
 
     figure, axes = plt.subplots(4, 5, figsize=(11, 8), layout="constrained")
     for ax, (name, (driven, p)) in zip(axes.flat, found.items(), strict=False):
-        sketch(ax, p)
+        plot_sketch(ax, p)
         ax.set_title(f"{name}, {driven}\n{p.kind}", fontsize=9)
     figure.savefig(path, dpi=110)
 

@@ -12,13 +12,11 @@ import numpy as np
 
 import flyball as fb
 from flyball.errors import ModelError
-from flyball.model.copies import CATEGORIES
 from flyball.model.element import Unit, fields_with
 from flyball.model.expressions import number
-from flyball.tables.specs import Structure
-from flyball.tables.system import (
-    REVOLUTE,
-)
+from flyball.model.snapshot import CATEGORIES
+from flyball.tables.structure_definition import Structure
+from flyball.tables.table_definitions import REVOLUTE
 from flyball.tables.values import Values, values
 
 STEP = 1e-30

@@ -49,7 +49,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """With ``--shipped``: name the kernels that were not run, or whose object code was not the wheel's."""
     if session.config.getoption("--shipped"):
-        from flyball.compiler.ahead import all_kernels
+        from flyball.compiler.ahead_of_time import all_kernels
 
         missing = [f"{k.name}: {k.origin or 'not run'}" for k in all_kernels() if k.origin != "shipped"]
         if missing or ("numba" in sys.modules and sys.modules["numba"] is not None):

@@ -12,9 +12,9 @@ from collections.abc import Callable
 import pytest
 
 import flyball as fb
-from flyball.analysis import simulate
-from flyball.analysis.assembly.start import Assembly
-from flyball.analysis.motion.start import Start, begin
+from flyball.assembly.assembled_state import Assembly
+from flyball.simulation import simulate
+from flyball.simulation.initial_state import InitialState, find_initial_state
 
 LAYERS = ("absolute", "joint")
 AUTO = "auto"
@@ -30,14 +30,14 @@ def in_force() -> str:
 def take(layer: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulate in that layer until the test ends."""
 
-    def begun(model, t, parameters, before, coordinates, **more) -> Start:
+    def begun(model, t, parameters, before, coordinates, **more) -> InitialState:
         coordinates = layer if coordinates == AUTO else coordinates
-        start = begin(model, t, parameters, before, coordinates, **more)
+        start = find_initial_state(model, t, parameters, before, coordinates, **more)
         if coordinates == "joint" and not start.assembly.compiled.structure.tree:
             pytest.skip("no joint of it can be a tree joint")
         return start
 
-    monkeypatch.setattr(simulate, "begin", begun)
+    monkeypatch.setattr(simulate, "find_initial_state", begun)
     monkeypatch.setattr(f"{__name__}._chosen", [layer])
 
 
@@ -57,4 +57,4 @@ def cached(make: Callable) -> Callable:
 
 def started(model: fb.Mechanism) -> Assembly:
     """A mechanism where it starts, in the coordinates in force."""
-    return simulate.begin(model, 0.0, None, None, in_force()).assembly
+    return simulate.find_initial_state(model, 0.0, None, None, in_force()).assembly

@@ -88,16 +88,13 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import elements as elements
     from . import rotations as rotations
     from . import testing as testing
-    from .analysis.assembly.start import Assembly as Assembly
-    from .analysis.motion.impulse.settings import Stepping as Stepping
-    from .analysis.prepared import Prepared as Prepared
-    from .analysis.study import load_study as load_study
-    from .control.integrator import Integrator as Integrator
-    from .control.lag import Lag as Lag
-    from .control.pid import PID as PID
-    from .control.state import State as State
-    from .control.state_space import StateSpace as StateSpace
-    from .control.transfer import Transfer as Transfer
+    from .assembly.assembled_state import Assembly as Assembly
+    from .controllers.integrator import Integrator as Integrator
+    from .controllers.lag import Lag as Lag
+    from .controllers.pid import PID as PID
+    from .controllers.state import State as State
+    from .controllers.state_space import StateSpace as StateSpace
+    from .controllers.transfer import Transfer as Transfer
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
     from .errors import ExpressionError as ExpressionError
@@ -113,56 +110,59 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .errors import SingularOrientationWarning as SingularOrientationWarning
     from .errors import StartWarning as StartWarning
     from .errors import UnitError as UnitError
-    from .files import load as load
-    from .files import load_result as load_result
     from .forces import *
     from .joints import *
+    from .kinematics.prepared import Prepared as Prepared
     from .mechanism import Mechanism as Mechanism
-    from .model.actions import Impulse as Impulse
-    from .model.actions import Lock as Lock
-    from .model.actions import Note as Note
-    from .model.actions import Release as Release
-    from .model.actions import Set as Set
-    from .model.actions import Stop as Stop
+    from .mechanism import load as load
+    from .mechanism import load_result as load_result
+    from .model.body import Bodies as Bodies
     from .model.body import Body as Body
     from .model.body import Driver as Driver
     from .model.body import Frame as Frame
+    from .model.body import Ground as Ground
     from .model.body import Initial as Initial
-    from .model.bulk import Bodies as Bodies
     from .model.contact import Contact as Contact
+    from .model.contact import Material as Material
+    from .model.contact import MaterialPair as MaterialPair
+    from .model.controller import IMU as IMU
+    from .model.controller import Sensor as Sensor
     from .model.event import Event as Event
-    from .model.ground import Ground as Ground
-    from .model.material import Material as Material
-    from .model.material import MaterialPair as MaterialPair
-    from .model.sensor import IMU as IMU
-    from .model.sensor import Sensor as Sensor
+    from .model.event import Impulse as Impulse
+    from .model.event import Lock as Lock
+    from .model.event import Note as Note
+    from .model.event import Release as Release
+    from .model.event import Set as Set
+    from .model.event import Stop as Stop
     from .model.shapes import *
     from .model.table import Table as Table
-    from .results.check import Report as Report
     from .results.comparison import Comparison as Comparison
-    from .results.equilibria import EquilibriumSeries as EquilibriumSeries
     from .results.equilibrium import Equilibrium as Equilibrium
-    from .results.indices import Indices as Indices
-    from .results.inverse import InverseDynamics as InverseDynamics
-    from .results.linear import LinearModel as LinearModel
-    from .results.mass import MassReport as MassReport
+    from .results.equilibrium import Touch as Touch
+    from .results.equilibrium_series import EquilibriumSeries as EquilibriumSeries
+    from .results.inverse_dynamics import InverseDynamics as InverseDynamics
+    from .results.linear_model import LinearModel as LinearModel
+    from .results.mechanism_report import MassReport as MassReport
+    from .results.mechanism_report import Report as Report
     from .results.mobility import Mobility as Mobility
     from .results.modes import Modes as Modes
-    from .results.optimum import Optimum as Optimum
+    from .results.modes import RootLocus as RootLocus
     from .results.result import Result as Result
-    from .results.root_locus import RootLocus as RootLocus
-    from .results.sensitivity import Sensitivity as Sensitivity
+    from .results.sensitivity_and_optimum import Optimum as Optimum
+    from .results.sensitivity_and_optimum import Sensitivity as Sensitivity
     from .results.singularities import Singularities as Singularities
+    from .results.study import Indices as Indices
     from .results.study import Study as Study
-    from .results.touch import Touch as Touch
+    from .simulation.integration_options import Stepping as Stepping
+    from .studies.study import load_study as load_study
     from .symbolic.equations import Equations as Equations
-    from .symbolic.explicit.explicit import ExplicitEquations as ExplicitEquations
-    from .symbolic.explicit.states import StateEquations as StateEquations
+    from .symbolic.explicit.explicit_equations import ExplicitEquations as ExplicitEquations
+    from .symbolic.explicit.state_space import StateEquations as StateEquations
     from .symbolic.export.code import Code as Code
     from .symbolic.expressions import Expressions as Expressions
-    from .symbolic.linear.equations import LinearEquations as LinearEquations
-    from .symbolic.linear.routh import StabilityConditions as StabilityConditions
-    from .symbolic.linear.transfer import TransferFunction as TransferFunction
+    from .symbolic.linear.linear_equations import LinearEquations as LinearEquations
+    from .symbolic.linear.stability import StabilityConditions as StabilityConditions
+    from .symbolic.linear.transfer_functions import TransferFunction as TransferFunction
 
 __version__ = "0.4.0"
 
@@ -172,28 +172,28 @@ _HOME = {
     "Frame": "model.body",
     "Driver": "model.body",
     "Initial": "model.body",
-    "Bodies": "model.bulk",
+    "Bodies": "model.body",
     "Contact": "model.contact",
     "Event": "model.event",
-    "Impulse": "model.actions",
-    "Lock": "model.actions",
-    "Note": "model.actions",
-    "Release": "model.actions",
-    "Set": "model.actions",
-    "Stop": "model.actions",
-    "Stepping": "analysis.motion.impulse.settings",
-    "Ground": "model.ground",
-    "Material": "model.material",
-    "MaterialPair": "model.material",
-    "Sensor": "model.sensor",
-    "IMU": "model.sensor",
+    "Impulse": "model.event",
+    "Lock": "model.event",
+    "Note": "model.event",
+    "Release": "model.event",
+    "Set": "model.event",
+    "Stop": "model.event",
+    "Stepping": "simulation.integration_options",
+    "Ground": "model.body",
+    "Material": "model.contact",
+    "MaterialPair": "model.contact",
+    "Sensor": "model.controller",
+    "IMU": "model.controller",
     "Table": "model.table",
-    "load": "files",
+    "load": "mechanism",
     "PerformanceNotice": "errors",
     "Interrupted": "errors",
     "StartWarning": "errors",
-    "load_result": "files",
-    "load_study": "analysis.study",
+    "load_result": "mechanism",
+    "load_study": "studies.study",
     "Result": "results.result",
     "FlyballError": "errors",
     "ModelError": "errors",
@@ -207,34 +207,34 @@ _HOME = {
     "MobilityError": "errors",
     "SingularityError": "errors",
     "NotConverged": "errors",
-    "Assembly": "analysis.assemble",
-    "Prepared": "analysis.prepared",
-    "MassReport": "results.mass",
+    "Assembly": "assembly.assembled_state",
+    "Prepared": "kinematics.prepared",
+    "MassReport": "results.mechanism_report",
     "Mobility": "results.mobility",
-    "Report": "results.check",
+    "Report": "results.mechanism_report",
     "Comparison": "results.comparison",
     "Equilibrium": "results.equilibrium",
-    "EquilibriumSeries": "results.equilibria",
-    "Indices": "results.indices",
-    "InverseDynamics": "results.inverse",
-    "LinearModel": "results.linear",
+    "EquilibriumSeries": "results.equilibrium_series",
+    "Indices": "results.study",
+    "InverseDynamics": "results.inverse_dynamics",
+    "LinearModel": "results.linear_model",
     "Modes": "results.modes",
-    "Optimum": "results.optimum",
-    "RootLocus": "results.root_locus",
-    "Sensitivity": "results.sensitivity",
+    "Optimum": "results.sensitivity_and_optimum",
+    "RootLocus": "results.modes",
+    "Sensitivity": "results.sensitivity_and_optimum",
     "Singularities": "results.singularities",
     "Study": "results.study",
-    "Touch": "results.touch",
+    "Touch": "results.equilibrium",
     "Code": "symbolic.export.code",
     "Equations": "symbolic.equations",
-    "ExplicitEquations": "symbolic.explicit.explicit",
+    "ExplicitEquations": "symbolic.explicit.explicit_equations",
     "Expressions": "symbolic.expressions",
-    "LinearEquations": "symbolic.linear.equations",
-    "StabilityConditions": "symbolic.linear.routh",
-    "StateEquations": "symbolic.explicit.states",
-    "TransferFunction": "symbolic.linear.transfer",
+    "LinearEquations": "symbolic.linear.linear_equations",
+    "StabilityConditions": "symbolic.linear.stability",
+    "StateEquations": "symbolic.explicit.state_space",
+    "TransferFunction": "symbolic.linear.transfer_functions",
 }
-_ROOMS = ("model.shapes", "joints", "forces", "control")
+_ROOMS = ("model.shapes", "joints", "forces", "controllers")
 _MODULES = ("elements", "rotations", "testing")
 
 
@@ -251,7 +251,7 @@ def __getattr__(name: str) -> Any:
             module = importlib.import_module(f".{room}", __name__)
             if hasattr(module, name) and isinstance(getattr(module, name), type):
                 return getattr(module, name)
-    from .model.words import suggest
+    from .model.messages import suggest
 
     hint = "" if name.startswith("_") else suggest(name, __dir__())
     raise AttributeError(f"module 'flyball' has no attribute {name!r}{hint}")

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from .compiler.formulas import formula as formula
 from .constraints import blocks as blocks
-from .constraints.along import point_row as point_row
-from .constraints.along import seen_from as seen_from
 from .constraints.blocks import ConstraintRow as ConstraintRow
+from .constraints.displacement import point_row as point_row
+from .constraints.displacement import seen_from as seen_from
 from .model.element import Angle as Angle
 from .model.element import Damping as Damping
 from .model.element import Direction as Direction
@@ -45,4 +45,4 @@ from .model.force import TwoPointForce as TwoPointForce
 from .model.joint import Coordinate as Coordinate
 from .model.joint import Joint as Joint
 from .model.shapes import ConvexSolid as ConvexSolid
-from .numerics.integrators.runge_kutta import runge_kutta as runge_kutta
+from .numerics.integrators.butcher_tableaux import runge_kutta as runge_kutta

@@ -11,24 +11,27 @@ from pathlib import Path
 from typing import Any
 
 PACKAGE = Path(__file__).parent
-HEAD, TAIL = 1200, 500  # characters of a long message that are kept: where it is, and what the rule and the remedy are
-_WORD = re.compile(r"\S{201,}")
+HEAD_LENGTH, TAIL_LENGTH = (
+    1200,
+    500,
+)  # characters of a long message that are kept: where it is, and what the rule and the remedy are
+_LONG_WORD = re.compile(r"\S{201,}")
 
 
-def readable(message: str) -> str:
+def shortened_message(message: str) -> str:
     """A message whose longest words, and as a whole what is longest, are shortened in the middle.
 
     Names, formulas and lists that a user wrote may have any length.
     """
-    text = _WORD.sub(lambda m: f"{m[0][:120]}...{m[0][-60:]}", message)
-    return text if len(text) <= HEAD + TAIL else f"{text[:HEAD]} ... {text[-TAIL:]}"
+    text = _LONG_WORD.sub(lambda m: f"{m[0][:120]}...{m[0][-60:]}", message)
+    return text if len(text) <= HEAD_LENGTH + TAIL_LENGTH else f"{text[:HEAD_LENGTH]} ... {text[-TAIL_LENGTH:]}"
 
 
 class FlyballError(Exception):
     """Any error raised by flyball on purpose."""
 
     def __init__(self, message: str = "") -> None:
-        super().__init__(readable(message))
+        super().__init__(shortened_message(message))
 
 
 class ModelError(FlyballError, ValueError):
@@ -55,15 +58,15 @@ def cannot_write(path: str | os.PathLike, error: OSError) -> ModelError:
     return ModelError(f"cannot write {os.fspath(path)!r}: {why}")
 
 
-def warn(text: str, category: type[Warning]) -> None:
+def warn_user(text: str, category: type[Warning]) -> None:
     """Warn at the line outside flyball that asked."""
     depth, frame = 1, sys._getframe(0)
     while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(PACKAGE):
         depth, frame = depth + 1, frame.f_back
-    warnings.warn(readable(text), category, stacklevel=depth)
+    warnings.warn(shortened_message(text), category, stacklevel=depth)
 
 
-def optional(package: str, extra: str) -> Any:
+def import_optional(package: str, extra: str) -> Any:
     """A package that not everybody has.
 
     Raises

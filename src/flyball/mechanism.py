@@ -1,19 +1,30 @@
-"""``Mechanism``: the description with every analysis as a method."""
+"""``Mechanism``, the description with every analysis as a method, and the functions that read it from files.
+
+`load` reads a mechanism from a model file (TOML or Python), `load_result` a result from a result file.
+"""
 
 from __future__ import annotations
 
 import os
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from .methods.design import Design
-from .methods.freedom import Freedom
-from .methods.motion import Motions
-from .methods.statics import Statics
-from .methods.symbols import Symbols
-from .methods.threads import on_one_thread
+from .errors import ModelError
+from .mechanism_methods import (
+    DesignMethods,
+    MobilityMethods,
+    MotionMethods,
+    StaticsMethods,
+    SymbolicMethods,
+    on_one_thread,
+)
 from .model.model import Model
 
+if TYPE_CHECKING:
+    from .results.result import Result
 
-class Mechanism(Motions, Statics, Design, Freedom, Symbols, Model):
+
+class Mechanism(MotionMethods, StaticsMethods, DesignMethods, MobilityMethods, SymbolicMethods, Model):
     """A mechanism: described once, then asked anything. See `Model` for what it takes.
 
     Nothing that an analysis finds is stored in it, so sweeps are loops.
@@ -21,18 +32,65 @@ class Mechanism(Motions, Statics, Design, Freedom, Symbols, Model):
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the description to a TOML file; `flyball.load` reads it back exactly."""
-        from .model.io import save
+        from .model.toml_file import save
 
         save(self, path)
 
     def _repr_html_(self) -> str:
-        from .view.described import described
+        from .view.still_picture import mechanism_html
 
-        return described(self)
+        return mechanism_html(self)
 
 
-for _family in (Motions, Statics, Design, Freedom, Symbols):  # so that Python's own messages name what the user called
+for _family in (
+    MotionMethods,
+    StaticsMethods,
+    DesignMethods,
+    MobilityMethods,
+    SymbolicMethods,
+):  # so that Python's own messages name what the user called
     for _name, _method in list(vars(_family).items()):
         if not _name.startswith("_") and callable(_method):
             _method.__qualname__ = f"Mechanism.{_name}"
-            setattr(_family, _name, on_one_thread(_method, by_scipy=_family is Statics))
+            setattr(_family, _name, on_one_thread(_method, by_scipy=_family is StaticsMethods))
+
+
+def load(path: str | os.PathLike) -> Mechanism:
+    """Read a mechanism from a model file: TOML as `Mechanism.save` writes it, or Python.
+
+    A file ``*.py`` is run, as the command runs it; it defines ``m``, ``mechanism`` or ``mechanism()``.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file or it describes no valid mechanism; the message names the file, the line and the
+        element.
+    """
+    try:
+        given = Path(path)
+    except TypeError:
+        raise ModelError(f"the path of a model file is a text or a path, not {path!r}") from None
+    if given.suffix.lower() == ".py":
+        from .model.python_file import load_python
+
+        return load_python(given, Mechanism)
+    from .model.toml_file import load
+
+    return load(given, Mechanism)
+
+
+def load_result(path: str | os.PathLike) -> Result:
+    """Read a result from a NetCDF file, as `Result.save` writes it: nothing is simulated again, nothing compiled.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file, or it is no result of flyball.
+    """
+    from .results.result_loading import read_result
+
+    try:
+        given = Path(path)
+    except TypeError:
+        raise ModelError(f"the path of a result file is a text or a path, not {path!r}") from None
+    return read_result(given, Mechanism)

@@ -11,18 +11,15 @@ import pytest
 from typer.testing import CliRunner
 
 import flyball as fb
-from flyball.analysis import compare as comparing
-from flyball.analysis.assemble import assemble
-from flyball.analysis.compiled import compiled
-from flyball.analysis.motion import partition
+from flyball.assembly.assemble import assemble
+from flyball.assembly.compiled_mechanism import compile_mechanism
 from flyball.cli import app
-from flyball.equations import projection
-from flyball.equations.engine import MOTION
-from flyball.tables.names import velocity_names
-from flyball.tables.system import (
-    COUPLED,
-    SCHUR,
-)
+from flyball.engine import projection
+from flyball.engine.entry_point import MOTION
+from flyball.simulation import initial_state
+from flyball.studies import formulation_comparison as comparing
+from flyball.tables.structure_definition import velocity_names
+from flyball.tables.table_definitions import COUPLED, SCHUR
 from tests.mechanisms import EXAMPLES, G, bricard, circles, door, example, four_bar, planar_rod
 
 ROUNDING = 1e-12
@@ -72,7 +69,7 @@ def test_a_violated_velocity_goes_on_as_the_equations_of_drift_say(kind, g, rate
     m, e = four_bar(), 1e-6
     r = m.simulate(0.1, outputs=2, coordinates="absolute")
     s = r.values.structure
-    c = compiled(m)
+    c = compile_mechanism(m)
     t, y = r.final
     c.at(t, y[: s.nq].copy(), y[s.nq : s.nq + s.nv].copy())
     Gd = c.jacobian()
@@ -166,7 +163,7 @@ def test_coordinates_change_places():
 @pytest.mark.parametrize("coordinates", ["absolute", "joint"])
 def test_a_poor_choice_is_mended(monkeypatch, coordinates):
     """The slide of a slider-crank as the independent coordinate is none at the dead centres."""
-    starts, original = [], partition.choose
+    starts, original = [], initial_state.choose_independent
 
     def poor(model, start):
         original(model, start)
@@ -178,7 +175,7 @@ def test_a_poor_choice_is_mended(monkeypatch, coordinates):
         c.work.velocities.partition[at] = -size[at]
         starts.append(start)
 
-    monkeypatch.setattr(partition, "choose", poor)
+    monkeypatch.setattr(initial_state, "choose_independent", poor)
     true = spinning_crank().simulate(1.0, rtol=1e-11, atol=1e-12, outputs=21)
     r = spinning_crank().simulate(
         1.0, rtol=1e-11, atol=1e-12, outputs=21, stabilization="partitioning", coordinates=coordinates
@@ -186,15 +183,15 @@ def test_a_poor_choice_is_mended(monkeypatch, coordinates):
     assert r["A.angle"] == pytest.approx(true["A.angle"], abs=1e-7)
     assert np.ptp(true["A.angle"]) > 4 * np.pi
     assert starts[0].assembly.compiled.work.counts.exchanges >= 1
-    assert len(partition.independent(starts[0])) == 1
+    assert len(initial_state.independent_names(starts[0])) == 1
 
 
 @pytest.mark.parametrize("make", [four_bar, bricard, door])
 def test_independent_coordinates_stay_as_they_are(make):
     """To the bit; the others fulfil g = 0 and G v = nu, redundant rows included."""
     m = make()
-    start = comparing.begin(m.snapshot(), 0.0, None, None, "absolute")
-    partition.choose(m, start)
+    start = comparing.find_initial_state(m.snapshot(), 0.0, None, None, "absolute")
+    initial_state.choose_independent(m, start)
     c, nq = start.assembly.compiled, start.assembly.compiled.structure.nq
     W = c.work
     own = W.velocities.partition < 0.0
@@ -231,7 +228,7 @@ def test_both_matrices_give_the_same_accelerations(make):
     a = assemble(m)
     found = []
     for coupled, solver in ((False, SCHUR), (True, COUPLED)):
-        c = compiled(m, coupled=coupled)
+        c = compile_mechanism(m, coupled=coupled)
         assert c.structure.tables["sizes"].solver == solver
         c.z = a.compiled.z.copy()
         assert c.at(0.0, a.q, a.v, MOTION)[0] == 0
@@ -291,9 +288,9 @@ def test_what_does_not_exist_for_a_mechanism_is_a_row():
 
 def test_the_table_names_everything(top, tmp_path):
     text = str(top)
-    for name in comparing.WAYS:
+    for name in comparing.EXPLICIT_FORMULATIONS:
         assert name in text
-    assert top.names == tuple(comparing.WAYS)
+    assert top.names == tuple(comparing.EXPLICIT_FORMULATIONS)
     assert "kinetic energy reaches" in text
     plain = json.loads(json.dumps(top.as_dict()["formulations"]["partitioning"]))
     assert plain["position_drift"] < ROUNDING

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.compiled import compiled
-from flyball.analysis.freedom import determinacy as own
-from flyball.numerics.rank import parts
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.kinematics import inverse_dynamics as own
+from flyball.numerics.rank import fundamental_subspaces
 from tests.analyses.linkages import four_bar_driven
 from tests.analyses.test_inverse_dynamics import arm
 from tests.assembly.test_mobility import parallelogram
@@ -61,7 +61,7 @@ def by_singular_values(c, t, q, v):
     c.at(t, q, v)
     G = c.jacobian() * (c.sizes / c.values.length)
     size = np.linalg.norm(G, axis=1)
-    p = parts(G / size[:, None])
+    p = fundamental_subspaces(G / size[:, None])
     return p, size
 
 
@@ -79,12 +79,16 @@ def test_dependencies_are_those_of_singular_values(name, monkeypatch):
     if not m.drivers:
         m.add(fb.Driver("drive", "A0.angle", "0.4*t"))
     done = []
-    monkeypatch.setattr(own, "parts", lambda A: done.append(1) or parts(A))
+    monkeypatch.setattr(own, "fundamental_subspaces", lambda A: done.append(1) or fundamental_subspaces(A))
     r = m.inverse_dynamics(21, t_end=end, coordinates="absolute")
     assert not done
-    c = compiled(m)
-    lam, sizes = own.dependencies(
-        c.values.system, c.work, own.absolute_states(r.result, c, c), own.lengths(c), int(r.determinacy.count[0])
+    c = compile_mechanism(m)
+    lam, sizes = own.dependent_rows(
+        c.values.system,
+        c.work,
+        own.absolute_states(r.result, c, c),
+        own.velocity_scales(c),
+        int(r.determinacy.count[0]),
     )
     for k in range(0, 21, 5):
         p, size = by_singular_values(c, r.t[k], r.result.q[k], r.result.v[k])
@@ -100,7 +104,7 @@ def test_singular_positions_are_looked_at_by_singular_values(monkeypatch):
     m = parallelogram(2)
     flat = np.pi / 2 - np.arctan2(0.3, 1.0)
     done = []
-    monkeypatch.setattr(own, "parts", lambda A: done.append(1) or parts(A))
+    monkeypatch.setattr(own, "fundamental_subspaces", lambda A: done.append(1) or fundamental_subspaces(A))
     m.add(fb.Driver("drive", "A0.angle", f"{-flat}*t"))
     r = m.inverse_dynamics([0.0, 0.25, 0.5, 0.75, 1.0 - 1e-13])
     assert r.determinacy.count.tolist() == [0, 0, 0, 0, 1]

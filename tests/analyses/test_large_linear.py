@@ -11,9 +11,9 @@ import pytest
 import scipy.sparse as sp
 
 import flyball as fb
-from flyball.analysis.linear import large
-from flyball.numerics.pencil import Pencil
-from flyball.numerics.saddle import saddle
+from flyball.linear import descriptor
+from flyball.numerics.eigen import QuadraticPencil
+from flyball.numerics.sparse_rank import saddle_point_solver
 from tests.analyses.made import G, chain, parallelogram, rod
 from tests.layers import LAYERS
 
@@ -51,7 +51,7 @@ def test_how_little_damping_is_none_depends_on_how_fast_it_swings(k, d):
     n = 120
     mu = 4.0 * np.sin(np.arange(1, n + 1) * np.pi / (2 * (n + 1))) ** 2
     T = sp.diags([2.0 * np.ones(n), -np.ones(n - 1), -np.ones(n - 1)], [0, 1, -1]).tocsr()
-    w = Pencil(sp.identity(n, format="csr"), d * T, k * T, sp.csr_matrix((0, n))).nearest(4)[0]
+    w = QuadraticPencil(sp.identity(n, format="csr"), d * T, k * T, sp.csr_matrix((0, n))).nearest(4)[0]
     exact = (-d * mu + np.sqrt((d * mu) ** 2 - 4.0 * k * mu + 0j)) / 2.0
     assert w[w.imag > 0][:2] == pytest.approx(exact[:2], rel=1e-9)
     assert w[w.imag > 0][:2].real == pytest.approx(exact[:2].real, rel=1e-3)
@@ -173,7 +173,7 @@ def test_both_forms_answer_alike(coordinates):
 @pytest.fixture
 def sparse(monkeypatch):
     """Take the way of large mechanisms always."""
-    monkeypatch.setattr(large, "DENSE", 0)
+    monkeypatch.setattr(descriptor, "DENSE_VELOCITIES", 0)
 
 
 def test_what_is_dense_is_made_when_asked_for(sparse, monkeypatch):
@@ -183,7 +183,7 @@ def test_what_is_dense_is_made_when_asked_for(sparse, monkeypatch):
     L = m.linearize(["push.x"], ["rod 1.x"], coordinates="joint")
     assert L.large
     m.gravity = (0, 0)  # of no consequence: the model is the one that was linearised
-    monkeypatch.setattr(large, "DENSE", 600)
+    monkeypatch.setattr(descriptor, "DENSE_VELOCITIES", 600)
     assert L.states[:4] == ("J0.angle", "J1.angle", "J2.angle", "J3.angle")
     some = L.descriptor.nearest(8)
     assert np.sort_complex(some) == pytest.approx(np.sort_complex(L.eigenvalues), abs=1e-8)
@@ -224,7 +224,7 @@ def test_the_same_is_refused(name, monkeypatch):
     """Large or not: the same error."""
     texts = []
     for bound in (600, 0):
-        monkeypatch.setattr(large, "DENSE", bound)
+        monkeypatch.setattr(descriptor, "DENSE_VELOCITIES", bound)
         for ask in ("linearize", "modes"):
             with pytest.raises(fb.FlyballError) as said:
                 getattr(REFUSED[name](), ask)(coordinates="absolute")
@@ -239,7 +239,7 @@ def test_sparse_equations_with_constraints_are_those_of_a_dense_solver(size):
     P, G, H = size * (rng.normal(size=(7, 7)) + 7 * np.eye(7)), rng.normal(size=(3, 7)), rng.normal(size=(3, 7))
     f, g = size * rng.normal(size=7), rng.normal(size=3)
     for of, rows in ((None, G), (H, H)):
-        x, force = saddle(sp.csc_array(P), sp.csc_array(G), None if of is None else sp.csc_array(of))(f, g)
+        x, force = saddle_point_solver(sp.csc_array(P), sp.csc_array(G), None if of is None else sp.csc_array(of))(f, g)
         wanted = np.linalg.solve(np.block([[P, -G.T], [rows, np.zeros((3, 3))]]), np.r_[f, g])
         assert x == pytest.approx(wanted[:7], rel=1e-9)
         assert force == pytest.approx(wanted[7:], rel=1e-9)

@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.cli.notices import show_notices
-from flyball.compiler import notice
-from flyball.equations.engine import engine
-from flyball.view.frequencies import frequencies, phase
-from flyball.view.linear import _ratio
+from flyball.cli.application import show_notices
+from flyball.compiler import object_code
+from flyball.engine.entry_point import engine
+from flyball.view.linear_plots import _unit_ratio, bode_frequencies, phase
 from tests.analyses.classical import bicycle, stand
 from tests.program.test_cli import Said
 
@@ -86,7 +85,7 @@ def test_bode_overlays_outputs_and_takes_frequencies() -> None:
 def test_phases_do_not_jump_at_undamped_resonances() -> None:
     """Collocated: poles and zeros alternate, the phase goes between 0 and -180; at the far end it falls to -360."""
     linear = two().linearize(["u.x"], ["A.x", "B.x"])
-    w = frequencies(linear, [("u.x", "A.x"), ("u.x", "B.x")])
+    w = bode_frequencies(linear, [("u.x", "A.x"), ("u.x", "B.x")])
     near, far = (np.degrees(phase(linear, "u.x", y, w, linear.response(w, "u.x", y))) for y in ("A.x", "B.x"))
     s = math.sqrt(K / M)
     low, zero, high = s * (math.sqrt(5) - 1) / 2, s, s * (math.sqrt(5) + 1) / 2
@@ -114,7 +113,7 @@ def test_a_response_that_is_none_says_so() -> None:
     [("m", "N", "m/N"), ("rad", "N*m", "rad/(N m)"), ("m/s", "1", "m/s"), ("1", "N", "1/N"), ("N", "m/s", "N/(m/s)")],
 )
 def test_units_of_ratios(above: str, below: str, said: str) -> None:
-    assert _ratio(above, below) == said
+    assert _unit_ratio(above, below) == said
 
 
 def test_root_locus_marks_ends_and_crossings() -> None:
@@ -259,21 +258,21 @@ def test_what_falls_for_ever_has_no_equilibrium(here: Path) -> None:
 
 def test_what_is_compiled_is_said_before(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
     """On a command line as a plain line; nothing is said of what takes no time."""
-    monkeypatch.setattr(notice, "_scale", [1.0])
-    monkeypatch.setitem(notice.COSTS, "engine", ("the equations of motion", 18.0))
+    monkeypatch.setattr(object_code, "_scale", [1.0])
+    monkeypatch.setitem(object_code.COSTS, "engine", ("the equations of motion", 18.0))
     with (
         pytest.warns(fb.PerformanceNotice, match=r"once: the equations of motion, about 20 s"),
-        notice.announce(engine),
+        object_code.announce_compilation(engine),
     ):
         pass
     with warnings.catch_warnings():
         show_notices(True)
-        monkeypatch.setattr(notice, "_scale", [3.0])
-        with notice.announce(engine):
+        monkeypatch.setattr(object_code, "_scale", [3.0])
+        with object_code.announce_compilation(engine):
             pass
         assert capsys.readouterr().err.strip().endswith("the equations of motion, about 55 s")
         show_notices(False)
-        with notice.announce(engine):
+        with object_code.announce_compilation(engine):
             pass
     assert capsys.readouterr().err == ""
 

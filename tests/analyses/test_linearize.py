@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.assemble import assemble
-from flyball.analysis.linear.derivatives import Equations, State
-from flyball.analysis.linear.free import free
+from flyball.assembly.assemble import assemble
+from flyball.derivatives.equation_derivatives import EquationDerivatives, MechanismState
+from flyball.derivatives.reduced_equations import free_coordinates
 from flyball.errors import ModelError
 from tests.analyses.made import G, conical_pendulum, parallelogram, rod, watt
 
@@ -50,14 +50,14 @@ def test_what_counts_from_the_start_is_no_output(name, instead):
 def test_self_stress_changes_nothing():
     """A third crank makes the reactions undetermined; whatever they are, the linear equations are the same."""
     a = assemble(parallelogram(0.0, 3))
-    x = State.moving(a.compiled, 0.0, a.q, a.v)
+    x = MechanismState.moving(a.compiled, 0.0, a.q, a.v)
     U, d, _ = np.linalg.svd(a.compiled.jacobian())
     own = U[:, (d > 1e-9 * d[0]).sum() :]
     assert own.shape[1] == 1
     found = []
     for stress in (0.0, 100.0):
-        e = Equations(State(x.c, x.t, x.q, x.v, x.z, x.vdot, x.lam + stress * own[:, 0], x.effort))
-        Z = free(e).Z
+        e = EquationDerivatives(MechanismState(x.c, x.t, x.q, x.v, x.z, x.vdot, x.lam + stress * own[:, 0], x.effort))
+        Z = free_coordinates(e).Z
         found.append(Z.T @ e.by_position[e.at["r"]] @ Z)
     assert found[1] == pytest.approx(found[0], rel=1e-11)
 

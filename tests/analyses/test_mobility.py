@@ -222,10 +222,10 @@ def test_sets_that_share_joints_need_their_own_changes():
 
 
 def test_where_the_search_for_cures_is_cut_it_says_so(monkeypatch):
-    from flyball.analysis.freedom import choices
+    from flyball.mobility import remedies
 
     assert "search_cut" not in door().mobility().sets[0].as_dict()
-    monkeypatch.setattr(choices, "TESTS", 0)
+    monkeypatch.setattr(remedies, "MAX_TESTS_PER_SET", 0)
     (only,) = door().mobility().sets
     assert only.cure is None
     assert only.advice == "no cure by another joint was found; the search was cut after 0 choices"

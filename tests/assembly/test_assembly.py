@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
-from flyball.analysis.assemble import assemble
-from flyball.analysis.compiled import compiled
-from flyball.equations.records import load
+from flyball.assembly.assemble import assemble
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.engine.kinematics import load_record
 from tests.assembly.rough import framed, rough_four_bar
 from tests.mechanisms import bricard, door, example, four_bar, spatial_four_bar
 from tests.verification.test_reactions import actuated
@@ -32,7 +32,7 @@ from tests.verification.test_reactions import actuated
 def test_drawn_joints_need_no_movement(make):
     """Joints given by points of the drawn configuration are closed by construction: the start is bit-equal."""
     model = make()
-    drawn = compiled(model)
+    drawn = compile_mechanism(model)
     a = assemble(model)
     assert np.array_equal(a.q, drawn.values.q)
     assert a.moved == {}
@@ -51,7 +51,7 @@ def closed(model, a):
     for j in model.joints:
         kinds = {r.axes for r in j.rows(model.planar)}
         if {"zx", "zy"} <= kinds:
-            F, M = (load(c.work.FK, s.frame_at[j.name, role, ""])[1] for role in "FM")
+            F, M = (load_record(c.work.FK, s.frame_at[j.name, role, ""])[1] for role in "FM")
             parallel[j.name] = F[2] * M[2] + F[5] * M[5] + F[8] * M[8]
     rates = c.jacobian() @ a.v - c.work.rows.nu
     return np.abs(c.work.rows.value).max(), np.abs(rates).max(), parallel
@@ -150,7 +150,7 @@ def test_an_antiparallel_start_comes_out_parallel(kind, turn):
     assert_closed(m, a)
     if kind in (fb.Prismatic, fb.Fixed):
         c = a.compiled
-        F, M = (load(c.work.FK, c.structure.frame_at["J", role, ""])[1] for role in "FM")
+        F, M = (load_record(c.work.FK, c.structure.frame_at["J", role, ""])[1] for role in "FM")
         assert pytest.approx(F, abs=1e-9) == M
 
 
@@ -285,7 +285,7 @@ def test_velocities_change_as_little_as_they_can():
         )
     for j in m.joints:
         guess.add(j)
-    before = compiled(guess).values.v
+    before = compile_mechanism(guess).values.v
     a = assemble(guess)
     assert_closed(guess, a)
     G, M = a.compiled.jacobian(), a.compiled.mass().toarray()

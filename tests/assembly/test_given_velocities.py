@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.assembly import velocities
-from flyball.model.io import dumps, loads
-from flyball.results.departure import Departure
+from flyball.assembly import positions_and_velocities
+from flyball.model.toml_file import dumps, loads
+from flyball.results.health import InitialDeviation
 from tests.layers import LAYERS, started, take
 
 
@@ -53,9 +53,9 @@ def test_an_angular_velocity_alone_is_kept_and_the_rest_follows():
 
 def test_what_is_nothing_beside_a_given_velocity_is_written_as_0():
     """An angle has one number, and a direction all of whose numbers are rounding none that is larger: both are 0."""
-    d = Departure("b", "angular_velocity", (2.4392,), (-3.98711e-321,), "rad/s")
+    d = InitialDeviation("b", "angular_velocity", (2.4392,), (-3.98711e-321,), "rad/s")
     assert d.text == "angular velocity of 'b': given 2.4392, got 0 rad/s"
-    d = Departure("b", "velocity", (5.0, 0.0), (1e-16, -3e-17), "m/s")
+    d = InitialDeviation("b", "velocity", (5.0, 0.0), (1e-16, -3e-17), "m/s")
     assert d.text == "velocity of 'b': given (5, 0), got (0, 0) m/s"
 
 
@@ -281,7 +281,7 @@ def test_a_large_mechanism_keeps_and_shares_the_same(monkeypatch):
     assert a.departures == ()
     contrary = chain(30, angular_velocity=lambda k: (-1) ** k, velocity=lambda k: (1, 0))
     dense = contrary.assemble()
-    monkeypatch.setattr(velocities, "DENSE", 0)
+    monkeypatch.setattr(positions_and_velocities, "DENSE_ROWS", 0)
     sparse = contrary.assemble()
     assert sparse.v == pytest.approx(dense.v, abs=1e-10)
     assert len(sparse.departures) == len(dense.departures) > 30

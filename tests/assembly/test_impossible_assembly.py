@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.assemble import assemble
+from flyball.assembly.assemble import assemble
 from tests.assembly.rough import framed, rough_four_bar
 from tests.mechanisms import four_bar
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.assemble import assemble
-from flyball.analysis.mobility import mobility
+from flyball.assembly.assemble import assemble
+from flyball.mobility.mobility import mobility
 from tests.mechanisms import bricard, door, example, four_bar, free_body, planar_rod, spatial_four_bar
 
 
@@ -162,16 +162,16 @@ def test_a_long_chain_is_counted_by_the_sparse_rank():
 @pytest.mark.parametrize("make", [bricard, door, spatial_four_bar, four_bar, lambda: parallelogram(3)])
 def test_large_mechanisms_are_told_the_same(make, monkeypatch):
     """The sparse way, which large mechanisms take, names the same joints and reactions as the dense one."""
-    from flyball.analysis.freedom import jacobian
+    from flyball.mobility import null_spaces
     from flyball.numerics import sparse_rank
 
     m = make()
     a = assemble(m)
     dense = mobility(m, a)
-    for module in (jacobian, sparse_rank):
+    for module in (null_spaces, sparse_rank):
         monkeypatch.setattr(module, "FEW", 0)
     assert mobility(m, a) == dense
-    for module in (jacobian, sparse_rank):
+    for module in (null_spaces, sparse_rank):
         monkeypatch.setattr(module, "DENSE", 0)
     assert mobility(m, a) == dense
 
@@ -226,10 +226,10 @@ def test_all_that_depends_on_something_is_named_in_a_large_mechanism_too():
 
 def test_sets_of_a_large_mechanism_are_counted_where_they_are_not_all_sought(monkeypatch):
     """Three constraints too many in each of two windows; of each window's one is looked into."""
-    from flyball.analysis.freedom import redundancy
+    from flyball.mobility import mobility as redundancy
 
     monkeypatch.setattr(redundancy, "DENSE", 0)
-    monkeypatch.setattr(redundancy, "SHOWN", 1)
+    monkeypatch.setattr(redundancy, "MAX_DEPENDENCIES", 1)
     m = windows(2)
     assert [s.count for s in mobility(m, assemble(m)).sets] == [3, 3]
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis import checkpointed as keeper
-from flyball.analysis.motion.part import Part
+from flyball.simulation import checkpoints as keeper
+from flyball.simulation.integration_intervals import Segment
 
 STEPS = 40  # of a part
 
@@ -21,28 +21,28 @@ class Killed(BaseException):
 def cut(patch: pytest.MonkeyPatch, steps: int = STEPS) -> None:
     """Have every part of so many steps, and be written at once."""
 
-    def measure(self: Part, step: float) -> None:
+    def measure(self: Segment, step: float) -> None:
         self._whole = self._left = steps if self.first is not None else np.inf  # a motion without checkpoints is whole
         self._event = 1.0
 
-    patch.setattr(Part, "_measure", measure)
+    patch.setattr(Segment, "_measure", measure)
     patch.setattr(keeper, "EVERY", 0.0)
 
 
 def killed(m: fb.Mechanism, path: Path, patch: pytest.MonkeyPatch, after: tuple[int, ...], **how) -> fb.Result:
     """The motion, killed after so many writes each time, and gone on with."""
-    write = keeper.Keeper.write
+    write = keeper.CheckpointFile.write
     for n in after:
         left = [n]
 
-        def stop(self: keeper.Keeper, left: list[int] = left) -> None:
+        def stop(self: keeper.CheckpointFile, left: list[int] = left) -> None:
             write(self)
             left[0] -= 1
             if left[0] == 0:
                 raise Killed
 
         with patch.context() as within:
-            within.setattr(keeper.Keeper, "write", stop)
+            within.setattr(keeper.CheckpointFile, "write", stop)
             with pytest.raises(Killed):
                 m.simulate(checkpoint=path, **how)
     return m.simulate(checkpoint=path, **how)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis import checkpointed as keeper
-from flyball.results.joined import joined
+from flyball.results.result import concatenate_results
+from flyball.simulation import checkpoints as keeper
 
 from .motions import Killed, cut, double_pendulum, killed
 
@@ -20,9 +20,9 @@ def test_all_that_is_written_is_a_few_times_the_result(tmp_path, monkeypatch):
     sizes, most = [], [0]
     save = keeper.save
 
-    def counted(result, path, *, whole):
-        save(result, path, whole=whole)
-        sizes.append(len(result.t) if not whole else 0)
+    def counted(result, path, *, with_labelled):
+        save(result, path, with_labelled=with_labelled)
+        sizes.append(len(result.t) if not with_labelled else 0)
         most[0] = max(most[0], len(list(tmp_path.iterdir())))
 
     monkeypatch.setattr(keeper, "save", counted)
@@ -30,13 +30,13 @@ def test_all_that_is_written_is_a_few_times_the_result(tmp_path, monkeypatch):
     run = double_pendulum().simulate(12, rtol=1e-9, outputs=2001, checkpoint=tmp_path / "run.nc")
     assert len(sizes) > 30
     assert sum(sizes) < 4 * len(run.t)
-    assert most[0] <= keeper.MOST + 1
+    assert most[0] <= keeper.MOST_FILES + 1
 
 
 def test_files_of_an_earlier_motion_are_not_taken_for_this_one(tmp_path, monkeypatch):
     m, path, how = double_pendulum(), tmp_path / "run.nc", {"t_end": 4, "outputs": 401}
     cut(monkeypatch, 10)
-    monkeypatch.setattr(keeper.Keeper, "finish", lambda *a: (_ for _ in ()).throw(Killed))
+    monkeypatch.setattr(keeper.CheckpointFile, "finish", lambda *a: (_ for _ in ()).throw(Killed))
     with pytest.raises(Killed):
         m.simulate(checkpoint=path, **how)
     beside = sorted(p for p in tmp_path.iterdir() if p != path)
@@ -54,7 +54,7 @@ def test_parts_end_to_end_are_the_whole():
     t = np.linspace(0, 2, 21)
     first = m.simulate(1, outputs=t[:11])
     second = m.simulate(2, outputs=t[11:], start=first)
-    both = joined([first, second], t)
+    both = concatenate_results([first, second], t)
     assert np.array_equal(both.t, t)
     assert both.health.steps == first.health.steps + second.health.steps
     balance = both.energy.total - sum(both.energy.work.values())

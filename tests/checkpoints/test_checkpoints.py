@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis import checkpointed as keeper
-from flyball.analysis import simulate as simulating
-from flyball.analysis.checkpointed import heeded
-from flyball.analysis.motion import part
+from flyball.simulation import checkpoints as keeper
+from flyball.simulation import integration_intervals
+from flyball.simulation import simulate as simulating
+from flyball.simulation.checkpoints import deferred_interrupt
 
 from .motions import (
     assert_same,
@@ -131,7 +131,7 @@ def test_an_interrupt_of_a_long_part_ends_it_in_order(tmp_path, monkeypatch):
 
     m = double_pendulum()
     cut(monkeypatch, 10**9)  # all of it is one part
-    monkeypatch.setattr(part, "OLD", 0.0)
+    monkeypatch.setattr(integration_intervals, "OLD", 0.0)
     monkeypatch.setattr(simulating, "SLICE", 1e-9)
     with pytest.raises(fb.Interrupted, match="interrupted by the user at t = ") as ended:
         m.simulate(4, checkpoint=path, progress=ctrl_c)
@@ -151,9 +151,9 @@ def test_an_interrupt_of_a_long_part_ends_it_in_order(tmp_path, monkeypatch):
 
 @pytest.mark.usefixtures("ctrl_c_interrupts")
 def test_a_second_interrupt_ends_it_at_once(monkeypatch):
-    monkeypatch.setattr(part, "OLD", 0.0)
-    own = part.Part(0.0)
-    with heeded(own):
+    monkeypatch.setattr(integration_intervals, "OLD", 0.0)
+    own = integration_intervals.Segment(0.0)
+    with deferred_interrupt(own):
         signal.raise_signal(signal.SIGINT)
         assert own.asked
         assert own.due()
@@ -177,7 +177,7 @@ def test_what_is_there_to_its_end_is_what_is_returned(tmp_path, monkeypatch):
     m, path = double_pendulum(), tmp_path / "run.nc"
     run = m.simulate(1, checkpoint=path)
     assert_same(run, m.simulate(1))  # it had one part
-    monkeypatch.setattr("flyball.analysis.checkpointed.told", None)
+    monkeypatch.setattr("flyball.simulation.checkpoints.simulate_with_reason", None)
     assert_same(run, m.simulate(1, checkpoint=path))
     assert type(m.simulate(1, checkpoint=path).model) is fb.Mechanism
     assert "A.angle" in _variables(path)  # for other programs
@@ -196,13 +196,13 @@ def test_a_motion_goes_on_from_any_state_of_its_file(tmp_path, monkeypatch):
     whole = m.simulate(4, rtol=1e-9)
     cut(monkeypatch, 6)
     files = []
-    write = keeper.Keeper.write
+    write = keeper.CheckpointFile.write
 
     def copied(self):
         write(self)
         files.append(path.read_bytes())
 
-    monkeypatch.setattr(keeper.Keeper, "write", copied)
+    monkeypatch.setattr(keeper.CheckpointFile, "write", copied)
     m.simulate(4, rtol=1e-9, checkpoint=path)
     assert len(files) > 3
     for n in (1, len(files) // 2, len(files) - 1):
@@ -216,7 +216,7 @@ def test_a_motion_goes_on_from_any_state_of_its_file(tmp_path, monkeypatch):
 
 
 def test_a_slow_machine_ends_parts_by_the_clock(tmp_path, monkeypatch):
-    monkeypatch.setattr(part, "LATEST", 0.0)
+    monkeypatch.setattr(integration_intervals, "LATEST", 0.0)
     monkeypatch.setattr(keeper, "EVERY", 0.0)
     written = []
     monkeypatch.setattr(keeper, "save", lambda *a, **k: written.append(a))

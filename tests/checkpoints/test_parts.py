@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis import checkpointed as keeper
+from flyball.simulation import checkpoints as keeper
 
 from .motions import bouncer, crank, cut, double_pendulum, pile, sampled, switched, twisting, watched
 
@@ -40,8 +40,8 @@ def test_no_part_lasts_long(case, tmp_path, monkeypatch):
     """Parts of implicit methods are of one step here."""
     made, how = CASES[case]
     cut(monkeypatch, STEPS)
-    kept, add = [], keeper.Keeper.add
-    monkeypatch.setattr(keeper.Keeper, "add", lambda self, part: (kept.append(part.health), add(self, part)))
+    kept, add = [], keeper.CheckpointFile.add
+    monkeypatch.setattr(keeper.CheckpointFile, "add", lambda self, part: (kept.append(part.health), add(self, part)))
     run = made().simulate(checkpoint=tmp_path / "run.nc", **{"outputs": 2} | how)
     assert run.health.success
     assert len(kept) >= run.health.steps / (MORE * STEPS) - 1

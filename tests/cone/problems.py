@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flyball.numerics.cone.rooms import rooms, unfilled
+from flyball.numerics.complementarity.contact_problem import allocate_solver, empty_problem
 
 KINDS = {
     "nodes": {},
@@ -31,7 +31,7 @@ class Builder:
         self.sizes = self.rng.integers(4, 9, ng)
         self.inertia = [positive(self.rng, n) for n in self.sizes]
         self.rows, self.used = 6 if turning else 3, 0
-        self.P = unfilled(nc, nn, ng, nl, (nc * 2 * self.rows + nl) * int(self.sizes.max(initial=0)), turning)
+        self.P = empty_problem(nc, nn, ng, nl, (nc * 2 * self.rows + nl) * int(self.sizes.max(initial=0)), turning)
         self.P.group[1:] = np.cumsum(self.sizes)
 
     def block(self, g, rows):
@@ -81,7 +81,7 @@ def random_problem(seed, nc=12, nn=6, ng=0, nl=0, soft=0.0, balls=False, turning
             rng.uniform(0, 0.1),
             *[(0, np.inf), (-0.2, 0.2), (-np.inf, np.inf)][k % 3],
         )
-    X, W, O, F = rooms(P)
+    X, W, O, F = allocate_solver(P)
     X.v[:, :6], X.wide[:] = rng.standard_normal((nn, 6)), rng.standard_normal(len(X.wide))
     return P, X, W, O, F
 

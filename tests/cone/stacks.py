@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flyball.numerics.cone.registry import ready
-from flyball.numerics.cone.rooms import rooms, unfilled
+from flyball.numerics.complementarity.contact_problem import allocate_solver, empty_problem
+from flyball.numerics.complementarity.solver_choice import prepare_solver
 
 H, G = 5e-3, 9.81
 CORNERS = np.array([(a, b, -0.5) for a in (-0.5, 0.5) for b in (-0.5, 0.5)])
@@ -34,11 +34,11 @@ class Stack:
         a = 0.03 * (np.arange(n) % 2)
         self.q = np.stack([np.cos(a), 0 * a, 0 * a, np.sin(a)], 1)
         self.v, self.p = np.zeros((n, 6)), np.zeros((4 * n, 3))
-        self.P = P = unfilled(4 * n, n)
-        self.X, self.W, self.O, _ = rooms(P)
+        self.P = P = empty_problem(4 * n, n)
+        self.X, self.W, self.O, _ = allocate_solver(P)
         P.node[:, 0], P.node[:, 1:4], P.node[:, 7] = 1 / self.m, (6 / self.m)[:, None], 1
         self.mu, self.start = mu, self.x.copy()
-        self.door = ready(solver, P, self.X, self.W, self.O)
+        self.door = prepare_solver(solver, P, self.X, self.W, self.O)
 
     def find(self):
         """Corners of each box on the top of the one below; their gaps."""

@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.numerics.cone.choose import (
-    BY_ONE,
-    BY_OTHER,
+from flyball.numerics.complementarity.contact_problem import CONVERGED, FactorStorage, allocate_solver, empty_problem
+from flyball.numerics.complementarity.gauss_seidel import gauss_seidel
+from flyball.numerics.complementarity.islands import islands_of
+from flyball.numerics.complementarity.solver_choice import (
     CALLS,
-    CONTACTS_BY_ONE,
-    HANDED_ON,
     ISLANDS,
-    LARGEST,
-    THE_REST,
+    LARGEST_ISLAND,
+    OTHER_SOLVED,
+    OTHER_SOLVER,
+    PASSED_ON,
+    SMALL_CONTACTS,
+    SMALL_SOLVED,
+    prepare_solver,
+    solver_names,
 )
-from flyball.numerics.cone.gauss_seidel import gauss_seidel
-from flyball.numerics.cone.islands import islands_of
-from flyball.numerics.cone.problem import CONVERGED, Factor
-from flyball.numerics.cone.registry import names, ready
-from flyball.numerics.cone.rooms import rooms, unfilled
 from tests.cone.problems import KINDS, dense, impulses, random_problem
 from tests.cone.test_gauss_seidel import cone_lack
 
@@ -37,9 +37,9 @@ def test_islands_one_by_one(limit, kind, seed):
     _, DK, N, b = dense(P, X)
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
     O.count.most, O.real.enough = 200_000, 1e-12
-    made = ready("auto", P, X, W, O)
+    made = prepare_solver("auto", P, X, W, O)
     made.F.limit[:] = limit, 100, limit, 100, 1000
-    made.F.doors[THE_REST] = gauss_seidel.address
+    made.F.doors[OTHER_SOLVER] = gauss_seidel.address
     made.kernel(P, X, W, O, made.F, 0)
     p = impulses(P, X)
     assert O.count.ended == CONVERGED and O.real.residual < 1e-9
@@ -50,16 +50,16 @@ def test_islands_one_by_one(limit, kind, seed):
     contacts = np.diff(I.island[: count + 1])
     limit = -1 if len(P.turn) else limit  # rolling friction is for sweeps
     expected = 1, count, (contacts <= limit).sum(), (contacts > limit).sum()
-    assert tuple(told[[CALLS, ISLANDS, BY_ONE, BY_OTHER]]) == expected
-    assert told[LARGEST] == contacts.max() and told[CONTACTS_BY_ONE] == contacts[contacts <= limit].sum()
+    assert tuple(told[[CALLS, ISLANDS, SMALL_SOLVED, OTHER_SOLVED]]) == expected
+    assert told[LARGEST_ISLAND] == contacts.max() and told[SMALL_CONTACTS] == contacts[contacts <= limit].sum()
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", solver_names())
 def test_every_name_solves(name):
     P, X, W, O, _ = random_problem(4)
     _, _, N, b = dense(P, X)
     O.count.most, O.real.enough = 100_000, 1e-10
-    made = ready(name, P, X, W, O)
+    made = prepare_solver(name, P, X, W, O)
     made.kernel(P, X, W, O, made.F, 0)
     p = impulses(P, X)
     assert O.count.ended == CONVERGED
@@ -70,28 +70,28 @@ def test_what_does_not_fit_is_handed_on():
     P, X, W, O, _ = random_problem(4)
     _, _, N, b = dense(P, X)
     O.count.most, O.real.enough = 100_000, 1e-10
-    made = ready("newton", P, X, W, O)
+    made = prepare_solver("newton", P, X, W, O)
     tight = made.F._replace(numbers=np.zeros(8), places=np.zeros(40, np.int64))
     made.kernel(P, X, W, O, tight, 0)
     p = impulses(P, X)
-    assert made.told[HANDED_ON] == 1 and O.count.ended == CONVERGED
+    assert made.told[PASSED_ON] == 1 and O.count.ended == CONVERGED
     assert cone_lack(P, p, N @ p + b) < 1e-8
 
 
 def test_few_bodies_need_no_sweeps():
     P, X, W, O, _ = random_problem(4)
-    made = ready("auto", P, X, W, O)
-    assert made.F.doors[THE_REST] == 0
+    made = prepare_solver("auto", P, X, W, O)
+    assert made.F.doors[OTHER_SOLVER] == 0
     made.kernel(P, X, W, O, made.F, 0)
-    assert O.count.ended == CONVERGED and made.told[BY_OTHER] == 0
+    assert O.count.ended == CONVERGED and made.told[OTHER_SOLVED] == 0
 
 
 def test_nothing_to_do():
     P, X, W, O, F = random_problem(4, nc=0, nn=2)
-    made = ready("auto", P, X, W, O)
+    made = prepare_solver("auto", P, X, W, O)
     before = X.v.copy()
     made.kernel(P, X, W, O, made.F, 0)
-    assert O.count.ended == CONVERGED and isinstance(F, Factor)
+    assert O.count.ended == CONVERGED and isinstance(F, FactorStorage)
     np.testing.assert_array_equal(X.v, before)
 
 
@@ -99,17 +99,17 @@ def test_nothing_to_do():
 def test_uneven_masses_go_to_newton_in_larger_islands(ratio, to_newton):
     """A chain of 60 nodes is too long for Newton, unless one of them is heavy."""
     n = 60
-    P = unfilled(n, n)
-    X, W, O, _ = rooms(P)
+    P = empty_problem(n, n)
+    X, W, O, _ = allocate_solver(P)
     P.node[:, 0] = P.node[:, 1] = P.node[:, 2] = P.node[:, 3] = 1.0
     P.node[-1, :4] /= ratio
     P.at[:, 0], P.at[:, 1] = np.arange(n) - 1, np.arange(n)
     P.frame[:] = 0, 0, 1, 1, 0, 0, 0, 1, 0
     X.v[:, 2] = -1.0
     O.count.most, O.real.enough = 100_000, 1e-9
-    made = ready("auto", P, X, W, O)
+    made = prepare_solver("auto", P, X, W, O)
     made.kernel(P, X, W, O, made.F, 0)
-    assert made.told[BY_ONE] == to_newton and made.told[BY_OTHER] == 1 - to_newton
+    assert made.told[SMALL_SOLVED] == to_newton and made.told[OTHER_SOLVED] == 1 - to_newton
     assert O.count.ended == CONVERGED
     assert X.p[:, 0] == pytest.approx((1 / P.node[::-1, 0]).cumsum()[::-1], rel=1e-4)
     assert abs(X.v).max() < 1e-5

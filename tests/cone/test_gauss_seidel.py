@@ -5,12 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.numerics.cone.gauss_seidel import gauss_seidel
-from flyball.numerics.cone.problem import (
-    CONVERGED,
-)
-from flyball.numerics.cone.rooms import rooms, unfilled
-from flyball.numerics.cone.solve import solve
+from flyball.numerics.complementarity.contact_problem import CONVERGED, allocate_solver, empty_problem, solve_contacts
+from flyball.numerics.complementarity.gauss_seidel import gauss_seidel
 from tests.cone.problems import KINDS, cone_lack, dense, impulses, random_problem
 
 
@@ -21,7 +17,7 @@ def test_the_convex_form_is_solved(kind, seed):
     _, DK, N, b = dense(P, X)
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
     O.count.most, O.real.enough = 200_000, 1e-12
-    solve(gauss_seidel, P, X, W, O, F)
+    solve_contacts(gauss_seidel, P, X, W, O, F)
     p = impulses(P, X)
     assert cone_lack(P, p, N @ p + b) < 1e-9 * (1 + abs(p).max())
     after = np.concatenate([X.v[:, :6].ravel(), X.wide])
@@ -35,7 +31,7 @@ def test_coulombs_law(kind):
     P, X, W, O, F = random_problem(1, **KINDS[kind])
     _, _, N, b = dense(P, X)
     O.count.most, O.real.enough, O.count.coulomb = 10_000, 1e-12, 1
-    solve(gauss_seidel, P, X, W, O, F)
+    solve_contacts(gauss_seidel, P, X, W, O, F)
     p = impulses(P, X)
     assert cone_lack(P, p, N @ p + b, coulomb=True) < 1e-9
 
@@ -49,7 +45,7 @@ def test_a_cut_solve_makes_no_energy(kind, coulomb, most):
     _, _, N, b = dense(P, X)
     O.count.most, O.count.coulomb = most, coulomb
     X.p[:, 0] = 50.0
-    solve(gauss_seidel, P, X, W, O, F)
+    solve_contacts(gauss_seidel, P, X, W, O, F)
     p = impulses(P, X)
     assert 0.5 * p @ N @ p + b @ p < 1e-10
 
@@ -64,7 +60,7 @@ def test_a_start_outside_of_the_cone(kind, coulomb):
     X.p[:] = np.random.default_rng(0).standard_normal(X.p.shape)
     X.p[::2, 0] = 0.0
     O.count.most, O.count.coulomb = 3, coulomb
-    solve(gauss_seidel, P, X, W, O, F)
+    solve_contacts(gauss_seidel, P, X, W, O, F)
     p, after = impulses(P, X), np.concatenate([X.v[:, :6].ravel(), X.wide])
     np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
     assert (np.hypot(X.p[:, 1], X.p[:, 2]) <= P.mu * X.p[:, 0] * (1 + 1e-12)).all()
@@ -72,8 +68,8 @@ def test_a_start_outside_of_the_cone(kind, coulomb):
 
 def on_a_slope(angle, mu, h=1e-2, g=9.81):
     """A ball of 2 kg and 0.1 m at rest on a slope, one step of gravity."""
-    P = unfilled(1, 1)
-    X, W, O, F = rooms(P)
+    P = empty_problem(1, 1)
+    X, W, O, F = allocate_solver(P)
     P.node[0] = 0.5, *[1 / (0.4 * 2 * 0.1**2)] * 3, 0, 0, 0, 1
     P.at[0], P.arm[0, 3:], P.mu[0] = (-1, 0), (0, 0, -0.1), mu
     P.frame[0] = 0, 0, 1, 1, 0, 0, 0, 1, 0
@@ -87,7 +83,7 @@ def test_a_ball_on_a_slope(angle):
     mu, h, g = 0.3, 1e-2, 9.81
     P, X, W, O, F = on_a_slope(angle, mu)
     O.count.coulomb, O.real.enough = 1, 1e-14
-    solve(gauss_seidel, P, X, W, O, F)
+    solve_contacts(gauss_seidel, P, X, W, O, F)
     rolls = np.tan(angle) <= 3.5 * mu
     a = 5 / 7 * g * np.sin(angle) if rolls else g * (np.sin(angle) - mu * np.cos(angle))
     assert X.v[0, 0] == pytest.approx(h * a, rel=1e-12)
@@ -100,17 +96,17 @@ def test_the_convex_form_floats_by_mu_times_the_slip():
     angle, mu = 1.2, 0.3
     P, X, W, O, F = on_a_slope(angle, mu)
     O.count.most, O.real.enough = 1000, 1e-15
-    solve(gauss_seidel, P, X, W, O, F)
+    solve_contacts(gauss_seidel, P, X, W, O, F)
     assert X.v[0, 2] == pytest.approx(mu * (X.v[0, 0] - 0.1 * X.v[0, 4]), rel=1e-9)
 
 
 def test_the_history_tells_every_sweep():
     P, X, W, _, F = random_problem(3)
     _, _, N, b = dense(P, X)
-    _, _, O, _ = rooms(P, history=50)
+    _, _, O, _ = allocate_solver(P, history=50)
     assert O.count.history == 1
     O.count.most, O.real.enough = 50, 0.0
-    solve(gauss_seidel, P, X, W, O, F)
+    solve_contacts(gauss_seidel, P, X, W, O, F)
     p = impulses(P, X)
     assert list(O.history[:, 0]) == list(range(1, 51))
     assert O.history[-1, 1:3] == pytest.approx(np.array([O.real.residual, O.real.force_residual]))
@@ -122,7 +118,7 @@ def test_a_least_impulse_is_held():
     P, X, W, O, F = random_problem(2, balls=True)
     P = P._replace(least=np.full(12, 0.7))
     O.count.most, O.real.enough = 10_000, 1e-12
-    solve(gauss_seidel, P, X, W, O, F)
+    solve_contacts(gauss_seidel, P, X, W, O, F)
     assert X.p[:, 0].min() == 0.7 and O.real.residual < 1e-9
 
 
@@ -132,15 +128,15 @@ def test_islands_are_solved_one_at_a_time():
     P.at[:4] = [[-1, 0], [0, 1], [1, 2], [-1, 2]]
     P.at[4:] = [[-1, 3], [3, 4], [4, 5], [-1, 5]]
     P = P._replace(island=np.array([0, 4, 8]), member_p=np.array([0, 3, 6]), line_p=np.zeros(3, np.int64))
-    both = rooms(P)[0]
+    both = allocate_solver(P)[0]
     both.v[:] = X.v
     O.count.most, O.real.enough = 10_000, 1e-14
-    solve(gauss_seidel, P, both, W, O, F)
+    solve_contacts(gauss_seidel, P, both, W, O, F)
     O.count.island = 1
     before = X.v.copy()
-    solve(gauss_seidel, P, X, W, O, F)
+    solve_contacts(gauss_seidel, P, X, W, O, F)
     np.testing.assert_array_equal(X.v[:3], before[:3])
     np.testing.assert_allclose(X.v[3:], both.v[3:], atol=1e-12)
     O.count.island = 0
-    solve(gauss_seidel, P, X, W, O, F)
+    solve_contacts(gauss_seidel, P, X, W, O, F)
     np.testing.assert_allclose(X.v, both.v, atol=1e-12)

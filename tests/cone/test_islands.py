@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from flyball.numerics.cone.islands import islands_of
+from flyball.numerics.complementarity.islands import islands_of
 
 
 def components(at, line_at, nodes, groups):
@@ -37,7 +37,7 @@ def test_islands_are_connected_components(seed):
         assert (np.diff(contacts) > 0).all() and (np.diff(lines) > 0).all()  # the order that they had
         mine = {*contact[contacts], *line[lines]}
         assert len(mine) == 1
-        held = {*I.member[I.member_p[k] : I.member_p[k + 1]], *(nodes + I.team[I.team_p[k] : I.team_p[k + 1]])}
+        held = {*I.member[I.member_p[k] : I.member_p[k + 1]], *(nodes + I.group_order[I.group_p[k] : I.group_p[k + 1]])}
         assert held == set(np.nonzero(of == mine.pop())[0])
     assert (contact[I.order[I.island[count] :]] == -1).all()
     assert I.line_p[count] == nl

@@ -5,13 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.numerics.cone.newton import newton
-from flyball.numerics.cone.problem import (
-    BROKEN,
-    CONVERGED,
-    SMALL,
-)
-from flyball.numerics.cone.solve import solve
+from flyball.numerics.complementarity.contact_problem import CONVERGED, SOLVE_FAILED, STORAGE_TOO_SMALL, solve_contacts
+from flyball.numerics.complementarity.newton import newton
 from tests.cone.enlarge import solved
 from tests.cone.problems import KINDS, dense, impulses, random_problem
 from tests.cone.test_gauss_seidel import cone_lack
@@ -101,12 +96,12 @@ def test_what_is_left_is_told_as_a_force_too(seed):
 def test_rooms_too_small_are_said():
     P, X, W, O, F = random_problem(0)
     p = X.p.copy()
-    assert solve(newton, P, X, W, O, F) == 0 and O.count.ended == SMALL
+    assert solve_contacts(newton, P, X, W, O, F) == 0 and O.count.ended == STORAGE_TOO_SMALL
     np.testing.assert_array_equal(X.p, p)
 
 
 def test_the_convex_form_of_rolling_friction_is_refused():
     P, X, W, O, F = random_problem(0, **KINDS["rolling friction"])
     v = X.v.copy()
-    assert solve(newton, P, X, W, O, F) == 0 and O.count.ended == BROKEN
+    assert solve_contacts(newton, P, X, W, O, F) == 0 and O.count.ended == SOLVE_FAILED
     np.testing.assert_array_equal(X.v, v)

@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 
 from flyball.errors import AnalysisError
-from flyball.numerics.cone.gauss_seidel import gauss_seidel
-from flyball.numerics.cone.lemke import delassus, lemke, pyramid_by_lemke
-from flyball.numerics.cone.problem import BROKEN, CONVERGED
-from flyball.numerics.cone.pyramid import in_polygon, pyramid, sliding_share
-from flyball.numerics.cone.rooms import rooms, unfilled
-from flyball.numerics.cone.solve import solve
+from flyball.numerics.complementarity.contact_problem import (
+    CONVERGED,
+    SOLVE_FAILED,
+    allocate_solver,
+    empty_problem,
+    solve_contacts,
+)
+from flyball.numerics.complementarity.friction_pyramid import project_on_polygon, pyramid, pyramid_sliding_friction
+from flyball.numerics.complementarity.gauss_seidel import gauss_seidel
+from flyball.numerics.complementarity.lemke import delassus, lemke, pyramid_by_lemke
 from tests.cone.problems import dense, random_problem
 
 
@@ -80,7 +84,7 @@ def test_the_nearest_point_of_a_polygon(d):
             t = (complex(x, y) - s) / (e - s)
             inside &= t.imag >= 0
             near.append(abs(t - min(max(t.real, 0), 1)) * abs(e - s))
-        a, b = in_polygon(d, 0.7, x, y)
+        a, b = project_on_polygon(d, 0.7, x, y)
         assert abs(complex(a - x, b - y)) == pytest.approx(0 if inside else min(near), abs=1e-12)
 
 
@@ -88,18 +92,18 @@ def test_the_nearest_point_of_a_polygon(d):
 @pytest.mark.parametrize("angle", [0.0, 0.3, 1.0, 2.5])
 def test_a_slider_on_a_pyramid(d, angle):
     """Friction acts along the edge nearest to the direction against the velocity; both ways of solving agree."""
-    P = unfilled(1, 1)
+    P = empty_problem(1, 1)
     P.node[0, 0], P.at[0], P.mu[0], P.frame[0] = 1.0, (-1, 0), 0.3, (0, 0, 1, 1, 0, 0, 0, 1, 0)
-    X, W, O, F = rooms(P)
+    X, W, O, F = allocate_solver(P)
     free = -500 * np.cos(angle), -500 * np.sin(angle), -1.0
     X.v[0, :3], O.count.directions, O.count.coulomb = free, d, 1
     O.count.most, O.real.enough = 1000, 1e-14
-    solve(pyramid, P, X, W, O, F)
-    along, across = sliding_share(d, angle)
+    solve_contacts(pyramid, P, X, W, O, F)
+    along, across = pyramid_sliding_friction(d, angle)
     assert X.p[0, 0] == pytest.approx(1.0)
     force = X.p[0, 1] * np.cos(angle) + X.p[0, 2] * np.sin(angle), X.p[0, 2] * np.cos(angle) - X.p[0, 1] * np.sin(angle)
     assert force == pytest.approx((0.3 * along, 0.3 * across), abs=1e-9)
-    Y = rooms(P)[0]
+    Y = allocate_solver(P)[0]
     Y.v[0, :3] = free
     pyramid_by_lemke(P, Y, d)
     np.testing.assert_allclose(Y.p, X.p, atol=1e-9)
@@ -109,10 +113,10 @@ def test_a_slider_on_a_pyramid(d, angle):
 def test_pivoting_agrees_with_sweeps(kind):
     P, X, W, O, F = random_problem(8, **{"nc": 5, **kind})
     P.mu[:] *= 0.5
-    Y = rooms(P)[0]
+    Y = allocate_solver(P)[0]
     Y.v[:], Y.wide[:] = X.v, X.wide
     O.count.most, O.real.enough, O.count.directions, O.count.coulomb = 100_000, 1e-13, 6, 1
-    solve(pyramid, P, X, W, O, F)
+    solve_contacts(pyramid, P, X, W, O, F)
     assert O.count.ended == CONVERGED
     pyramid_by_lemke(P, Y, 6)
     np.testing.assert_allclose(Y.v, X.v, atol=1e-8)
@@ -121,15 +125,15 @@ def test_pivoting_agrees_with_sweeps(kind):
 def test_many_edges_are_the_cone():
     P, X, W, O, F = random_problem(8, nc=5)
     O.count.most, O.real.enough, O.count.directions, O.count.coulomb = 100_000, 1e-12, 400, 1
-    Y = rooms(P)[0]
+    Y = allocate_solver(P)[0]
     Y.v[:] = X.v
-    solve(pyramid, P, X, W, O, F)
-    solve(gauss_seidel, P, Y, W, O, F)
+    solve_contacts(pyramid, P, X, W, O, F)
+    solve_contacts(gauss_seidel, P, Y, W, O, F)
     np.testing.assert_allclose(X.v, Y.v, atol=2e-2)
 
 
 def test_what_it_is_not_made_for_is_left_alone():
     P, X, W, O, F = random_problem(1)
     before, O.count.directions = X.v.copy(), 4
-    assert solve(pyramid, P, X, W, O, F) == 0 and O.count.ended == BROKEN
+    assert solve_contacts(pyramid, P, X, W, O, F) == 0 and O.count.ended == SOLVE_FAILED
     np.testing.assert_array_equal(X.v, before)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.numerics.cone.newton import newton
-from flyball.numerics.cone.problem import CONVERGED
-from flyball.numerics.cone.rooms import rooms, unfilled
+from flyball.numerics.complementarity.contact_problem import CONVERGED, allocate_solver, empty_problem
+from flyball.numerics.complementarity.newton import newton
 from tests.cone.enlarge import solved
 
 H, G, MU = 5e-3, 9.81, 0.5
@@ -16,8 +15,8 @@ SIDES = (0.5, 0.4, 0.3)  # half lengths
 
 def box(mass=2.0):
     """A box with four corners on a plane z = 0."""
-    P = unfilled(4, 1)
-    X, W, O, F = rooms(P)
+    P = empty_problem(4, 1)
+    X, W, O, F = allocate_solver(P)
     a, b, c = SIDES
     inertia = mass / 3.0 * np.array([b * b + c * c, a * a + c * c, a * a + b * b])
     P.node[0] = 1 / mass, *(1 / inertia), 0, 0, 0, 0
@@ -72,8 +71,8 @@ def test_a_turning_box_loses_its_spin_by_friction():
 
 def rod(mu, theta=0.9, spin=1.0):
     """A slender rod that slides on its lower end, thrown ahead of it (Painleve 1895): mass 1, half length 1."""
-    P = unfilled(1, 1)
-    X, W, O, F = rooms(P)
+    P = empty_problem(1, 1)
+    X, W, O, F = allocate_solver(P)
     P.node[0] = 1.0, 3.0, 3.0, 3.0, 0, 0, 0, 1
     P.frame[0] = 0, 0, 1, 1, 0, 0, 0, 1, 0
     P.at[0], P.mu[0] = (-1, 0), mu

@@ -7,25 +7,25 @@ import pytest
 from scipy.linalg import block_diag
 from scipy.optimize import nnls
 
-from flyball.numerics.cone.apgd import apgd
-from flyball.numerics.cone.barzilai_borwein import barzilai_borwein
-from flyball.numerics.cone.diagonal import diagonal, diagonal_turning
-from flyball.numerics.cone.gauss_seidel import gauss_seidel
-from flyball.numerics.cone.jacobi import jacobi
-from flyball.numerics.cone.lean import lean
-from flyball.numerics.cone.operator import push, push_turning, seen, seen_turning
-from flyball.numerics.cone.problem import (
-    BROKEN,
-    CONVERGED,
+from flyball.numerics.complementarity.apgd import apgd, scaled_apgd
+from flyball.numerics.complementarity.barzilai_borwein import barzilai_borwein
+from flyball.numerics.complementarity.cone_projection import project_on_rolling_cone
+from flyball.numerics.complementarity.contact_operator import (
+    apply_contact_impulse,
+    apply_torque_impulse,
+    contact_angular_velocity,
+    contact_velocity,
+    diagonal_block,
+    residuals,
+    rolling_diagonal_block,
 )
-from flyball.numerics.cone.projection import projected_turning
-from flyball.numerics.cone.residual import residuals
-from flyball.numerics.cone.rooms import rooms
-from flyball.numerics.cone.solve import solve
-from flyball.numerics.cone.static import Cones
+from flyball.numerics.complementarity.contact_problem import CONVERGED, SOLVE_FAILED, allocate_solver, solve_contacts
+from flyball.numerics.complementarity.douglas_rachford import ConeProduct
+from flyball.numerics.complementarity.gauss_seidel import gauss_seidel
+from flyball.numerics.complementarity.jacobi import jacobi
 from tests.cone.problems import KINDS, cone_lack, dense, impulses, random_problem
 
-GRADIENTS = {"jacobi": jacobi, "barzilai_borwein": barzilai_borwein, "apgd": apgd, "lean": lean}
+GRADIENTS = {"jacobi": jacobi, "barzilai_borwein": barzilai_borwein, "apgd": apgd, "lean": scaled_apgd}
 SOLVERS = {"gauss_seidel": gauss_seidel, **GRADIENTS}
 
 
@@ -36,7 +36,7 @@ def test_the_convex_form_is_solved(kind, name):
     _, DK, N, b = dense(P, X)
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
     O.count.most, O.real.enough = 100_000, 1e-10
-    solve(SOLVERS[name], P, X, W, O, F)
+    solve_contacts(SOLVERS[name], P, X, W, O, F)
     p = impulses(P, X)
     assert O.count.ended == CONVERGED and O.real.residual < 1e-9
     assert cone_lack(P, p, N @ p + b) < 1e-8 * (1 + abs(p).max())
@@ -64,9 +64,9 @@ def test_pyramids_enclose_the_objective(seed):
     assert above - below < 5e-3 * abs(above)
     O.count.most, O.real.enough = 10_000, 1e-10
     for solver in SOLVERS.values():
-        Y = rooms(P)[0]
+        Y = allocate_solver(P)[0]
         Y.v[:] = X.v
-        solve(solver, P, Y, W, O, F)
+        solve_contacts(solver, P, Y, W, O, F)
         p = impulses(P, Y)
         assert below - 1e-7 <= 0.5 * p @ N @ p + b @ p <= above + 1e-7
 
@@ -80,7 +80,7 @@ def test_coulombs_law(name, kind):
     P.mu[:] *= 0.5
     _, _, N, b = dense(P, X)
     O.count.most, O.real.enough, O.count.coulomb = 50_000, 1e-10, 1
-    solve(SOLVERS[name], P, X, W, O, F)
+    solve_contacts(SOLVERS[name], P, X, W, O, F)
     assert O.count.ended == CONVERGED
     p = impulses(P, X)
     assert cone_lack(P, p, N @ p + b, coulomb=True) < 1e-8
@@ -89,8 +89,8 @@ def test_coulombs_law(name, kind):
 def test_what_needs_an_objective_leaves_coulombs_law_alone():
     P, X, W, O, F = random_problem(4)
     before, O.count.coulomb = X.v.copy(), 1
-    assert solve(barzilai_borwein, P, X, W, O, F) == 0
-    assert O.count.ended == BROKEN
+    assert solve_contacts(barzilai_borwein, P, X, W, O, F) == 0
+    assert O.count.ended == SOLVE_FAILED
     np.testing.assert_array_equal(X.v, before)
 
 
@@ -102,7 +102,7 @@ def test_a_cut_solve_makes_no_energy(kind, name):
         _, _, N, b = dense(P, X)
         O.count.most = most
         X.p[:, 0] = 50.0
-        solve(SOLVERS[name], P, X, W, O, F)
+        solve_contacts(SOLVERS[name], P, X, W, O, F)
         p = impulses(P, X)
         assert 0.5 * p @ N @ p + b @ p < 1e-10
 
@@ -117,13 +117,15 @@ def test_what_velocities_contacts_see_and_impulses_change(kind):
     before = np.concatenate([v[:, :6].ravel(), wide])
     for c in range(P.size[0]):
         rows = slice(c * r, c * r + r)
-        both = np.ravel([seen(P, X.v, X.wide, c), *([seen_turning(P, X.v, X.wide, c)] if r == 6 else [])])
+        both = np.ravel(
+            [contact_velocity(P, X.v, X.wide, c), *([contact_angular_velocity(P, X.v, X.wide, c)] if r == 6 else [])]
+        )
         np.testing.assert_allclose(both, (D @ before)[rows], atol=1e-13)
         p = rng.standard_normal(r)
         v[:], wide[:] = X.v, X.wide
-        push(P, v, wide, c, tuple(p[:3]))
+        apply_contact_impulse(P, v, wide, c, tuple(p[:3]))
         if r == 6:
-            push_turning(P, v, wide, c, tuple(p[3:]))
+            apply_torque_impulse(P, v, wide, c, tuple(p[3:]))
         change = np.concatenate([v[:, :6].ravel(), wide]) - before
         np.testing.assert_allclose(change, DK[rows].T @ p, atol=1e-13)
 
@@ -137,9 +139,9 @@ def test_diagonal_blocks_by_definition(kind):
     upper = np.triu_indices(3)
     for c in range(P.size[0]):
         block = (D @ DK.T)[c * r : c * r + r, c * r : c * r + r]
-        np.testing.assert_allclose(diagonal(P, c), block[:3, :3][upper], atol=1e-13)
+        np.testing.assert_allclose(diagonal_block(P, c), block[:3, :3][upper], atol=1e-13)
         if r == 6:
-            np.testing.assert_allclose(diagonal_turning(P, c), block[3:, 3:][upper], atol=1e-13)
+            np.testing.assert_allclose(rolling_diagonal_block(P, c), block[3:, 3:][upper], atol=1e-13)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -196,7 +198,7 @@ def test_residuals_with_rolling_and_spinning_friction_by_definition(coulomb, see
         force, torque, rate, turn = p[k], p[q] / arm, u[k], arm * u[q]
         slip = mu * np.linalg.norm(rate[1:]) + rho * np.linalg.norm(turn[1:]) + sigma * abs(turn[0])
         to = force - size * (rate + (coulomb * slip, 0, 0)), torque - size * turn
-        near = projected_turning(mu, rho, sigma, 0.0, *map(tuple, to))
+        near = project_on_rolling_cone(mu, rho, sigma, 0.0, *map(tuple, to))
         lack.append(np.linalg.norm(np.ravel(near) - np.r_[force, torque]))
         rates.append(lack[-1] / size)
     largest = np.linalg.norm(X.p, axis=1).max()
@@ -212,7 +214,7 @@ def test_the_nearest_point_with_rolling_and_spinning_friction(bounds):
     circle = np.c_[np.cos(a), np.sin(a)]
     inside = 0
     for x in rng.standard_normal((200, 6)) * (1, 1, 1, 0.5, 0.5, 0.5) + (0.5, 0, 0, 0, 0, 0):
-        y = np.ravel(projected_turning(mu, rho, sigma, 0.0, tuple(x[:3]), tuple(x[3:])))
+        y = np.ravel(project_on_rolling_cone(mu, rho, sigma, 0.0, tuple(x[:3]), tuple(x[3:])))
         rest = x - y
         assert np.linalg.norm(y[1:3]) <= mu * y[0] + 1e-12 and np.linalg.norm(y[4:]) <= rho * y[0] + 1e-12
         assert abs(y[3]) <= sigma * y[0] + 1e-12
@@ -229,7 +231,7 @@ def test_the_nearest_forces_within_cones(mu):
     n = 200
     x = np.random.default_rng(3).standard_normal(3 + 2 + 3 * n + 1)
     most = np.array([0.1])
-    y = Cones(3, np.array([1.0, -1.0]), np.full(n, mu), most).projected(x)
+    y = ConeProduct(3, np.array([1.0, -1.0]), np.full(n, mu), most).project(x)
     assert y[:3] == pytest.approx(x[:3], abs=0.0)
     assert y[3:5] == pytest.approx([max(x[3], 0.0), min(x[4], 0.0)], abs=0.0)
     assert y[-1] == np.clip(x[-1], -0.1, 0.1)
@@ -251,7 +253,7 @@ def test_the_units_of_residuals(name):
         P.node[:, 1:7] /= mass * length**2
         X.v[:, :3] *= length
         O.count.most, O.real.enough = 20, 0.0
-        solve(SOLVERS[name], P, X, W, O, F)
+        solve_contacts(SOLVERS[name], P, X, W, O, F)
         told.append(np.array([O.real.residual, O.real.force_residual]) / [length, 1.0])
     if name != "apgd":  # which takes N - 1 for a vector to start from, whatever the unit of 1
         np.testing.assert_allclose(told[1:], [told[0]] * 2, rtol=1e-6)
@@ -264,18 +266,18 @@ def test_a_warm_start_is_used(name):
     P, X, W, O, F = random_problem(7)
     O.count.most, O.real.enough = 100_000, 1e-11
     free = X.v.copy()
-    solve(SOLVERS[name], P, X, W, O, F)
+    solve_contacts(SOLVERS[name], P, X, W, O, F)
     X.v[:], O.real.enough = free, 1e-9
-    assert solve(SOLVERS[name], P, X, W, O, F) <= 3
+    assert solve_contacts(SOLVERS[name], P, X, W, O, F) <= 3
 
 
 @pytest.mark.parametrize("name", GRADIENTS)
 def test_the_history_tells_every_iteration(name):
     P, X, W, _, F = random_problem(3)
     _, _, N, b = dense(P, X)
-    _, _, O, _ = rooms(P, history=40)
+    _, _, O, _ = allocate_solver(P, history=40)
     O.count.most, O.real.enough = 40, 0.0
-    solve(SOLVERS[name], P, X, W, O, F)
+    solve_contacts(SOLVERS[name], P, X, W, O, F)
     p = impulses(P, X)
     rows = O.history[: O.count[5]]
     assert rows[-1, 1:3] == pytest.approx(np.array([O.real.residual, O.real.force_residual]))
@@ -289,14 +291,14 @@ def test_an_island_alone(name):
     P.at[:4] = [[-1, 0], [0, 1], [1, 2], [-1, 2]]
     P.at[4:] = [[-1, 3], [3, 4], [4, 5], [-1, 5]]
     P = P._replace(island=np.array([0, 4, 8]), member_p=np.array([0, 3, 6]), line_p=np.zeros(3, np.int64))
-    both = rooms(P)[0]
+    both = allocate_solver(P)[0]
     both.v[:] = X.v
     O.count.most, O.real.enough = 10_000, 1e-13
-    solve(SOLVERS[name], P, both, W, O, F)
+    solve_contacts(SOLVERS[name], P, both, W, O, F)
     before = X.v.copy()
     for island in (1, 0):
         O.count.island = island
-        solve(SOLVERS[name], P, X, W, O, F)
+        solve_contacts(SOLVERS[name], P, X, W, O, F)
         if island:
             np.testing.assert_array_equal(X.v[:3], before[:3])
     np.testing.assert_allclose(X.v, both.v, atol=1e-10)
@@ -308,8 +310,8 @@ def test_what_is_no_number_is_told(name):
     P, X, W, O, F = random_problem(1)
     P.bias[3, 0] = np.nan
     free = X.v.copy()
-    solve(SOLVERS[name], P, X, W, O, F)
-    assert O.count.ended == BROKEN
+    solve_contacts(SOLVERS[name], P, X, W, O, F)
+    assert O.count.ended == SOLVE_FAILED
     np.testing.assert_array_equal(X.v, free)
     assert not X.p.any()
 
@@ -322,7 +324,7 @@ def test_a_contact_of_what_cannot_move_is_left_alone(name, balls):
     P.node[:3, :7], X.v[:3], P.bias[:, 0] = 0.0, 0.0, abs(P.bias[:, 0])
     P.bias[(P.at < 3).all(1), 0] = -1.0  # nothing can be done about these
     O.count.most, O.real.enough = 50_000, 1e-9
-    solve(SOLVERS[name], P, X, W, O, F)
+    solve_contacts(SOLVERS[name], P, X, W, O, F)
     stuck = (P.at < 3).all(1)
     assert stuck.any() and not stuck.all()
     assert not X.p[stuck].any() and X.p.any()

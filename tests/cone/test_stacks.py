@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.numerics.cone.problem import CONVERGED
+from flyball.numerics.complementarity.contact_problem import CONVERGED
 from tests.cone.stacks import G, H, Stack
 
 MASSES = {"equal": [1000.0] * 10, "1000:1": [1.0] * 10 + [1000.0], "1e5:1": [1.0] * 10 + [1e5]}

@@ -12,9 +12,9 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from flyball.contact.kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, HULL, SPHERE
-from flyball.contact.solids.hull import Hull, hull
-from flyball.contact.tables import AXES, COUNT, FACE_COUNT, FACE_FIRST, FIRST, KIND, MOVER, PAR, RADIUS, Geometry
+from flyball.collision.convex_decomposition import Hull, convex_hull
+from flyball.collision.shape_kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, HULL, SPHERE
+from flyball.collision.tables import AXES, COUNT, FACE_COUNT, FACE_FIRST, FIRST, KIND, MOVER, PAR, RADIUS, Geometry
 from tests.contact.pairs import separations
 
 NAMES = {
@@ -89,7 +89,9 @@ class Some:
 def some(kind, rng):
     """A random shape about half a metre in size."""
     if kind == HULL:
-        return Some(kind, np.zeros(3), hull(rng.normal(size=(rng.integers(8, 21), 3)) * rng.uniform(0.1, 0.5, 3)))
+        return Some(
+            kind, np.zeros(3), convex_hull(rng.normal(size=(rng.integers(8, 21), 3)) * rng.uniform(0.1, 0.5, 3))
+        )
     return Some(kind, rng.uniform(0.15, 0.6, 3))
 
 

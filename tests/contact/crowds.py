@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from flyball.contact.finder import no_movers
-from flyball.contact.kinds import PLANE, SPHERE
-from flyball.contact.tables import AXES, BEFORE, FOUND, GAP, KIND, MASK, MEMBER, MOVER, PAR, RADIUS, Geometry
+from flyball.collision.contact_finder import no_movers
+from flyball.collision.shape_kinds import PLANE, SPHERE
+from flyball.collision.tables import AXES, BEFORE, FOUND, GAP, KIND, MASK, MEMBER, MOVER, PAR, RADIUS, Geometry
 
 
 def geometry(radii, movers=None, planes=(), apart=(), member=1, mask=-1, places=None):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flyball.contact.narrow.collide import collide
-from flyball.contact.narrow.room import ROOM
-from flyball.contact.tables import AXES, FACE_COUNT, FACE_FIRST, PAR, RADIUS, Geometry, Movers
+from flyball.collision.narrow_phase.dispatch import collide
+from flyball.collision.narrow_phase.primitives import SCRATCH_ROWS
+from flyball.collision.tables import AXES, FACE_COUNT, FACE_FIRST, PAR, RADIUS, Geometry, Movers
 from tests.compiled import compiled
 
 
@@ -40,7 +40,7 @@ def contacts(a, b, at_a, at_b, reach=np.inf, exchange=False):
     """Contacts (rows: point, normal from a to b, gap, feature) of shapes at (position, rotation matrix)."""
     G = geometry(a, b)
     pose = np.array([[*p, *np.ravel(R)] for p, R in (at_a, at_b)], dtype=float)
-    room = np.full((ROOM, 8), np.nan)
+    room = np.full((SCRATCH_ROWS, 8), np.nan)
     i, j = (1, 0) if exchange else (0, 1)
     count = meet(G, Movers(pose, np.zeros((2, 6))), i, j, float(reach), room)
     found = room[:count].copy()

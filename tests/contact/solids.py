@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flyball.contact.kinds import BOX, CAPSULE, CONE, CYLINDER, PLANE, SPHERE
+from flyball.collision.shape_kinds import BOX, CAPSULE, CONE, CYLINDER, PLANE, SPHERE
 from tests.contact.scenes import turned
 
 SOLIDS = {"sphere": SPHERE, "plane": PLANE, "box": BOX, "capsule": CAPSULE, "cylinder": CYLINDER, "cone": CONE}

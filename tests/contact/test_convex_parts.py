@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.contact import tables as ct
-from flyball.contact.solids.clipping import winding
-from flyball.contact.solids.parts import parts
+from flyball.collision import tables as ct
+from flyball.collision.convex_decomposition import convex_parts, winding_number
 from flyball.errors import ModelError, PerformanceNotice
-from flyball.model.shapes.surface import extrude
-from flyball.tables.contact import touching
-from flyball.tables.numbers import numbers
+from flyball.model.shapes.geometry import extrude
+from flyball.tables.contact_tables import contact_tables
+from flyball.tables.element_numbers import element_numbers
 from tests.contact.against import rotation
 from tests.contact.pairs import separations
 
@@ -50,19 +49,19 @@ def inside(found, x):
 @pytest.mark.parametrize(("scale", "at"), [(1.0, 0.0), (1e-3, 0.0), (1.0, 100.0)])
 def test_a_solid_with_flat_sides_is_the_union_of_its_parts(name, scale, at):
     v, f = solid(name, scale, at)
-    found = parts(v, f)
+    found = convex_parts(v, f)
     assert len(found.hulls) <= OUTLINES[name][1]
     assert found.beyond < 1e-6 * scale
     assert sum(h.volume for h in found.hulls) == pytest.approx(volume(v - at, f), rel=1e-9)
     x = np.random.default_rng(0).uniform(v.min(axis=0), v.max(axis=0), (400, 3))
-    np.testing.assert_array_equal(inside(found, x) < 0, winding(x, v[f]) > 0.5)
+    np.testing.assert_array_equal(inside(found, x) < 0, winding_number(x, v[f]) > 0.5)
 
 
 def test_a_convex_surface_is_one_hull_however_fine():
     v, f = fb.Sphere(radius=0.3).surface(fb.model.element.resolve(fb.Sphere(radius=0.3), {}), 24)
-    assert len(parts(v, f).hulls) == 1
+    assert len(convex_parts(v, f).hulls) == 1
     v, f = solid("L")
-    e = parts(np.concatenate([v, v + (10, 0, 0)]), np.concatenate([f, f + len(v)]))  # in two pieces
+    e = convex_parts(np.concatenate([v, v + (10, 0, 0)]), np.concatenate([f, f + len(v)]))  # in two pieces
     assert len(e.hulls) == 4
     assert sum(h.volume for h in e.hulls) == pytest.approx(12)
 
@@ -70,7 +69,7 @@ def test_a_convex_surface_is_one_hull_however_fine():
 def test_a_cavity_stays_empty():
     v, f = box((0, 0, 0), (3, 3, 3))
     w, g = box((1, 1, 1), (2, 2, 2))
-    found = parts(np.concatenate([v, w]), np.concatenate([f, g[:, ::-1] + len(v)]))
+    found = convex_parts(np.concatenate([v, w]), np.concatenate([f, g[:, ::-1] + len(v)]))
     assert sum(h.volume for h in found.hulls) == pytest.approx(26)
     assert inside(found, np.array([[1.5, 1.5, 1.5]]))[0] > 0.49
 
@@ -79,27 +78,27 @@ def test_a_cavity_stays_empty():
 def test_a_tube_stays_open_within_the_tolerance(tolerance):
     tube = fb.Tube(radius=1, inner_radius=0.5, length=0.7)
     v, f = tube.surface(fb.model.element.resolve(tube, {}), 32)
-    found = parts(v, f, tolerance)
+    found = convex_parts(v, f, tolerance)
     assert found.beyond <= tolerance
     x = np.random.default_rng(0).uniform(v.min(axis=0), v.max(axis=0), (2000, 3))
-    filled = (inside(found, x) < 0) & (winding(x, v[f]) < 0.5)
+    filled = (inside(found, x) < 0) & (winding_number(x, v[f]) < 0.5)
     assert (np.hypot(*x[filled, :2].T) > 0.5 - tolerance - 0.01).all()
-    assert (inside(found, x)[winding(x, v[f]) > 0.5] < 1e-9).all()  # nothing of the solid is lost
+    assert (inside(found, x)[winding_number(x, v[f]) > 0.5] < 1e-9).all()  # nothing of the solid is lost
 
 
 def test_what_has_no_solid_inside_or_no_tolerance_is_refused():
     v, f = box((0, 0, 0), (1, 1, 1))
     with pytest.raises(ModelError, match="flat"):
-        parts(v * (1, 1, 0), f)
+        convex_parts(v * (1, 1, 0), f)
     with pytest.raises(ModelError, match="greater than zero"):
-        parts(v, f, 0.0)
+        convex_parts(v, f, 0.0)
 
 
 def touched(*shapes, planar=False):
     m = fb.Mechanism("solids", planar=planar)
     inertia = 1 if planar else (1, 1, 1)
     m.add(*(fb.Body(f"b{k}", shape=s, mass=1, inertia=inertia) for k, s in enumerate(shapes)), fb.Contact(friction=0.3))
-    return touching(m.snapshot(), numbers(m), [f"b{k}" for k in range(len(shapes))])
+    return contact_tables(m.snapshot(), element_numbers(m), [f"b{k}" for k in range(len(shapes))])
 
 
 def mesh(name):

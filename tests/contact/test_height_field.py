@@ -9,10 +9,10 @@ import sys
 import numpy as np
 import pytest
 
-from flyball.contact.kinds import BOX, CAPSULE, CYLINDER, ELLIPSOID, FIELD, HULL, SPHERE
-from flyball.contact.narrow.room import ROOM
-from flyball.contact.solids.field import field
-from flyball.contact.tables import COUNT, FIRST, KIND, MOVER, PAR, RADIUS, Geometry, Movers
+from flyball.collision.narrow_phase.primitives import SCRATCH_ROWS
+from flyball.collision.shape_kinds import BOX, CAPSULE, CYLINDER, ELLIPSOID, FIELD, HULL, SPHERE
+from flyball.collision.shapes.height_field import height_field_rows
+from flyball.collision.tables import COUNT, FIRST, KIND, MOVER, PAR, RADIUS, Geometry, Movers
 from flyball.errors import ModelError
 from tests.contact.against import NAMES, pool, rotation, tables
 from tests.contact.pairs import separations
@@ -23,7 +23,7 @@ FLAT = np.zeros((8, 9))
 
 
 def ground(heights, dx=1.0, dy=1.0):
-    rows, par = field(heights, dx, dy)
+    rows, par = height_field_rows(heights, dx, dy)
     return (FIELD, par, rows)
 
 
@@ -182,7 +182,7 @@ def test_any_shape_over_rough_ground_is_as_far_from_it_as_from_its_triangles(kin
     knot = np.stack([i * d, j * d, z], axis=-1)
     a, b, c, e = knot[:-1, :-1], knot[1:, :-1], knot[1:, 1:], knot[:-1, 1:]
     triangles = np.concatenate([np.stack([a, b, c], axis=2), np.stack([a, c, e], axis=2)]).reshape(-1, 3, 3)
-    rows, par = field(z, d, d)
+    rows, par = height_field_rows(z, d, d)
     for _ in range(25):
         s = pool(kind)[rng.integers(60)]
         R = rotation(rng)
@@ -193,7 +193,7 @@ def test_any_shape_over_rough_ground_is_as_far_from_it_as_from_its_triangles(kin
         at[1, KIND], at[1, MOVER], at[1, FIRST], x[1, PAR : PAR + 4], x[1, RADIUS] = FIELD, 1, len(G.vertex), par, 4
         both = Geometry(at, x, np.concatenate([G.vertex, rows]), G.face, G.apart)
         pose = np.array([[*p, *R.ravel()], [0, 0, 0, *I.ravel()]])
-        room = np.zeros((ROOM, 8))
+        room = np.zeros((SCRATCH_ROWS, 8))
         count = meet(both, Movers(pose, np.zeros((2, 6))), 0, 1, 0.05, room)
         gap = room[:count, 6].min(initial=np.inf)
         if exact > 0:
@@ -252,14 +252,14 @@ def test_many_contacts_are_thinned_out_to_those_that_differ():
 )
 def test_what_is_no_field_is_refused(heights, d, told):
     with pytest.raises(ModelError, match=told):
-        field(heights, *d)
+        height_field_rows(heights, *d)
 
 
 LENS = '''"""Two caps of a sphere, base to base: what is within the radius of both of two centres on the z axis."""
 
-from ....compiler.formulas import formula
-from ....math.scalar import sqrt
-from ...tables import PAR
+from ...compiler.formulas import formula
+from ...math.scalar import sqrt
+from ..tables import PAR
 
 KIND = 12
 
@@ -283,13 +283,13 @@ def test_a_convex_shape_that_is_added_rests_on_a_height_field(tmp_path):
     (tmp_path / "lens.py").write_text(LENS, encoding="utf-8")
     script = f"""
 import json, numpy as np
-import flyball.contact.narrow.shapes as shapes
+import flyball.collision.shapes as shapes
 shapes.__path__.append({str(tmp_path)!r})
-from flyball.contact.kinds import FIELD, PLANE
-from flyball.contact.narrow.collide import collide
-from flyball.contact.narrow.room import ROOM
-from flyball.contact.solids.field import field
-from flyball.contact.tables import Movers
+from flyball.collision.shape_kinds import FIELD, PLANE
+from flyball.collision.narrow_phase.dispatch import collide
+from flyball.collision.narrow_phase.primitives import SCRATCH_ROWS
+from flyball.collision.shapes.height_field import height_field_rows
+from flyball.collision.tables import Movers
 from tests.contact.scenes import geometry
 rows, par = field(np.zeros((5, 5)), 1.0, 1.0)
 out = []

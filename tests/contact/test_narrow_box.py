@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.contact.kinds import BOX, CAPSULE, CONE, CYLINDER
+from flyball.collision.shape_kinds import BOX, CAPSULE, CONE, CYLINDER
 from tests.contact.pairs import separations
 from tests.contact.scenes import contacts, geometry, turned
 from tests.contact.solids import rotation

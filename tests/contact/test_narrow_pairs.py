@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flyball.contact.kinds import BOX, CAPSULE, CONE, CYLINDER, PLANE, SPHERE
+from flyball.collision.shape_kinds import BOX, CAPSULE, CONE, CYLINDER, PLANE, SPHERE
 from tests.contact.scenes import contacts, turned
 from tests.contact.solids import SOLIDS, outside, rotation, separation, solid, two
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.contact.kinds import PLANE, POLYGON, SPHERE
+from flyball.collision.shape_kinds import PLANE, POLYGON, SPHERE
 from tests.contact.scenes import contacts, turned
 
 I, O = np.eye(3), np.zeros(3)

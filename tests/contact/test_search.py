@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from flyball.contact.broad.desk import AFRESH_SO_FAR, COMPARED, LOOKED_AT, REMADE
-from flyball.contact.broad.same import before
-from flyball.contact.finder import Finder, no_contacts
-from flyball.contact.tables import FOUND, GAP, NORMAL, PAIRS, POINT
+from flyball.collision.broad_phase.workspace import ENVELOPES_RENEWED, PAIRS_COMPARED, PAIRS_EXAMINED, REBUILDS
+from flyball.collision.contact_finder import ContactFinder, no_contacts
+from flyball.collision.contact_matching import matching_contact
+from flyball.collision.tables import FOUND, GAP, NORMAL, PAIRS, POINT
 from flyball.errors import ModelError
 from tests.contact.crowds import gaps_of, geometry, identities_hold, moving, on_planes, pairs_of, spheres_that_touch
 
@@ -34,7 +34,7 @@ def test_the_contacts_are_those_of_all_pairs_step_by_step(ratio, speed):
     r, x, v = crowd(rng, 150, ratio, speed)
     r *= 0.5
     G = geometry(r, planes=BOX)
-    F = Finder(G, margin=MARGIN, ahead=STEP)
+    F = ContactFinder(G, margin=MARGIN, ahead=STEP)
     for k in range(60):
         C = F.find(moving(x, v))
         want = spheres_that_touch(x, v, r, MARGIN, STEP) | on_planes(G, x, v, r, MARGIN, STEP)
@@ -50,7 +50,7 @@ def test_the_contacts_are_those_of_all_pairs_step_by_step(ratio, speed):
 
 def test_gap_normal_and_point_of_spheres_and_planes():
     G = geometry([0.5, 0.25], planes=[((0, 0, 0), (0, 0, 1))])
-    C = Finder(G, margin=0.01).find(moving([[0.3, 0, 0.49], [0.3, 0.6, 0.49 + 0.45]]))
+    C = ContactFinder(G, margin=0.01).find(moving([[0.3, 0, 0.49], [0.3, 0.6, 0.49 + 0.45]]))
     rows = {pair: C.x[k, :7] for k, pair in enumerate(pairs_of(C))}
     assert set(rows) == {(0, 1), (0, 2)}
     assert rows[0, 1][GAP] == pytest.approx(0.75 - 0.75, abs=1e-15)
@@ -62,7 +62,7 @@ def test_gap_normal_and_point_of_spheres_and_planes():
 
 
 def test_spheres_at_one_place_have_a_normal():
-    C = Finder(geometry([0.5, 0.5])).find(moving(np.zeros((2, 3))))
+    C = ContactFinder(geometry([0.5, 0.5])).find(moving(np.zeros((2, 3))))
     assert C.x[0, :7] == pytest.approx([0, 0, 0, 1, 0, 0, -1.0])
 
 
@@ -73,7 +73,7 @@ def test_a_bullet_meets_what_is_in_its_way_and_nothing_else():
     r = np.concatenate([[0.01], np.full(1000, 0.2), [0.01]])
     v = np.zeros_like(x)
     v[0, 0] = 1000.0
-    F = Finder(geometry(r), margin=MARGIN, ahead=STEP)
+    F = ContactFinder(geometry(r), margin=MARGIN, ahead=STEP)
     met = []
     for _ in range(4):
         C = F.find(moving(x, v))
@@ -91,7 +91,7 @@ def test_what_meets_nothing_is_left_out():
     member = [1, 1, 1, 1, 2, 4]
     mask = [1 + 2, 1 + 2, 1 + 2, 1 + 2, 1, 1 + 2]  # the last meets those that do not meet it
     G = geometry(np.full(6, 0.1), movers=movers, apart=[(0, 1), (2, 0)], member=member, mask=mask)
-    C = Finder(G).find(moving(x[:5]))
+    C = ContactFinder(G).find(moving(x[:5]))
     assert sorted(pairs_of(C)) == [(0, 4), (1, 4), (2, 3), (2, 4), (3, 4)]
 
 
@@ -103,7 +103,7 @@ def test_many_groups_are_the_same_as_few():
     r, x, _ = crowd(rng, n, 5.0, 0.0)
     G = geometry(r, member=member, mask=mask)
     want = {(i, j) for i, j in spheres_that_touch(x, 0 * x, r, 0.0, 0.0) if member[i] & mask[j] and member[j] & mask[i]}
-    assert set(pairs_of(Finder(G).find(moving(x)))) == want
+    assert set(pairs_of(ContactFinder(G).find(moving(x)))) == want
     assert len(want) > 10
 
 
@@ -112,7 +112,7 @@ def test_shapes_that_stand_still_do_not_meet_and_planes_may_move():
     places = [[0, 0, 0], [0.1, 0, 0], [0, 0, 0]]
     G = geometry([0.2, 0.2, 0.2], movers=movers, places=places, planes=[((0, 0, 0), (0, 0, 1))])
     G.shape_i[3, 1] = 1  # on a mover
-    F = Finder(G)
+    F = ContactFinder(G)
     for height, want in ((-2.0, []), (-0.1, [(0, 3), (1, 3)]), (1.0, [(0, 3), (1, 3), (2, 3)])):
         C = F.find(moving([[0.3, 0, 0.5], [0, 0, height]]))
         assert sorted(p for p in pairs_of(C) if p[1] == 3) == want
@@ -124,7 +124,7 @@ def test_what_falls_together_is_looked_at_as_if_at_rest():
     rng = np.random.default_rng(3)
     r, x, _ = crowd(rng, 400, 3.0, 0.0)
     n = len(r)
-    rest, fall = (Finder(geometry(r), margin=MARGIN, ahead=STEP) for _ in range(2))
+    rest, fall = (ContactFinder(geometry(r), margin=MARGIN, ahead=STEP) for _ in range(2))
     rest.find(moving(x))
     v, listed = np.zeros((n, 3)), []
     v[:, 2] = -8.0
@@ -138,8 +138,8 @@ def test_what_falls_together_is_looked_at_as_if_at_rest():
         x = x + STEP * v
         x[0, 0] += STEP * 40.0
         if k == 20:
-            last = fall.search.count[AFRESH_SO_FAR]
-    assert fall.search.count[AFRESH_SO_FAR] == last <= 2
+            last = fall.search.count[REBUILDS]
+    assert fall.search.count[REBUILDS] == last <= 2
     assert max(listed[1:]) < 1.2 * rest.now.count[PAIRS] + 100
     assert x[1, 2] < -11.0
 
@@ -147,10 +147,10 @@ def test_what_falls_together_is_looked_at_as_if_at_rest():
 def test_contacts_stay_themselves_while_pairs_are_looked_for_anew():
     rng = np.random.default_rng(5)
     r, x, _ = crowd(rng, 300, 4.0, 0.0)
-    F = Finder(geometry(r, planes=BOX), margin=MARGIN, ahead=STEP)
+    F = ContactFinder(geometry(r, planes=BOX), margin=MARGIN, ahead=STEP)
     first = F.find(moving(x))
     names = first.at[: first.count[FOUND], :3].copy()
-    again = F.find(moving(x), afresh=True)
+    again = F.find(moving(x), rebuild=True)
     assert again.count[FOUND] == len(names)
     assert np.array_equal(names[again.at[: len(names), 3]], again.at[: len(names), :3])
     # one goes to the other side and back: only its own are new
@@ -167,7 +167,7 @@ def test_contacts_stay_themselves_while_pairs_are_looked_for_anew():
 def test_the_same_every_time():
     rng = np.random.default_rng(8)
     r, x, v = crowd(rng, 200, 10.0, 1.0)
-    one, other = (Finder(geometry(r, planes=BOX), margin=MARGIN, ahead=STEP) for _ in range(2))
+    one, other = (ContactFinder(geometry(r, planes=BOX), margin=MARGIN, ahead=STEP) for _ in range(2))
     for k in range(20):
         M = moving(x + k * STEP * v, v)
         a, b = one.find(M), other.find(M)
@@ -183,9 +183,9 @@ def test_work_is_linear(ratio):
         rng = np.random.default_rng(n)
         r = 0.2 * ratio ** -rng.random(n)
         side = (4 * (r**3).sum() / 0.3) ** (1 / 3)  # a third of the space filled
-        F = Finder(geometry(r), margin=1e-4)
+        F = ContactFinder(geometry(r), margin=1e-4)
         C = F.find(moving(rng.uniform(0, side, (n, 3))))
-        each.append((F.search.count[COMPARED] / n, F.search.count[LOOKED_AT] / n, C.count[FOUND] / n))
+        each.append((F.search.count[PAIRS_COMPARED] / n, F.search.count[PAIRS_EXAMINED] / n, C.count[FOUND] / n))
     assert each[1] == pytest.approx(each[0], rel=0.3)
     assert each[1][0] < 300
 
@@ -196,30 +196,30 @@ def test_a_flat_crowd_and_one_far_away_cost_no_more():
     x = np.zeros((n, 3))
     x[:, :2] = rng.uniform(0, 11, (n, 2))
     x[0] = [1e9, -1e7, 3e8]
-    F = Finder(geometry(np.full(n, 0.1)))
+    F = ContactFinder(geometry(np.full(n, 0.1)))
     C = F.find(moving(x))
-    assert F.search.count[COMPARED] < 10 * n
+    assert F.search.count[PAIRS_COMPARED] < 10 * n
     assert C.count[FOUND] == len(spheres_that_touch(x, 0 * x, np.full(n, 0.1), 0.0, 0.0))
 
 
 def test_one_that_moves_is_looked_for_alone():
     rng = np.random.default_rng(4)
     r, x, _ = crowd(rng, 500, 2.0, 0.0)
-    F = Finder(geometry(r), margin=MARGIN, ahead=STEP)
+    F = ContactFinder(geometry(r), margin=MARGIN, ahead=STEP)
     F.find(moving(x))
-    made = F.search.count[REMADE]
+    made = F.search.count[ENVELOPES_RENEWED]
     v = np.zeros_like(x)
     v[3] = [0, 3.0, 0]
     for _ in range(20):
         x = x + STEP * v
         C = F.find(moving(x, v))
         assert set(pairs_of(C)) == spheres_that_touch(x, v, r, MARGIN, STEP)
-    assert F.search.count[AFRESH_SO_FAR] == 1
-    assert F.search.count[REMADE] - made <= 20
+    assert F.search.count[REBUILDS] == 1
+    assert F.search.count[ENVELOPES_RENEWED] - made <= 20
 
 
 def test_a_pose_that_is_no_number_is_named():
-    F = Finder(geometry([0.1, 0.1, 0.1]))
+    F = ContactFinder(geometry([0.1, 0.1, 0.1]))
     x = np.zeros((3, 3))
     x[1, 2] = np.nan
     with pytest.raises(ModelError, match="mover 1 has a position, orientation or velocity that is not a finite number"):
@@ -230,7 +230,7 @@ def test_a_pose_that_is_no_number_is_named():
 
 def test_too_many_in_one_place_are_refused():
     n = 60_000
-    F = Finder(geometry(np.full(n, 0.1)))
+    F = ContactFinder(geometry(np.full(n, 0.1)))
     with pytest.raises(ModelError, match=r"too many shapes are in one place: .* shape \d+ alone; move bodies"):
         F.find(moving(np.zeros((n, 3))))
 
@@ -240,7 +240,7 @@ def test_what_asks_for_more_room_goes_on_as_if_it_had_it():
     rng = np.random.default_rng(6)
     n = 400
     x = rng.uniform(-1, 1, (n, 3))
-    F = Finder(geometry(np.full(n, 0.05)), margin=MARGIN)
+    F = ContactFinder(geometry(np.full(n, 0.05)), margin=MARGIN)
     for size in np.linspace(4.0, 0.22, 30):
         C = F.find(moving(size * x))
         assert set(pairs_of(C)) == spheres_that_touch(size * x, 0 * x, np.full(n, 0.05), MARGIN, 0.0)
@@ -249,15 +249,15 @@ def test_what_asks_for_more_room_goes_on_as_if_it_had_it():
 
 
 def test_crowds_of_none_of_one_and_of_points():
-    none = Finder(geometry([])).find(moving(np.zeros((0, 3))))
+    none = ContactFinder(geometry([])).find(moving(np.zeros((0, 3))))
     assert none.count[FOUND] == 0
-    ground = Finder(geometry([], planes=BOX)).find(moving(np.zeros((2, 3))))
+    ground = ContactFinder(geometry([], planes=BOX)).find(moving(np.zeros((2, 3))))
     assert ground.count[FOUND] == 0
-    one = Finder(geometry([0.5], planes=BOX), margin=1e-9).find(moving([[0, 0, 0.5]]))
+    one = ContactFinder(geometry([0.5], planes=BOX), margin=1e-9).find(moving([[0, 0, 0.5]]))
     assert pairs_of(one) == [(0, 1)]
     rng = np.random.default_rng(0)
     x = rng.integers(0, 8, (400, 3)) * 0.25
-    points = Finder(geometry(np.zeros(400)), margin=1e-6).find(moving(x))
+    points = ContactFinder(geometry(np.zeros(400)), margin=1e-6).find(moving(x))
     assert set(pairs_of(points)) == spheres_that_touch(x, 0 * x, np.zeros(400), 1e-6, 0.0)
 
 
@@ -266,8 +266,8 @@ def test_a_contact_without_a_namesake_is_the_nearest_one():
     O.count[FOUND] = 5
     O.at[:5, :3] = [[0, 1, 7], [2, 3, 5], [2, 3, 6], [2, 3, 8], [2, 4, 5]]
     O.x[1:4, 0] = 0.0, 1.0, 1.1
-    assert before(O, (2, 3), 1, 8, (0.0, 0, 0), 1.0, 0) == (3, 4)  # by its name, wherever it is
-    assert before(O, (2, 3), 1, 9, (1.02, 0, 0), 1.0, 0) == (2, 2)  # the nearest
-    assert before(O, (2, 3), 1, 9, (1.02, 0, 0), 1.0, 2) == (3, 4)  # of those that are left
-    assert before(O, (2, 3), 1, 9, (0.5, 0, 0), 1.0, 0) == (-1, 0)  # if it is near
-    assert before(O, (2, 3), -1, 8, (0.0, 0, 0), 1.0, 0) == (-1, 0)
+    assert matching_contact(O, (2, 3), 1, 8, (0.0, 0, 0), 1.0, 0) == (3, 4)  # by its name, wherever it is
+    assert matching_contact(O, (2, 3), 1, 9, (1.02, 0, 0), 1.0, 0) == (2, 2)  # the nearest
+    assert matching_contact(O, (2, 3), 1, 9, (1.02, 0, 0), 1.0, 2) == (3, 4)  # of those that are left
+    assert matching_contact(O, (2, 3), 1, 9, (0.5, 0, 0), 1.0, 0) == (-1, 0)  # if it is near
+    assert matching_contact(O, (2, 3), -1, 8, (0.0, 0, 0), 1.0, 0) == (-1, 0)

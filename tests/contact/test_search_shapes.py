@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from flyball.contact.broad.desk import LISTED
-from flyball.contact.finder import Finder, no_movers
-from flyball.contact.kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, PLANE, SPHERE
-from flyball.contact.narrow.room import ROOM
-from flyball.contact.tables import AXES, BEFORE, FOUND, GAP, KIND, MASK, MEMBER, MOVER, PAR, RADIUS, Geometry
+from flyball.collision.broad_phase.workspace import PAIRS_IN_LIST
+from flyball.collision.contact_finder import ContactFinder, no_movers
+from flyball.collision.narrow_phase.primitives import SCRATCH_ROWS
+from flyball.collision.shape_kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, PLANE, SPHERE
+from flyball.collision.tables import AXES, BEFORE, FOUND, GAP, KIND, MASK, MEMBER, MOVER, PAR, RADIUS, Geometry
 from tests.contact.crowds import identities_hold, pairs_of
 from tests.contact.scenes import meet, turned
 
@@ -55,7 +55,7 @@ def move(M, h):
 
 def by_all_pairs(G, M, reach):
     """{pair: contacts of the narrow phase}."""
-    room, out = np.zeros((ROOM, 8)), {}
+    room, out = np.zeros((SCRATCH_ROWS, 8)), {}
     still = G.shape_i[:, MOVER] < 0
     for i in range(len(still)):
         for j in range(i + 1, len(still)):
@@ -73,7 +73,7 @@ def test_contacts_are_those_of_the_narrow_phase_for_all_pairs(speed):
     G, M = crowd(rng, 60, kinds, 1.6)
     M.twist[:] = speed * rng.standard_normal((60, 6))
     M.twist[:, 2] -= 2.0
-    F = Finder(G, margin=MARGIN)
+    F = ContactFinder(G, margin=MARGIN)
     for _ in range(12):
         C = F.find(M)
         want = by_all_pairs(G, M, MARGIN)
@@ -92,7 +92,7 @@ def test_corners_of_a_box_that_slides_and_turns_stay_the_same_contacts():
     shape_x[:, [AXES, AXES + 4, AXES + 8]] = 1.0
     shape_x[0, PAR : PAR + 3], shape_x[1, PAR : PAR + 3] = 0.1, (2.0, 2.0, 0.5)
     shape_x[:, RADIUS] = np.linalg.norm(shape_x[:, PAR : PAR + 3], axis=1)
-    F = Finder(Geometry(shape_i, shape_x, np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros((0, 2), np.int64)))
+    F = ContactFinder(Geometry(shape_i, shape_x, np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros((0, 2), np.int64)))
     M = no_movers(1)
     M.pose[0, 2] = 0.6 - 1e-4
     M.twist[0] = 0.8, 0, 0, 0, 0, 2.0
@@ -121,7 +121,7 @@ def test_fast_small_bodies_meet_a_thin_plate_or_fly_past_it(kind):
     G.shape_x[0, PAR : PAR + 3], G.shape_x[1, PAR : PAR + 3] = (0.05, 0.05, 0.002), (0.01, 0.006, 0.004)
     G.shape_i[1, KIND] = kind
     G.shape_x[:, RADIUS] = 0.0708, 0.0170 if kind != SPHERE else 0.01
-    room, hits, misses = np.zeros((ROOM, 8)), 0, 0
+    room, hits, misses = np.zeros((SCRATCH_ROWS, 8)), 0, 0
     for _ in range(60):
         way = rng.standard_normal(3)
         way /= np.linalg.norm(way)
@@ -130,7 +130,7 @@ def test_fast_small_bodies_meet_a_thin_plate_or_fly_past_it(kind):
         for k in (0, 1):
             M.pose[k, 3:] = turned(rng.standard_normal(3), rng.uniform(0, 3)).ravel()
         M.twist[0, 3:], M.twist[1, :3], M.twist[1, 3:] = rng.standard_normal(3), speed * way, rng.standard_normal(3)
-        C = Finder(G, margin=MARGIN, ahead=STEP).find(M)
+        C = ContactFinder(G, margin=MARGIN, ahead=STEP).find(M)
         found, kept = C.count[FOUND], M.pose.copy()
         gaps = []
         for _ in range(401):
@@ -165,7 +165,7 @@ def test_shapes_over_a_height_field_are_asked_about_only_below_its_top():
     G.shape_x[n, PAR : PAR + 4] = 12, 10, 0.2, 0.2
     G = G._replace(vertex=heights.reshape(-1, 3))
     M.twist[:] = rng.standard_normal((n, 6))
-    F, touching = Finder(G, margin=MARGIN), 0
+    F, touching = ContactFinder(G, margin=MARGIN), 0
     for _ in range(8):
         C = F.find(M)
         want = by_all_pairs(G, M, MARGIN)
@@ -176,5 +176,5 @@ def test_shapes_over_a_height_field_are_asked_about_only_below_its_top():
     assert touching > 20
     M.pose[:, 2] += 10.0
     F.find(M)
-    assert F.search.count[LISTED] < 1.5 * n  # pairs of shapes among themselves only
+    assert F.search.count[PAIRS_IN_LIST] < 1.5 * n  # pairs of shapes among themselves only
     assert not any(n in pair for pair in pairs_of(F.now))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.contact.kinds import BOX, ELLIPSOID, HEMISPHERE, HULL, SPHERE
+from flyball.collision.shape_kinds import BOX, ELLIPSOID, HEMISPHERE, HULL, SPHERE
 from tests.contact.pairs import separations
 from tests.contact.scenes import geometry, turned
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from flyball.numerics.integrators.tableaux import TABLEAUX
+from flyball.numerics.integrators.butcher_tableaux import TABLEAUX
 
 
 @pytest.fixture(autouse=True)

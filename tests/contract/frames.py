@@ -8,20 +8,20 @@ from scipy.spatial.transform import Rotation
 import flyball as fb
 from flyball.constraints import (
     alignment,
-    along,
     angle,
-    blade,
     coincident,
     curve,
+    displacement,
     distance,
+    knife_edge,
     perpendicular,
+    relative_spin,
     rolling,
-    skew,
-    spin,
+    skew_lines,
 )
 from flyball.constraints.registry import KINDS
 from flyball.model.element import resolve
-from flyball.testing.frames import random_motion, record, turned
+from flyball.testing.formula_checks import frame_record, random_motion, turned_frame
 
 OVAL = [(2.0 * np.cos(u), 1.2 * np.sin(u)) for u in np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)]
 PROFILE = fb.Cam("c", "a", "b", points=OVAL, axis=(0, 0, 1))
@@ -32,11 +32,11 @@ ASSEMBLY = (alignment.KIND_AXIS, alignment.KIND_FULL)  # stand-ins while a joint
 AXES = (0.36, 0.48, 0.8, 0.6, 0.0, -0.8, 0.3, 1.0)  # two unit axes; a constant; the coefficient, which no row reads
 PARAMETERS = {
     coincident.KIND: {"": AXES},
-    along.KIND: {"": AXES},
+    displacement.KIND: {"": AXES},
     perpendicular.KIND: {"": AXES},
     distance.KIND: {"": AXES},
     angle.KIND: {"": (0.0, *AXES[1:]), "unwrapped": (1.0, *AXES[1:])},
-    skew.KIND: {"": (*AXES[:3], 0.7, -0.4, 1.3, 0.3, 1.0)},
+    skew_lines.KIND: {"": (*AXES[:3], 0.7, -0.4, 1.3, 0.3, 1.0)},
     curve.KIND: {
         "outside": (0.0, 0.0, len(SPLINES[0]), 1.0, 0.0, 0.0, 0.3, 1.0),
         "inside": (0.0, 0.0, len(SPLINES[0]), -1.0, 0.0, 0.0, 0.1, 1.0),
@@ -49,11 +49,11 @@ PARAMETERS = {
         "slip of a wheel": (0.8, -0.6, 0.0, 0.5, 0.2, 0.0, 0.0, 1.0),
         "slip of a ball": (0.8, -0.6, 0.0, 0.0, 0.2, 0.0, 0.0, 1.0),
     },
-    blade.KIND: {"": AXES},
-    spin.KIND: {"": AXES},
+    knife_edge.KIND: {"": AXES},
+    relative_spin.KIND: {"": AXES},
 }
 CASES = [(kind, name) for kind, sets in PARAMETERS.items() for name in sets]
-WORLD = (coincident.KIND, skew.KIND)  # they speak of an axis of the world, not of their frames
+WORLD = (coincident.KIND, skew_lines.KIND)  # they speak of an axis of the world, not of their frames
 
 
 def label(case) -> str:
@@ -66,7 +66,7 @@ def has_value(case) -> bool:
     """Whether the row restrains positions."""
     kind, _ = case
     par = PARAMETERS[kind][case[1]]
-    return kind not in (blade.KIND, spin.KIND) and not (kind == rolling.KIND and par[5] == 0.0)
+    return kind not in (knife_edge.KIND, relative_spin.KIND) and not (kind == rolling.KIND and par[5] == 0.0)
 
 
 def frames(case, seed: int) -> tuple[dict, dict, float]:
@@ -86,7 +86,7 @@ def frames(case, seed: int) -> tuple[dict, dict, float]:
 def evaluated(case, F: dict, M: dict, hint: float, dtype=float) -> tuple:
     """The row's value, wrench and bias."""
     kind, name = case
-    return KINDS[kind].row(PARAMETERS[kind][name], record(F, dtype), record(M, dtype), hint, DATA)
+    return KINDS[kind].row(PARAMETERS[kind][name], frame_record(F, dtype), frame_record(M, dtype), hint, DATA)
 
 
 def rate(out: tuple, F: dict, M: dict, w: str = "w", v: str = "v") -> float:
@@ -98,7 +98,7 @@ def rate(out: tuple, F: dict, M: dict, w: str = "w", v: str = "v") -> float:
 def elsewhere(case, F: dict, M: dict) -> tuple[dict, dict, tuple]:
     """Both frames after the world has been turned and put 10 km away; the row's parameters there."""
     Q, d = Rotation.random(random_state=3).as_matrix(), np.array([1e4, -2e3, 5e2])
-    new = [turned(m, Q, d) for m in (F, M)]
+    new = [turned_frame(m, Q, d) for m in (F, M)]
     par = PARAMETERS[case[0]][case[1]]
     if case[0] in WORLD:
         par = (*(Q @ par[:3]).tolist(), *par[3:])

@@ -7,9 +7,9 @@ import pytest
 
 from flyball import forces
 from flyball.constraints.registry import KINDS, RARE, Kind, ordered
-from flyball.equations import dispatch
+from flyball.engine import element_dispatch
 from flyball.model.force import CoordinateForce
-from flyball.testing.frames import random_motion, record
+from flyball.testing.formula_checks import frame_record, random_motion
 from tests.contract.test_forces import LAWS, full
 
 UNKNOWN = 1000
@@ -17,7 +17,7 @@ UNKNOWN = 1000
 
 def frames():
     F, M = random_motion(3)
-    return record(F), record(M)
+    return frame_record(F), frame_record(M)
 
 
 @pytest.mark.parametrize("kind", forces.ALL, ids=lambda k: k.__name__)
@@ -25,22 +25,22 @@ def test_every_force_is_answered_by_its_own_formula(kind):
     par = full(kind)
     if issubclass(kind, CoordinateForce):
         told = par, 0.7, 0.3, LAWS, 2.0
-        assert dispatch.effort(kind.kind, *told) == kind.effort(*told)
+        assert element_dispatch.effort(kind.kind, *told) == kind.effort(*told)
         return
     F, M = frames()
-    assert dispatch.inputs(kind.kind, par, F, M) == kind.inputs(par, F, M)
+    assert element_dispatch.inputs(kind.kind, par, F, M) == kind.inputs(par, F, M)
     told = par, F, M, LAWS, kind.inputs(par, F, M)
-    assert dispatch.wrench(kind.kind, *told) == kind.wrench(*told)
+    assert element_dispatch.wrench(kind.kind, *told) == kind.wrench(*told)
 
 
 def test_no_unknown_kind_is_answered_by_another_ones_formula():
     F, M = frames()
     par = (1.0,) * 16
-    wrench = dispatch.wrench(UNKNOWN, par, F, M, LAWS, (0.1, 0.2))
-    inputs = dispatch.inputs(UNKNOWN, par, F, M)
-    row = dispatch.rare(UNKNOWN, par[:8], F, M, 0.0, np.zeros(3))
+    wrench = element_dispatch.wrench(UNKNOWN, par, F, M, LAWS, (0.1, 0.2))
+    inputs = element_dispatch.inputs(UNKNOWN, par, F, M)
+    row = element_dispatch.rare(UNKNOWN, par[:8], F, M, 0.0, np.zeros(3))
     numbers = [*wrench[0], *wrench[1], *inputs, row[0], *row[1], *row[2], *row[3], row[4]]
-    assert all(math.isnan(x) for x in [*numbers, dispatch.effort(UNKNOWN, par, 0.7, 0.3, LAWS, 2.0)])
+    assert all(math.isnan(x) for x in [*numbers, element_dispatch.effort(UNKNOWN, par, 0.7, 0.3, LAWS, 2.0)])
 
 
 def test_two_forces_of_one_kind_are_refused():

@@ -7,11 +7,11 @@ import pytest
 
 import flyball as fb
 from flyball import forces, joints
-from flyball.equations.engine import MOTION
-from flyball.equations.motion import derivative
-from flyball.model.coupling import Coupling
-from flyball.model.io import dumps, loads
-from flyball.model.sensor import IMU, Sensor
+from flyball.engine.entry_point import MOTION
+from flyball.engine.motion import derivative
+from flyball.model.controller import IMU, Sensor
+from flyball.model.joint import Coupling
+from flyball.model.toml_file import dumps, loads
 from tests.layers import both_layers, started
 
 pytestmark = both_layers

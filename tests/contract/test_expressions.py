@@ -15,8 +15,8 @@ from flyball.model.expressions import (
     is_number_text,
     law_expression,
     number,
+    resolve_parameters,
 )
-from flyball.model.parameters import resolve_parameters
 from flyball.model.units import to_si
 
 QUANTITIES = [

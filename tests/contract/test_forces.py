@@ -6,10 +6,17 @@ from scipy.spatial.transform import Rotation
 
 import flyball as fb
 from flyball import forces
-from flyball.constraints.modes import FROZEN, STATIC
+from flyball.constraints.switch_kinds import FROZEN, STATIC
 from flyball.math.rotation import log_gradient, rotation_vector
 from flyball.model.force import CoordinateForce
-from flyball.testing.frames import moved, power, random_motion, record, stepped, turned
+from flyball.testing.formula_checks import (
+    complex_step_frame,
+    frame_record,
+    moved_frame,
+    random_motion,
+    turned_frame,
+    wrench_power,
+)
 
 BETWEEN = [k for k in forces.ALL if not issubclass(k, CoordinateForce)]
 ALONG = [k for k in (*forces.ALL, *forces.LIMITS) if issubclass(k, CoordinateForce) and hasattr(k, "effort")]
@@ -59,7 +66,7 @@ def undamped(kind):
 
 
 def wrench(kind, par, F, M, laws=NO_LAWS, dtype=float):
-    f, m = record(F, dtype), record(M, dtype)
+    f, m = frame_record(F, dtype), frame_record(M, dtype)
     return kind.wrench(par, f, m, laws, kind.inputs(par, f, m))
 
 
@@ -75,14 +82,18 @@ def test_power_between_frames_is_minus_the_rate_of_the_energy(kind, seed):
     """What a force without damping gives to the bodies it loses itself, far turned too; given forces store nothing."""
     F, M = random_motion(seed)
     if kind.energy is None:
-        assert power(wrench(kind, full(kind), F, M), F, M) == pytest.approx(0.0, abs=1e-12)
+        assert wrench_power(wrench(kind, full(kind), F, M), F, M) == pytest.approx(0.0, abs=1e-12)
         return
-    P = power(wrench(kind, undamped(kind), F, M), F, M)
+    P = wrench_power(wrench(kind, undamped(kind), F, M), F, M)
     e = 1e-30
-    energy = kind.energy(undamped(kind), record(stepped(F, e), complex), record(stepped(M, e), complex))
+    energy = kind.energy(
+        undamped(kind), frame_record(complex_step_frame(F, e), complex), frame_record(complex_step_frame(M, e), complex)
+    )
     assert pytest.approx(-np.imag(energy) / e, rel=1e-11, abs=1e-11) == P
     h = 1e-5
-    ahead, behind = (kind.energy(undamped(kind), record(moved(F, s)), record(moved(M, s))) for s in (h, -h))
+    ahead, behind = (
+        kind.energy(undamped(kind), frame_record(moved_frame(F, s)), frame_record(moved_frame(M, s))) for s in (h, -h)
+    )
     assert pytest.approx(-(ahead - behind) / (2 * h), rel=1e-6) == P
 
 
@@ -100,7 +111,7 @@ def test_effort_is_minus_the_gradient_of_the_energy(kind):
 @seeds
 def test_damping_between_frames_takes_power(kind, seed):
     F, M = random_motion(seed)
-    P = power(wrench(kind, full(kind), F, M), F, M) - power(wrench(kind, undamped(kind), F, M), F, M)
+    P = wrench_power(wrench(kind, full(kind), F, M), F, M) - wrench_power(wrench(kind, undamped(kind), F, M), F, M)
     assert P < 0.0 if kind.__name__ in UNDAMPED else P == 0.0
 
 
@@ -117,8 +128,10 @@ def test_damping_and_friction_along_a_coordinate_take_power(kind, rate):
 def test_inputs_are_a_quantity_and_its_rate(kind, seed):
     F, M = random_motion(seed)
     par, e = full(kind), 1e-30
-    x = kind.inputs(par, record(stepped(F, e), complex), record(stepped(M, e), complex))[0]
-    assert kind.inputs(par, record(F), record(M))[1] == pytest.approx(np.imag(x) / e, rel=1e-12, abs=1e-14)
+    x = kind.inputs(
+        par, frame_record(complex_step_frame(F, e), complex), frame_record(complex_step_frame(M, e), complex)
+    )[0]
+    assert kind.inputs(par, frame_record(F), frame_record(M))[1] == pytest.approx(np.imag(x) / e, rel=1e-12, abs=1e-14)
 
 
 @between
@@ -127,7 +140,7 @@ def test_nothing_depends_on_the_world(kind, seed):
     """The world turned and put 10 km away: the wrench turned with it, but for a force given in the world's axes."""
     F, M = random_motion(seed)
     Q, d = Rotation.random(random_state=3).as_matrix(), np.array([1e4, -2e3, 5e2])
-    f, m = (turned(x, Q, d) for x in (F, M))
+    f, m = (turned_frame(x, Q, d) for x in (F, M))
     for here, there in zip(wrench(kind, full(kind), F, M, LAWS), wrench(kind, full(kind), f, m, LAWS), strict=True):
         assert np.array(there) == pytest.approx(Q @ np.array(here), rel=1e-9, abs=1e-9)
 
@@ -138,7 +151,7 @@ def test_complex_numbers_and_arrays_change_nothing_between_frames(kind):
     many = [
         tuple(
             tuple(np.array(x) for x in zip(*parts, strict=True))
-            for parts in zip(*(record(pair[side]) for pair in frames), strict=True)
+            for parts in zip(*(frame_record(pair[side]) for pair in frames), strict=True)
         )
         for side in range(2)
     ]

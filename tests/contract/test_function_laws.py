@@ -15,13 +15,11 @@ import pytest
 
 import flyball as fb
 from flyball.errors import ExpressionError, PerformanceNotice
-from flyball.laws.call import STACK_RESERVE
-from flyball.laws.evaluation import evaluate
-from flyball.laws.functions import fault, forget, interrupts_kept
-from flyball.laws.native import native
-from flyball.laws.program import compile_law
+from flyball.laws.bytecode import STACK_RESERVE, evaluate
+from flyball.laws.compilation import compile_law
+from flyball.laws.python_functions import clear_faults, compile_function, deferred_interrupts, function_fault
+from flyball.model.expression_parser import FunctionCall
 from flyball.model.expressions import Expression, law_expression
-from flyball.model.function import Call
 from tests.compiled import compiled
 
 PARAMETERS = {"k": 3.0}
@@ -67,7 +65,7 @@ class Law:
         return self.functions[0].native
 
     def fault(self):
-        return fault(self.stack, self.functions)
+        return function_fault(self.stack, self.functions)
 
 
 @pytest.fixture
@@ -238,7 +236,7 @@ def test_a_value_that_is_not_finite_is_noted(how, given):
     assert law.fault().exception is None
     assert law.fault().arguments == (4.0, 2.5)
     assert f"gives {given} for t = 4, rate = 2.5; it must give a finite number" in law.fault().message
-    forget(law.stack)
+    clear_faults(law.stack)
     assert law.fault() is None
     law.value(4.0, 0.0, math.nan)  # not the function's fault
     assert law.fault() is None
@@ -350,14 +348,14 @@ def test_an_interrupt_waits_for_compiled_code():
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # the shell of a background job ignores it
     law, value = Law(in_python(stop)), None
     try:
-        with pytest.raises(KeyboardInterrupt), interrupts_kept(law.functions):
+        with pytest.raises(KeyboardInterrupt), deferred_interrupts(law.functions):
             value = compiled_sum(law.code, law.const, law.at, law.stack, (0.0, 0.0, 0.0), np.zeros((3, 2)), 11)
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
         signal.signal(signal.SIGINT, before)
     assert value == 55.0
     assert law.fault() is None
-    with interrupts_kept(law.functions):
+    with deferred_interrupts(law.functions):
         law.value()
 
 
@@ -379,7 +377,7 @@ def test_equal_functions_are_compiled_once():
         return lambda t: c * t
 
     functions = [made(2.0), made(2.0), made(3.0), made(2), made(-0.0), made(0.0)]
-    codes = [native(Call(f, ("t",), "", "")) for f in functions]
+    codes = [compile_function(FunctionCall(f, ("t",), "", "")) for f in functions]
     assert codes[0].address == codes[1].address
     assert len({x.address for x in codes}) == 5
     for f, x in zip(functions, codes, strict=True):
@@ -399,7 +397,7 @@ def test_functions_with_other_surroundings_are_compiled_by_themselves():
         return lambda t: c[0] / 3 * t + math.atan2(c[1], -1.0)
 
     functions = [of(math.sin), of(math.cos), by(math), by(np), from_tuple((1, 0.0)), from_tuple((1, -0.0))]
-    codes = [native(Call(f, ("t",), "", "")) for f in functions]
+    codes = [compile_function(FunctionCall(f, ("t",), "", "")) for f in functions]
     assert len({x.address for x in codes}) == 6
     values = [float(integrated(f)) for f in functions[:2]]
     assert values == pytest.approx([1.0 - math.sin(1.0), 1.0 - math.cos(1.0)], abs=1e-9)

@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
-from flyball.equations.engine import MOTION
-from flyball.equations.motion import derivative
-from flyball.model.io import dumps, loads
+from flyball.engine.entry_point import MOTION
+from flyball.engine.motion import derivative
+from flyball.model.toml_file import dumps, loads
 from tests.contract.zoo import (
     CASES,
     GRAVITY,

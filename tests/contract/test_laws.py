@@ -8,10 +8,8 @@ import sympy
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from flyball.laws.evaluation import evaluate, evaluate_jet
-from flyball.laws.manner import entire
-from flyball.laws.opcodes import BY_MOTION
-from flyball.laws.program import compile_law
+from flyball.laws.bytecode import BY_MOTION, evaluate, evaluate_jet, is_entire
+from flyball.laws.compilation import compile_law
 from flyball.model.expressions import FUNCTIONS, Expression
 from tests.compiled import compiled
 
@@ -264,4 +262,4 @@ def test_long_sums_are_fine():
 def test_only_laws_without_jumps_and_kinks_are_entire(law, smooth):
     code, const = [], []
     at, _ = compile_law(Expression.parse(law), ("t",), (), code, const)
-    assert entire(np.array(code), at) is smooth
+    assert is_entire(np.array(code), at) is smooth

@@ -5,8 +5,8 @@ from math import log
 import numpy as np
 import pytest
 
-from flyball.numerics.dissection import minimum_degree, nested_dissection
-from flyball.numerics.ldl import analyse, factor_kernel
+from flyball.numerics.graphs import minimum_degree, nested_dissection
+from flyball.numerics.sparse_factorisation import analyse_ldl, ldl_factor_kernel
 
 
 def grid(n, rows=1, steps=((0, 1), (1, 0), (0, 0))):
@@ -25,7 +25,7 @@ def grid(n, rows=1, steps=((0, 1), (1, 0), (0, 0))):
 
 def work(n, i, j):
     """Products of a factorisation."""
-    column = np.diff(analyse(n, i, j)[0].Lp).astype(float)
+    column = np.diff(analyse_ldl(n, i, j)[0].Lp).astype(float)
     return (column * (column + 3.0)).sum() / 2.0
 
 
@@ -51,7 +51,7 @@ def test_a_graph_that_cannot_be_halved_is_ordered_too():
 def test_the_factor_solves_the_equations():
     """L D L^T of a matrix whose factor is filled so much that nested dissection is tried, against a dense solution."""
     n, i, j = grid(14, rows=3)
-    P, place = analyse(n, i, j)
+    P, place = analyse_ldl(n, i, j)
     rng = np.random.default_rng(1)
     dense = np.zeros((n, n))
     lower = i >= j
@@ -60,7 +60,7 @@ def test_the_factor_solves_the_equations():
     for entry, x, row, column in zip(place[: len(i)][lower], value[lower], i[lower], j[lower], strict=True):
         A[entry] = dense[row, column] = dense[column, row] = x
     D, L = np.zeros(n), np.zeros(len(P.Li))
-    assert factor_kernel(P, A, L, D, np.zeros(n)) == 0
+    assert ldl_factor_kernel(P, A, L, D, np.zeros(n)) == 0
     full = np.eye(n)
     full[P.Li, np.repeat(np.arange(n), np.diff(P.Lp))] = L
     again = (full / D) @ full.T
@@ -96,5 +96,5 @@ def test_work_a_point_of_a_net_of_rods_grows_as_its_side():
 def test_chains_have_no_fill():
     k = np.arange(4000)
     n = 4001
-    P, _ = analyse(n, k + 1, k)
+    P, _ = analyse_ldl(n, k + 1, k)
     assert len(P.Li) == n - 1

@@ -88,7 +88,7 @@ def test_a_method_without_stages_within_a_step_finds_no_events():
 
 def test_a_higher_order_has_its_own_dense_output():
     """Dormand and Prince's pair is what flyball has as rk45."""
-    from flyball.numerics.integrators.tableaux import tableau
+    from flyball.numerics.integrators.butcher_tableaux import tableau
 
     R = tableau("rk45")
     A = [row[:6] for row in R.A[:6]]

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import flyball as fb
-from flyball.constraints import blade, distance
+from flyball.constraints import distance, knife_edge
 from flyball.elements import (
     ConstraintRow,
     Coordinate,
@@ -196,7 +196,7 @@ def apart(par, F, M):
 
 def edge(par, F, M):
     """No velocity along an axis of M."""
-    return blade.row(par, F, M, 0.0, None)
+    return knife_edge.row(par, F, M, 0.0, None)
 
 
 def test_the_formula_of_a_built_in_row_gives_its_bits():

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.contact.finder import Finder
+from flyball.collision.contact_finder import ContactFinder
 from flyball.elements import ConvexSolid, Length, Number, Point, Unit, element
 from flyball.math.scalar import sqrt
 from flyball.math.vec import dot, scale
-from flyball.tables.contact.touching import touching
-from flyball.tables.numbers import numbers
+from flyball.tables.contact_tables import contact_tables
+from flyball.tables.element_numbers import element_numbers
 from flyball.testing import CHECKS, ContractError, check_element
 
 
@@ -132,8 +132,8 @@ def contacts(shape, other, rng):
         )
         m.add(fb.Ground("other", shape=other), fb.Contact(friction=0.3))
         model = m.snapshot()
-        scene = touching(model, numbers(model), ["b"])
-        found = Finder(scene.geometry, margin=0.1).find(scene.carriers.movers)
+        scene = contact_tables(model, element_numbers(model), ["b"])
+        found = ContactFinder(scene.geometry, margin=0.1).find(scene.carriers.movers)
         out.append(found.x[: found.count[0], :7])
     return out
 
@@ -192,8 +192,8 @@ def test_many_sizes():
     )
     m.add(fb.Ground("floor", shape=fb.Plane()), fb.Contact(friction=0.5))
     model = m.snapshot()
-    scene = touching(model, numbers(model), ["b"])
-    found = Finder(scene.geometry, margin=0.1).find(scene.carriers.movers)
+    scene = contact_tables(model, element_numbers(model), ["b"])
+    found = ContactFinder(scene.geometry, margin=0.1).find(scene.carriers.movers)
     np.testing.assert_allclose(found.x[:2, 6], 0.0, atol=1e-12)
 
 

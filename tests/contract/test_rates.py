@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
-from flyball.constraints import angle, blade, rolling, spin
+from flyball.constraints import angle, knife_edge, relative_spin, rolling
 from flyball.constraints.registry import KINDS
-from flyball.testing.frames import moved, random_motion, record
+from flyball.testing.formula_checks import frame_record, moved_frame, random_motion
 from tests.contract.frames import AXES, DATA, PARAMETERS, evaluated, frames, rate
 
 H = 1e-5
@@ -59,16 +59,16 @@ def test_slip_of_an_upright_disk_adds_up():
             "v": np.array([2.0 * np.cos(2.0 * t), 0, 0]),
             "w": np.array([0, 3.0 * t * t, 0]),
         }
-        slip.append(rate(KINDS[rolling.KIND].row(par, record(F), record(M), 0.0, DATA), F, M))
+        slip.append(rate(KINDS[rolling.KIND].row(par, frame_record(F), frame_record(M), 0.0, DATA), F, M))
     assert 0.5 * np.dot(weight, slip) == pytest.approx(np.sin(2.0) - 0.5 * 1.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_blade_is_the_velocity_seen_from_F_along_an_axis_of_M(seed):
     F, M = random_motion(seed)
-    seen = [f["R"].T @ (m["p"] - f["p"]) for f, m in ((moved(F, s), moved(M, s)) for s in (H, -H))]
+    seen = [f["R"].T @ (m["p"] - f["p"]) for f, m in ((moved_frame(F, s), moved_frame(M, s)) for s in (H, -H))]
     velocity = F["R"] @ ((seen[0] - seen[1]) / (2 * H))
-    out = evaluated((blade.KIND, ""), F, M, 0.0)
+    out = evaluated((knife_edge.KIND, ""), F, M, 0.0)
     assert rate(out, F, M) == pytest.approx(M["R"] @ AXES[:3] @ velocity, rel=1e-7, abs=1e-8)
     assert out[0] == 0.0
 
@@ -76,9 +76,9 @@ def test_blade_is_the_velocity_seen_from_F_along_an_axis_of_M(seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_spin_is_the_rotation_seen_from_F_about_an_axis_of_M(seed):
     F, M = random_motion(seed)
-    ahead, behind = (moved(F, s)["R"].T @ moved(M, s)["R"] for s in (H, -H))
+    ahead, behind = (moved_frame(F, s)["R"].T @ moved_frame(M, s)["R"] for s in (H, -H))
     turn = Rotation.from_matrix(behind.T @ ahead).as_rotvec() / (2 * H)
-    out = evaluated((spin.KIND, ""), F, M, 0.0)
+    out = evaluated((relative_spin.KIND, ""), F, M, 0.0)
     assert rate(out, F, M) == pytest.approx(turn @ AXES[:3], rel=1e-7, abs=1e-8)
     assert out[0] == 0.0
 
@@ -87,9 +87,9 @@ def test_spin_is_the_rotation_seen_from_F_about_an_axis_of_M(seed):
 def test_an_angle_is_the_one_next_to_its_hint(turns):
     """Whole turns come from the hint, the rest from the frames, also where the two disagree by nearly half a turn."""
     F, M = random_motion(4)
-    plain = KINDS[angle.KIND].row((0.0,) * 8, record(F), record(M), 0.0, DATA)[0]
+    plain = KINDS[angle.KIND].row((0.0,) * 8, frame_record(F), frame_record(M), 0.0, DATA)[0]
     assert -np.pi < plain <= np.pi
     for off in (-3.1, 0.0, 3.1):
         hint = plain + 2.0 * np.pi * turns + off
-        value = KINDS[angle.KIND].row((1.0, *(0.0,) * 7), record(F), record(M), hint, DATA)[0]
+        value = KINDS[angle.KIND].row((1.0, *(0.0,) * 7), frame_record(F), frame_record(M), hint, DATA)[0]
         assert value == pytest.approx(plain + 2.0 * np.pi * turns, abs=1e-12)

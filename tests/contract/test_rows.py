@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flyball.constraints import alignment, skew
+from flyball.constraints import alignment, skew_lines
 from flyball.constraints import angle as angle_row
 from flyball.constraints.registry import KINDS
-from flyball.testing.frames import moved, random_motion, record, stepped
+from flyball.testing.formula_checks import complex_step_frame, frame_record, moved_frame, random_motion
 from tests.contract.frames import (
     ASSEMBLY,
     CASES,
@@ -22,7 +22,7 @@ from tests.contract.frames import (
     rate,
 )
 
-PLACES = ("flyball.constraints.corner", "flyball.constraints.touch")
+PLACES = ("flyball.constraints.corner_on_box", "flyball.constraints.ball_on_box")
 """Of places of contact: along motions, in `tests/identities/test_contact_rows.py`."""
 
 every = pytest.mark.parametrize("case", CASES, ids=label)
@@ -42,10 +42,10 @@ def test_wrench_is_the_gradient_of_the_value(case, seed):
     F, M, hint = frames(case, seed)
     G_v = rate(evaluated(case, F, M, hint), F, M)
     e = 1e-30
-    value = evaluated(case, stepped(F, e), stepped(M, e), hint, complex)[0]
+    value = evaluated(case, complex_step_frame(F, e), complex_step_frame(M, e), hint, complex)[0]
     assert np.imag(value) / e == pytest.approx(G_v, rel=1e-11, abs=1e-12)
     h = 1e-5
-    ahead, behind = (evaluated(case, moved(F, s), moved(M, s), hint)[0] for s in (h, -h))
+    ahead, behind = (evaluated(case, moved_frame(F, s), moved_frame(M, s), hint)[0] for s in (h, -h))
     assert (ahead - behind) / (2 * h) == pytest.approx(G_v, rel=1e-7, abs=1e-7)
 
 
@@ -62,7 +62,7 @@ def test_wrench_is_the_gradient_of_the_value_on_the_constraint(case):
     out = evaluated(case, F, M, hint)
     assert out[0] == pytest.approx(0.0, abs=1e-12)
     e = 1e-30
-    value = evaluated(case, stepped(F, e), stepped(M, e), hint, complex)[0]
+    value = evaluated(case, complex_step_frame(F, e), complex_step_frame(M, e), hint, complex)[0]
     assert np.imag(value) / e == pytest.approx(rate(out, F, M), rel=1e-11, abs=1e-12)
 
 
@@ -75,7 +75,7 @@ def test_bias_is_the_second_derivative(case, seed):
     h = 1e-4
     rates = []
     for s in (2 * h, h, -h, -2 * h):
-        f, m = moved(F, s), moved(M, s)
+        f, m = moved_frame(F, s), moved_frame(M, s)
         rates.append(rate(evaluated(case, f, m, hint), f, m))
     assert (8 * (rates[1] - rates[2]) - (rates[0] - rates[3])) / (12 * h) == pytest.approx(bias, rel=1e-7, abs=1e-6)
 
@@ -101,7 +101,7 @@ def test_action_equals_reaction(case):
     F, M, hint = frames(case, 7)
     if case[0] in WORLD:
         f, m = F["R"][:, 2], M["R"][:, 2]
-        s1, s2, k = PARAMETERS[case[0]][case[1]][3:6] if case[0] == skew.KIND else (0.0, 0.0, 0.0)
+        s1, s2, k = PARAMETERS[case[0]][case[1]][3:6] if case[0] == skew_lines.KIND else (0.0, 0.0, 0.0)
         M["p"] = F["p"] + s1 * f + s2 * m + k * np.cross(f, m)
     _, f, tM, tF, _ = (np.array(x) for x in evaluated(case, F, M, hint))
     assert tM + tF + np.cross(M["p"] - F["p"], f) == pytest.approx(np.zeros(3), abs=1e-12)
@@ -113,7 +113,7 @@ def test_nothing_depends_on_the_world(case):
     F, M, hint = frames(case, 11)
     here = evaluated(case, F, M, hint)
     f, m, par, Q = elsewhere(case, F, M)
-    there = KINDS[case[0]].row(par, record(f), record(m), hint, DATA)
+    there = KINDS[case[0]].row(par, frame_record(f), frame_record(m), hint, DATA)
     assert there[0] == pytest.approx(here[0], rel=1e-10, abs=1e-10)
     assert there[4] == pytest.approx(here[4], rel=1e-9, abs=1e-9)
     for a, b in zip(here[1:4], there[1:4], strict=True):
@@ -132,7 +132,7 @@ def test_complex_numbers_without_imaginary_part_change_nothing(case):
 def test_arrays_over_time_are_so_many_numbers(case):
     """Results run the rows on arrays over time: each entry is what the numbers of that time give."""
     single = [frames(case, seed) for seed in range(4)]
-    F, M = (_over_time([record(s[side]) for s in single]) for side in range(2))
+    F, M = (_over_time([frame_record(s[side]) for s in single]) for side in range(2))
     kind, name = case
     out = KINDS[kind].row(PARAMETERS[kind][name], F, M, np.array([hint for _, _, hint in single]), DATA)
     for k, (f, m, hint) in enumerate(single):
@@ -153,7 +153,7 @@ def test_alignment_measures_the_true_angle(angle):
     axis = np.array([0.6, 0.8, 0.0])
     M["R"] = F["R"] @ Rotation.from_rotvec(angle * axis).as_matrix()
     unit = np.eye(3)
-    ends = record(F), record(M), 0.0, DATA
+    ends = frame_record(F), frame_record(M), 0.0, DATA
     full = [alignment.full_row((*unit[i], 0, 0, 0, 0, 1), *ends)[0] for i in range(3)]
     tilt = [alignment.axis_row((*unit[i], 0, 0, 0, 0, 1), *ends)[0] for i in range(2)]
     assert np.linalg.norm(full) == pytest.approx(angle, abs=1e-7)

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from flyball.errors import ExpressionError
-from flyball.laws.call import STACK_RESERVE
-from flyball.laws.evaluation import evaluate, evaluate_jet
-from flyball.laws.opcodes import BY_MOTION, BY_TIME, FREEZE
-from flyball.laws.program import compile_law
+from flyball.laws.bytecode import BY_MOTION, BY_TIME, FREEZE, STACK_RESERVE, evaluate, evaluate_jet
+from flyball.laws.compilation import compile_law
 from flyball.math import scalar
 from flyball.model.expressions import Expression, law_expression
 from flyball.model.table import Table

@@ -7,9 +7,9 @@ import pytest
 from scipy.linalg import expm
 
 import flyball as fb
-from flyball.analysis import checkpointed as keeper
-from flyball.analysis.motion.events import run
-from flyball.analysis.motion.implicit.made import implicit
+from flyball.simulation import checkpoints as keeper
+from flyball.simulation.events import event_loop
+from flyball.simulation.implicit.integrators import implicit_integrator
 from tests.checkpoints.motions import cut, killed
 from tests.control.slide import TIGHT, slide
 
@@ -103,8 +103,8 @@ def test_states_that_events_set_in_a_motion_of_many_parts(tmp_path, monkeypatch)
     cut(monkeypatch, 4)
     kept = []
     with monkeypatch.context() as within:
-        write = keeper.Keeper.write
-        within.setattr(keeper.Keeper, "write", lambda self: (write(self), kept.append(self.parts[-1].final[0])))
+        write = keeper.CheckpointFile.write
+        within.setattr(keeper.CheckpointFile, "write", lambda self: (write(self), kept.append(self.parts[-1].final[0])))
         m.simulate(1.55, rtol=1e-10, outputs=2, checkpoint=tmp_path / "whole.nc")
     before = sum(t < 1.05 for t in kept)
     assert 0 < before < len(kept)
@@ -127,7 +127,7 @@ def test_an_event_at_an_instant_where_a_law_jumps_later(way):
 def test_jacobians_serve_from_sample_to_sample(monkeypatch):
     """Only what pushes jumps at instants: of a linear loop one is enough, to the exact discrete solution."""
     period, made = 1e-3, []
-    monkeypatch.setattr(run, "implicit", lambda *a: made.append(implicit(*a)) or made[-1])
+    monkeypatch.setattr(event_loop, "implicit_integrator", lambda *a: made.append(implicit_integrator(*a)) or made[-1])
     m = slide(fb.PID("pid", setpoint="1", measured="A.displacement", kp=80, ki=60, period=period))
     r = m.simulate(0.5, outputs=501, method="radau", rtol=1e-10, atol=1e-11)
     P = expm(np.array([[0, 1, 0], [-10, -2, 1], [0, 0, 0]]) * period)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.tables.contact import touching
-from flyball.tables.numbers import numbers
+from flyball.tables.contact_tables import contact_tables
+from flyball.tables.element_numbers import element_numbers
 
 BALL = fb.Sphere(radius=0.1)
 
@@ -155,14 +155,14 @@ def test_shapes_without_an_outline(shape, message):
     m = scene(planar=True)
     m.add(fb.Ground("wall", shape=shape), fb.Contact(friction=0.1))
     with pytest.raises(fb.ModelError, match=rf"Ground 'wall': {type(shape).__name__}: {message}"):
-        touching(m, numbers(m), ["ball"])
+        contact_tables(m, element_numbers(m), ["ball"])
 
 
 def test_contact_on_a_body_without_mass():
     m = scene()
     m.add(fb.Body("ring", mass=0, inertia=(0, 0, 0), shape=BALL), fb.Contact(friction=0.1))
     with pytest.raises(fb.ModelError, match=r"Body 'ring': it touches and has no mass"):
-        touching(m, numbers(m), ["ball", "ring"])
+        contact_tables(m, element_numbers(m), ["ball", "ring"])
 
 
 def test_analyses_that_know_no_contact_say_so():
@@ -216,7 +216,7 @@ def test_stiffness_that_nothing_says():
     m = scene()
     m.add(fb.Contact(friction=0.3, law="hertz"))
     with pytest.raises(fb.ModelError, match=r"says no stiffness of(?s:.*)youngs_modulus(?s:.*)give stiffness="):
-        touching(m, numbers(m), ["ball", "other"])
+        contact_tables(m, element_numbers(m), ["ball", "other"])
 
 
 def test_elastic_constants_say_nothing_of_a_box_on_a_floor():
@@ -227,4 +227,4 @@ def test_elastic_constants_say_nothing_of_a_box_on_a_floor():
     m.replace(fb.Ground("floor", shape=fb.Plane(), material="steel"))
     m.add(fb.Contact(between="box", others="floor", friction=0.3, law="hertz"))
     with pytest.raises(fb.ModelError, match=r"only for spheres on spheres or on flat shapes(?s:.*)stiffness="):
-        touching(m, numbers(m), ["ball", "other", "box"])
+        contact_tables(m, element_numbers(m), ["ball", "other", "box"])

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from flyball.errors import ExpressionError, FlyballError, ModelError, UnitError
-from flyball.laws.program import compile_law
-from flyball.model.expressions import Expression, law_expression, number
-from flyball.model.parameters import resolve_parameters
+from flyball.laws.compilation import compile_law
+from flyball.model.expressions import Expression, law_expression, number, resolve_parameters
 from flyball.model.units import to_si
 
 WHERE = "mass of body 'crank'"

@@ -7,7 +7,7 @@ import pytest
 
 import flyball as fb
 from flyball.errors import ExpressionError, ModelError, UnitError
-from flyball.laws.program import compile_law
+from flyball.laws.compilation import compile_law
 from flyball.model.expressions import Expression, law_expression
 from flyball.model.table import Table
 

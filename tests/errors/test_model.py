@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.simulate import output_times
+from flyball.simulation.simulate import output_times
 from flyball.tables.structure import structure
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.start import begin
-from flyball.analysis.motion.unbounded import longest_stable
-from flyball.numerics.integrators.tableaux import tableau
+from flyball.numerics.integrators.butcher_tableaux import tableau
+from flyball.simulation.initial_state import find_initial_state
+from flyball.simulation.law_faults import longest_stable
 from tests.control.slide import slide
 
 
@@ -42,7 +42,7 @@ def test_a_fixed_step_that_is_too_long_is_told_with_the_longest_stable_one(metho
 
 def test_the_longest_stable_step_is_that_of_the_stability_region():
     """Hairer and Wanner (1996), section IV.2: 3.31 on the negative real axis for Dormand and Prince's method of order 5."""
-    start = begin(damped().snapshot(), 0.0, None, None, "auto", switches=True).assembly
+    start = find_initial_state(damped().snapshot(), 0.0, None, None, "auto", switches=True).assembly
     longest, rate = longest_stable(start, tableau("rk45"))
     assert rate == pytest.approx(3000.0, rel=1e-5)
     assert longest * rate == pytest.approx(3.31, abs=0.01)

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 import flyball as fb
 from flyball.errors import ExpressionError, ModelError, UnitError
-from flyball.model.expressions import law_expression, number
-from flyball.model.parameters import resolve_parameters
+from flyball.model.expressions import law_expression, number, resolve_parameters
 from flyball.model.units import KINDS, to_si
 
 NAMES = ["t", "x", "v", "h", "s", "m", "g", "k", "a", "b", "c", "d", "l", "u", "K", "N", "R", "T", "deg", "mm", "rate"]

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import pytest
 
-from flyball.constraints.modes import LOCK
+from flyball.constraints.switch_kinds import LOCK
 from flyball.model.element import Element, element
-from flyball.model.switch import Switch
+from flyball.model.force import Switch
 
 BOTH = pytest.mark.parametrize("coordinates", ["absolute", "joint"])
 

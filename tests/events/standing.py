@@ -6,11 +6,11 @@ import inspect
 
 import numpy as np
 
-from flyball.analysis.motion.choice import SimulateOptions
-from flyball.analysis.motion.events.here import Here
-from flyball.analysis.motion.start import begin
-from flyball.analysis.simulate import clock_for
-from flyball.tables.system import VALUE
+from flyball.simulation.events.context import EventContext
+from flyball.simulation.initial_state import find_initial_state
+from flyball.simulation.method_choice import SimulateOptions
+from flyball.simulation.simulate import clock_for
+from flyball.tables.table_definitions import VALUE
 
 ASKED = {
     "method": "dop853", "t_end": 1.0, "t_start": None, "outputs": 2, "parameters": None, "start": None,
@@ -19,33 +19,33 @@ ASKED = {
 }  # fmt: skip
 
 
-def standing(m, coordinates) -> Here:
+def standing(m, coordinates) -> EventContext:
     """Of a mechanism, at t = 0, nothing decided yet."""
-    more = {"switches": True} if "switches" in inspect.signature(begin).parameters else {}
-    start = begin(m.snapshot(), 0.0, None, None, coordinates, **more)
+    more = {"switches": True} if "switches" in inspect.signature(find_initial_state).parameters else {}
+    start = find_initial_state(m.snapshot(), 0.0, None, None, coordinates, **more)
     clock = clock_for(start, 0.0, 1.0, np.array([0.0, 1.0]), SimulateOptions(**ASKED, coordinates=coordinates))
-    return Here(start, clock)
+    return EventContext(start, clock)
 
 
-def modes(here: Here) -> list[float]:
+def modes(here: EventContext) -> list[float]:
     """Of all switches."""
     return here.c.work.modes.mode.tolist()
 
 
-def ways(here: Here) -> list[float]:
+def ways(here: EventContext) -> list[float]:
     """Ways of all switches."""
     n = len(here.c.system.switches.row)
     return here.c.work.sensed[VALUE, here.c.work.sensed.shape[1] - n :].tolist()
 
 
-def moving(here: Here) -> dict[str, np.ndarray]:
+def moving(here: EventContext) -> dict[str, np.ndarray]:
     """(vx, vy, turning rate) of every body."""
     c = here.c
     bodies = c.moving(here.t, here.q, here.v)
     return {name: np.array([b.v[0], b.v[1], b.w[2]]) for name, b in bodies.items()}
 
 
-def kicked(here: Here, body: str, at, impulse) -> np.ndarray:
+def kicked(here: EventContext, body: str, at, impulse) -> np.ndarray:
     """Generalised impulse of a blow on a body at a point of the plane, by virtual work."""
     c = here.c
     before, v = here.v.copy(), np.zeros(c.structure.nv)

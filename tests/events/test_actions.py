@@ -371,10 +371,10 @@ def test_without_parameters_results_are_saved_too(layer, tmp_path):
 
 
 def test_events_that_come_ever_closer_are_named(monkeypatch):
-    from flyball.analysis.motion.events import run
+    from flyball.simulation.events import event_loop
 
-    monkeypatch.setattr(run, "ENDLESS", 30)
-    monkeypatch.setattr(run, "AT_ONCE", 1e-3)
+    monkeypatch.setattr(event_loop, "ENDLESS", 30)
+    monkeypatch.setattr(event_loop, "AT_ONCE", 1e-3)
     m = slide()
     m.add(fb.Event("ever faster", "sin(1/(0.3 - t))"))
     with pytest.raises(fb.SimulationError, match=r"without end \(30 within .* s\): Event 'ever faster'"):

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.compiled import compiled
-from flyball.analysis.motion.start import begin
-from flyball.analysis.motion.touches import impossible, with_places
-from flyball.equations.engine import MOTION
-from flyball.equations.friction import FORGOTTEN
-from flyball.model.touch import Touch
-from flyball.tables.system import HELD, OFF, VALUE
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.engine.entry_point import MOTION
+from flyball.engine.loads import SLOPES_UNKNOWN
+from flyball.model.contact_point import Touch
+from flyball.simulation.initial_state import find_initial_state
+from flyball.simulation.method_choice import unsupported_contacts, with_contact_points
+from flyball.tables.table_definitions import HELD, OFF, VALUE
 
 G, MU = 9.81, 0.3
 BALL = fb.Sphere(radius=0.1)
@@ -29,17 +29,17 @@ def floor(planar=False):
 
 
 def names(m):
-    return [e.name for e in with_places(m, None).forces if isinstance(e, Touch)]
+    return [e.name for e in with_contact_points(m, None).forces if isinstance(e, Touch)]
 
 
 def moving(m, modes, ways, coordinates="absolute"):
     """Accelerations and multipliers of the tables with these modes and ways of the switches of the first place."""
-    a = begin(with_places(m, None), 0.0, None, None, coordinates, switches=True).assembly
+    a = find_initial_state(with_contact_points(m, None), 0.0, None, None, coordinates, switches=True).assembly
     c = a.compiled
     W, n = c.work, len(c.structure.switches)
     W.modes.mode[: len(modes)] = modes
     W.sensed[VALUE, W.sensed.shape[1] - n : W.sensed.shape[1] - n + len(ways)] = ways
-    W.counts.load_updates = FORGOTTEN
+    W.counts.load_updates = SLOPES_UNKNOWN
     status, dy = c.at(a.t, a.q, a.v, MOTION)
     assert status == 0
     nq, nv = c.structure.nq, c.structure.nv
@@ -61,7 +61,7 @@ def test_places_in_the_plane():
     ball = fb.Body("ball", shape=BALL, density=1000, position=(0, 0.5))
     found = names(scene(floor(True), box, top, planar=True))
     assert len(found) == 4 + 4 + 8
-    c = compiled(with_places(scene(box, top, planar=True), None), switches=True)
+    c = compile_mechanism(with_contact_points(scene(box, top, planar=True), None), switches=True)
     faces = [c.z[c.structure.state_at[f"box-top-{k}.place"]] for k in (1, 2, 7, 8)]
     assert faces == [2, 2, 3, 3]  # one stands on the other, though their sides are in line too
     assert names(scene(box, ball, planar=True)) == ["box-ball"]
@@ -72,8 +72,8 @@ def test_what_rows_do_not_know_is_named_and_left_to_steps():
     b = fb.Body("b", shape=fb.Box(edges=(0.2, 0.2, 0.1)), density=1000, position=(0, 0, 0.15))
     m = scene(floor(), a, b)
     with pytest.raises(fb.ModelError, match=r"the box of 'a' on the box of 'b'; leave method out, or give method='imp"):
-        with_places(m, None)
-    assert "the box of 'a' on the box of 'b'" in impossible(m, None)
+        with_contact_points(m, None)
+    assert "the box of 'a' on the box of 'b'" in unsupported_contacts(m, None)
 
 
 @pytest.mark.parametrize("coordinates", ["absolute", "joint"])

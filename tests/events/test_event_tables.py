@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.compiled import compiled
-from flyball.constraints.modes import LOCK
-from flyball.equations.engine import MOTION
-from flyball.equations.guards import watch
-from flyball.tables.events import own_row, parting
-from flyball.tables.spanning import spanning
-from flyball.tables.system import EITHER, FALLING, G_LAW, HELD, RISING, VALUE
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.constraints.switch_kinds import LOCK
+from flyball.engine.entry_point import MOTION
+from flyball.engine.guards import evaluate_guards
+from flyball.tables.constraint_rows import joint_row_name, released_joints
+from flyball.tables.coordinate_choice import spanning_joints
+from flyball.tables.table_definitions import EITHER, FALLING, G_LAW, HELD, RISING, VALUE
 
 
 def model(planar: bool = True) -> fb.Mechanism:
@@ -38,13 +38,13 @@ def model(planar: bool = True) -> fb.Mechanism:
 
 def test_only_a_motion_has_them():
     m = model()
-    assert len(compiled(m).structure.guards) == 0
-    assert len(compiled(m).structure.switches) == 0
-    assert compiled(m).structure.measured == {}
+    assert len(compile_mechanism(m).structure.guards) == 0
+    assert len(compile_mechanism(m).structure.switches) == 0
+    assert compile_mechanism(m).structure.measured == {}
 
 
 def test_one_row_for_each_coordinate_and_those_of_joints_that_let_go():
-    s = compiled(model(), switches=True).structure
+    s = compile_mechanism(model(), switches=True).structure
     assert [(x.element.name, x.switch.kind, x.held) for x in s.switches] == [
         ("stop", LOCK, False),
         *[("W", LOCK, True)] * 3,
@@ -56,17 +56,17 @@ def test_one_row_for_each_coordinate_and_those_of_joints_that_let_go():
 
 def test_what_lets_go_is_no_tree_joint():
     m = model()
-    assert [j.name for j in parting(m)] == ["W"]
-    assert spanning(m) == ("A",)
+    assert [j.name for j in released_joints(m)] == ["W"]
+    assert spanning_joints(m) == ("A",)
     m.events.pop(1)
-    assert spanning(m) == ("A", "W")
+    assert spanning_joints(m) == ("A", "W")
 
 
 @pytest.mark.parametrize("planar", [True, False])
 @pytest.mark.parametrize("tree", [(), ("A",)])
 def test_rows_that_let_go_are_measured_as_they_are(planar, tree):
     """Away from closed, the measured copy of each row of the joint has its value and gradient."""
-    c = compiled(model(planar), tree=tree, switches=True)
+    c = compile_mechanism(model(planar), tree=tree, switches=True)
     s, S = c.structure, c.system
     c.work.modes.mode[:] = HELD
     rng = np.random.default_rng(3)
@@ -77,7 +77,7 @@ def test_rows_that_let_go_are_measured_as_they_are(planar, tree):
     J = c.jacobian()
     nr = len(S.rows.law)
     for k, row in enumerate(range(rows.start, rows.stop)):
-        m = s.measured[own_row(s.model["W"], k)]
+        m = s.measured[joint_row_name(s.model["W"], k)]
         assert c.work.sensed[VALUE, m] == pytest.approx(c.work.rows.value[row], abs=1e-12)
         gradient = np.zeros(s.nv)
         at = slice(S.row_start[nr + m], S.row_start[nr + m + 1])
@@ -91,10 +91,10 @@ def test_guards_read_curves_and_rates():
     m = model()
     m.events.pop(1)
     m.add(fb.Event("went", "turned + A.rate - k*t", direction="falling"))
-    c = compiled(m, tree=("A", "W"), switches=True)
+    c = compile_mechanism(m, tree=("A", "W"), switches=True)
     c.at(0.5, np.array([0.3]), np.array([0.7]), MOTION)
     out = np.zeros(len(c.structure.guards))
-    watch(c.system, c.work, 0.5, out)
+    evaluate_guards(c.system, c.work, 0.5, out)
     angle = 0.3 + np.arctan2(0.2, 0.1)
     vx = -0.7 * np.hypot(0.1, 0.2) * np.sin(angle)
     names = [c.structure.events[g].name for g in range(len(out))]

@@ -98,7 +98,7 @@ def test_every_part_that_holds_at_times_is_asked_about():
 def test_every_analysis_is_asked():
     public = {
         n for n, f in inspect.getmembers(fb.Mechanism, inspect.isfunction)
-        if not n.startswith("_") and f.__module__.startswith("flyball.methods")
+        if not n.startswith("_") and f.__module__.startswith("flyball.mechanism_methods")
     }  # fmt: skip
     assert public == set(ASKED) | ELSEWHERE
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.results.struck import Struck, summed
+from flyball.results.reactions import EventImpulses, sum_impulses
 from tests.layers import both_layers
 
 ROUND = {"looks": True, "contact": True}
@@ -183,9 +183,9 @@ def run_table(m):
 def test_jumps_that_follow_one_another_are_one():
     """Of elements, of rows and of what was given."""
     blows = [("along", 0, 1.0, "blow")], [("along", 1, 4.0, "other")]
-    first = Struck({"stop": 1.0}, np.array([1.0, 2.0]), blows[0])
-    second = Struck({"stop": 0.5, "rope": 2.0}, np.array([0.5, -1.0]), blows[1])
-    both = summed([first, second]).plain()
+    first = EventImpulses({"stop": 1.0}, np.array([1.0, 2.0]), blows[0])
+    second = EventImpulses({"stop": 0.5, "rope": 2.0}, np.array([0.5, -1.0]), blows[1])
+    both = sum_impulses([first, second]).plain()
     assert both == {"own": {"stop": 1.5, "rope": 2.0}, "rows": [1.5, 1.0], "blows": (*blows[0], *blows[1])}
 
 

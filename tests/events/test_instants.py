@@ -9,8 +9,8 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
-from flyball.analysis import simulate as simulating
 from flyball.errors import SimulationError
+from flyball.simulation import simulate as simulating
 from tests.layers import LAYERS
 
 G = 9.81
@@ -167,7 +167,7 @@ def test_motions_without_events_take_the_way_they_always_took(monkeypatch):
     def never(*_):
         raise AssertionError
 
-    monkeypatch.setattr(simulating, "run_events", never)
+    monkeypatch.setattr(simulating, "integrate_events", never)
     assert ball().simulate(0.1).health.success
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.events.happen import begin
-from flyball.constraints.modes import STOP
-from flyball.tables.system import HELD
+from flyball.constraints.switch_kinds import STOP
+from flyball.simulation.events.resolution import resolve_start
+from flyball.tables.table_definitions import HELD
 from tests.events.one_row import BOTH, Row, forgotten, rows
 from tests.events.standing import kicked, modes, moving, standing
 
@@ -33,8 +33,8 @@ def test_blow_on_the_end_of_two_hinged_rods(coordinates):
     """P across at the free end of the first: u = 5 P / 4 m, w = -9 P / 4 m a; -P / 4 m, 3 P / 4 m a, half length a = 1."""
     m = rows(rods(), Row("far", of=("B.angle",), kind=STOP, par=(-1.0, 1.0)))
     here = standing(m, coordinates)
-    here.kick = kicked(here, "a", (-2.0, 0.0), (0.0, 2.0))
-    begin(here)
+    here.external_impulse = kicked(here, "a", (-2.0, 0.0), (0.0, 2.0))
+    resolve_start(here)
     now = moving(here)
     np.testing.assert_allclose(now["a"], [0.0, 2.5, -4.5], atol=1e-14)
     np.testing.assert_allclose(now["b"], [0.0, -0.5, 1.5], atol=1e-14)
@@ -47,9 +47,9 @@ def test_hinge_that_locks(coordinates):
     """Both go on as one: momentum and angular momentum of the two are kept."""
     m = rows(rods(), Row("lock", of=("B.angle",)))
     here = standing(m, coordinates)
-    here.kick = kicked(here, "a", (-2.0, 0.0), (0.0, 2.0))
+    here.external_impulse = kicked(here, "a", (-2.0, 0.0), (0.0, 2.0))
     here.c.work.modes.mode[0] = HELD
-    begin(here)
+    resolve_start(here)
     w = -2.0 * 2.0 / (2 / 3 + 2.0)  # about the middle: r x P over the inertia of a rod of length 4 and mass 2
     now = moving(here)
     np.testing.assert_allclose(now["a"], [0.0, 1.0 - w, w], atol=1e-14)
@@ -80,7 +80,7 @@ def test_sudden_stop_of_a_double_rod(coordinates):
     """The first hinge stops dead: the second rod keeps its angular momentum about its hinge, w' = w_b + 3 v_B / 4 a."""
     m = rows(turning(1.5, -0.5), Row("stop", of=("A.angle",), kind=STOP, par=(-np.inf, 0.0)))
     here = standing(m, coordinates)
-    begin(here)
+    resolve_start(here)
     w = -0.5 + 0.75 * 3.0
     np.testing.assert_allclose(moving(here)["a"], 0.0, atol=1e-14)
     np.testing.assert_allclose(moving(here)["b"], [0.0, w, w], atol=1e-14)
@@ -96,7 +96,7 @@ def test_sudden_stop_of_a_double_rod(coordinates):
 def test_elastic_stop_of_a_double_rod_keeps_the_energy(coordinates):
     m = rows(turning(1.5, -0.5), Row("stop", of=("A.angle",), kind=STOP, par=(-np.inf, 0.0, 1.0)))
     here = standing(m, coordinates)
-    begin(here)
+    resolve_start(here)
     assert here.lost == pytest.approx(0.0, abs=1e-14)
     assert moving(here)["a"][2] == pytest.approx(-1.5, rel=1e-13)
 
@@ -107,7 +107,7 @@ def test_second_hinge_of_a_double_pendulum_locks(coordinates):
     m = rows(turning(1.0, -2.0), Row("lock", of=("B.angle",)))
     here = standing(m, coordinates)
     here.c.work.modes.mode[0] = HELD
-    begin(here)
+    resolve_start(here)
     w = (4 / 3 + 0.0 - 2 / 3) / (4 / 3 + 1 / 3 + 9)
     np.testing.assert_allclose([moving(here)[x][2] for x in "ab"], w, rtol=1e-13)
 
@@ -131,7 +131,7 @@ def cradle(speeds, e):
 def test_three_in_a_row_by_poissons_law(coordinates, e, after):
     """All at once: compression to 1/3 by impulses 2/3 and 1/3, then e times these (Glocker 2001)."""
     here = standing(cradle((1.0, 0.0, 0.0), e), coordinates)
-    begin(here)
+    resolve_start(here)
     np.testing.assert_allclose([moving(here)[f"b{i}"][0] for i in range(3)], after, atol=1e-14)
     assert here.lost == pytest.approx(0.5 - 0.5 * sum(u * u for u in after), abs=1e-14)
 
@@ -142,7 +142,7 @@ def test_driver_that_moves_what_is_to_be_locked_is_told():
     m.add(fb.Driver("turn", "A.angle", "2 * t"))
     here = standing(rows(m, Row("stop", of=("A.angle",), kind=STOP, par=(-1.0, 0.0))), "absolute")
     with pytest.raises(fb.SimulationError, match="no impulses let the velocities fulfil") as error:
-        begin(here)
+        resolve_start(here)
     assert "stop" in str(error.value)
 
 
@@ -157,7 +157,7 @@ def test_driver_gives_what_an_impact_takes(coordinates):
     of = ("P0.displacement", "P1.displacement")
     here = standing(rows(m, Row("gap", of=of, kind=STOP, par=(0.0, np.inf, 0.0), weights=(-1.0, 1.0))), coordinates)
     z = here.y[here.structure.nq + here.structure.nv :].copy()
-    begin(here)
+    resolve_start(here)
     assert moving(here)["b1"][0] == pytest.approx(1.0, rel=1e-13)
     assert here.lost == pytest.approx(1.0, rel=1e-13)
     given = here.y[here.structure.nq + here.structure.nv :] - z
@@ -170,7 +170,7 @@ def test_start_beyond_a_limit_names_it():
     with pytest.raises(
         fb.ModelError, match=r"'knee'.*begins beyond it: B.angle is 0 rad and must be within 0.2 rad .* and 1 rad"
     ):
-        begin(here)
+        resolve_start(here)
 
 
 @BOTH

@@ -57,6 +57,6 @@ def test_in_two_parts_it_is_the_same(run):
 def test_a_file_keeps_what_held(run, tmp_path):
     run.save(tmp_path / "run.nc")
     again = fb.load_result(tmp_path / "run.nc")
-    assert np.array_equal(again.stretches.mode, run.stretches.mode)
+    assert np.array_equal(again.phases.mode, run.phases.mode)
     for name, (_, x) in run.channels().items():
         assert np.array_equal(again[name], x, equal_nan=True), name

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.numerics.integrators.watching import EITHER, FALLING, RISING
+from flyball.numerics.event_location.guards import EITHER, FALLING, RISING
 from tests.events.watched_ode import run
 
 G = 9.81

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion import touches
+from flyball.simulation import method_choice
 
 G = 9.81
 ADAPTIVE, STEPS = "dop853, from touch to touch", "steps by impulses"
@@ -60,7 +60,7 @@ def test_many_or_unknown_places_are_left_to_steps(parts, why):
 
 
 def test_what_only_an_integration_knows_decides(monkeypatch):
-    monkeypatch.setattr(touches, "FEW", 2)
+    monkeypatch.setattr(method_choice, "FEW", 2)
     many = [ball(f"b{k}", (k, 0, 0.1)) for k in range(2)]
     m = scene(*many)
     m.add(fb.Event("late", "t > 0.005", do=[fb.Stop()]))

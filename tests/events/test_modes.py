@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.events.happen import begin
-from flyball.constraints.modes import ONE_WAY, STOP
-from flyball.equations.engine import MOTION
-from flyball.tables.system import HELD, OFF
+from flyball.constraints.switch_kinds import ONE_WAY, STOP
+from flyball.engine.entry_point import MOTION
+from flyball.simulation.events.resolution import resolve_start
+from flyball.tables.table_definitions import HELD, OFF
 from tests.events.one_row import BOTH, Row, forgotten, rows
 from tests.events.standing import modes, standing
 
@@ -37,7 +37,7 @@ def carried(here):
 def test_rod_on_three_supports(coordinates, middle):
     """What it carries balances its weight, and no support pulls."""
     here = standing(table(middle), coordinates)
-    begin(here)
+    resolve_start(here)
     x = carried(here)
     assert (x >= -1e-12).all()
     np.testing.assert_allclose([x.sum(), x[2] - x[0]], [1.0, middle], atol=1e-10)
@@ -47,7 +47,7 @@ def test_rod_on_three_supports(coordinates, middle):
 @BOTH
 def test_rod_whose_weight_is_beyond_its_supports_tips(coordinates):
     here = standing(table(1.2), coordinates)
-    begin(here)
+    resolve_start(here)
     assert modes(here) == [OFF, OFF, HELD]
     # about the last support: (0.4 + 0.2^2) alpha = -0.2; it carries 1 + 0.2 alpha
     assert carried(here)[2] == pytest.approx(1.0 - 0.2 * 0.2 / 0.44, rel=1e-12)
@@ -59,7 +59,7 @@ def test_layers_decide_the_same_by_the_same_words(coordinates):
     rng = np.random.default_rng(5)
     for middle in rng.uniform(-1.3, 1.3, 6):
         one, other = standing(table(middle), "absolute"), standing(table(middle), "joint")
-        begin(one), begin(other)
+        resolve_start(one), resolve_start(other)
         assert modes(one) == modes(other)
         np.testing.assert_allclose(carried(one), carried(other), atol=1e-10)
 
@@ -70,7 +70,7 @@ def test_freewheel_that_is_pulled_back_locks(coordinates):
     m.add(fb.Body("wheel", mass=1.0, inertia=0.5), fb.Revolute("A", "ground", "wheel", at=(0, 0)))
     m.add(fb.Motor("pull", "A", torque="-2"))
     here = standing(rows(m, Row("free", of=("A.angle",), kind=ONE_WAY)), coordinates)
-    begin(here)
+    resolve_start(here)
     assert modes(here) == [HELD]
     assert carried(here)[0] == pytest.approx(2.0, rel=1e-13)
 
@@ -78,9 +78,9 @@ def test_freewheel_that_is_pulled_back_locks(coordinates):
 def test_nothing_is_decided_twice_at_one_instant():
     """A motion that goes on from what was decided decides the same."""
     here = standing(table(0.3), "absolute")
-    begin(here)
+    resolve_start(here)
     first, y = modes(here), here.y.copy()
-    begin(here)
+    resolve_start(here)
     assert modes(here) == first
     np.testing.assert_array_equal(here.y, y)
     assert not here.records

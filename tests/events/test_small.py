@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.events import modes, run
-from flyball.constraints.modes import SLIP
+from flyball.constraints.switch_kinds import SLIP
+from flyball.simulation.events import event_loop, mode_selection
 
 from .watched_ode import run as watched
 
@@ -71,14 +71,14 @@ def test_what_begins_beneath_sinks_no_deeper():
 
 @pytest.mark.parametrize("size", [1.0, 1e-4])
 def test_beneath_the_floor_is_refused(monkeypatch, size):
-    happens, times = run.Run.happens, []
+    happens, times = event_loop.EventDrivenMotion.happens, []
 
     def sunk(self, fired):
         times.append(self.here.t)
         self.here.q[1] -= 1e-6 * size * (len(times) == 2)
         happens(self, fired)
 
-    monkeypatch.setattr(run.Run, "happens", sunk)
+    monkeypatch.setattr(event_loop.EventDrivenMotion, "happens", sunk)
     with pytest.raises(fb.SimulationError, match=f"ground and 'b' are in each other by {1e-6 * size:.3g} m"):
         dropped(size, 9.81, 0.1, 0.5).simulate(3.0, method="dop853")
     assert len(times) == 2
@@ -97,7 +97,7 @@ def pushed():
 @pytest.mark.parametrize("often", [1, 10**9])
 def test_a_slip_that_begins_backwards_is_seen(monkeypatch, often):
     """From (mu g - 2) / 2 on it slides with x'' = 2 + 2 t - mu g, though it was told to slide the other way."""
-    write, count = modes.write_slips, []
+    write, count = mode_selection.write_slips, []
 
     def backwards(n, parts, found):
         write(n, parts, found)
@@ -106,9 +106,9 @@ def test_a_slip_that_begins_backwards_is_seen(monkeypatch, often):
             count.append(n.here.t)
             ways[slips] *= -1.0
 
-    monkeypatch.setattr(modes, "write_slips", backwards)
+    monkeypatch.setattr(mode_selection, "write_slips", backwards)
     if often > 1:
-        monkeypatch.setattr(run, "ENDLESS", 50)
+        monkeypatch.setattr(event_loop, "ENDLESS", 50)
         with pytest.raises(fb.SimulationError, match="without end"):
             pushed().simulate(1.5, method="dop853")
         return

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.compiled import Compiled
-from flyball.analysis.motion.events.segments import Segments
-from flyball.analysis.motion.residual import acceleration_violation
-from flyball.analysis.motion.start import begin
-from flyball.constraints.modes import LOCK
-from flyball.equations.engine import MOTION
+from flyball.assembly.compiled_mechanism import CompiledMechanism
+from flyball.constraints.switch_kinds import LOCK
+from flyball.engine.entry_point import MOTION
 from flyball.model.element import Element, element
-from flyball.model.switch import Switch
+from flyball.model.force import Switch
 from flyball.results.health import Health
 from flyball.results.result import Result
-from flyball.tables.system import HELD
+from flyball.simulation.diagnosis import acceleration_violation
+from flyball.simulation.events.event_loop import PhaseRecorder
+from flyball.simulation.initial_state import find_initial_state
+from flyball.tables.table_definitions import HELD
 
 
 @element
@@ -65,8 +65,8 @@ def row(c, t, x, v):
 def two_stretches(damping=0.0):
     """At rest held at x = 0.1, k = 100; from then on free at k = 400."""
     m = block(damping=damping).snapshot()
-    a = begin(m, 0.0, None, None, "joint", switches=True).assembly
-    seen, lost = Segments(), 0.0
+    a = find_initial_state(m, 0.0, None, None, "joint", switches=True).assembly
+    seen, lost = PhaseRecorder(), 0.0
     rows = []
     here = SimpleNamespace(c=a.compiled, structure=a.compiled.structure, lost=lost, given=0.0, y=None)
     here.c.work.modes.mode[0], here.c.work.modes.hold[0] = HELD, 0.1
@@ -74,7 +74,11 @@ def two_stretches(damping=0.0):
         if told:
             from flyball.tables.values import values
 
-            here.c = Compiled(values(a.compiled.structure, told), a.compiled.z.copy(), told) if not rows[1:] else here.c
+            here.c = (
+                CompiledMechanism(values(a.compiled.structure, told), a.compiled.z.copy(), told)
+                if not rows[1:]
+                else here.c
+            )
             here.lost = 0.25
         new = row(here.c, float(len(rows)), *state)
         rows.append(new)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.assemble import assemble
-from flyball.analysis.compiled import compiled
-from flyball.analysis.motion.start import begin
-from flyball.constraints.modes import LOCK, STOP
-from flyball.equations.engine import MOTION
+from flyball.assembly.assemble import assemble
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.constraints.switch_kinds import LOCK, STOP
+from flyball.engine.entry_point import MOTION
 from flyball.model.element import Element, element
-from flyball.model.switch import Switch
-from flyball.tables.system import HELD, OFF, STEADY, VALUE
+from flyball.model.force import Switch
+from flyball.simulation.initial_state import find_initial_state
+from flyball.tables.table_definitions import HELD, OFF, STEADY, VALUE
 from tests.mechanisms import four_bar
 
 
@@ -48,7 +48,7 @@ def double(of, coordinates):
     m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(1, 0)))
     m.limits.append(Hold("hold", of=of))
     m.by_name["hold"] = m.limits[-1]
-    return begin(m.snapshot(), 0.0, None, None, coordinates, switches=True).assembly
+    return find_initial_state(m.snapshot(), 0.0, None, None, coordinates, switches=True).assembly
 
 
 @pytest.mark.parametrize("coordinates", ["absolute", "joint"])
@@ -57,7 +57,7 @@ def test_off_it_is_as_if_it_were_not_there(coordinates):
     c = a.compiled
     assert len(c.structure.switches) == 1
     status, dy = c.at(a.t, a.q, a.v, MOTION)
-    plain = compiled(c.structure.model, tree=c.structure.tree)
+    plain = compile_mechanism(c.structure.model, tree=c.structure.tree)
     plain.follow(c.hints)
     wanted = plain.at(a.t, a.q, a.v, MOTION)[1]
     assert status == 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.results.events import Events, Happening
+from flyball.results.events import EventRecord, Events
 
 
 @pytest.fixture(scope="module")
@@ -24,8 +24,8 @@ def happened(run):
     s = run.values.structure
     before, after = y.copy(), y.copy()
     after[s.nq : s.nq + s.nv] *= 0.5
-    hit = Happening(0.5, "wall", "impact", ("bounced",), 6.75, {"wall": -3.0}, before, after)
-    return [hit, Happening(0.5, "wall, floor", "impact"), Happening(0.75, "half way", "event", ("noted",))]
+    hit = EventRecord(0.5, "wall", "impact", ("bounced",), 6.75, {"wall": -3.0}, before, after)
+    return [hit, EventRecord(0.5, "wall, floor", "impact"), EventRecord(0.75, "half way", "event", ("noted",))]
 
 
 def test_nothing_happened(run):
@@ -64,7 +64,7 @@ def test_tables(run):
     assert list(table.columns) == ["t", "name", "kind", "done", "lost", "impulse wall"]
     assert table["impulse wall"][0] == -3.0
     assert "<td>half way</td>" in e._repr_html_()
-    many = Events([Happening(0.1 * k, "tick", "event") for k in range(400)])
+    many = Events([EventRecord(0.1 * k, "tick", "event") for k in range(400)])
     assert len(repr(many).splitlines()) == 22
     assert "... 380 more before the last one" in repr(many)
     assert many.summary() == "400: tick 400 times"

@@ -9,12 +9,12 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 import flyball as fb
-from flyball.analysis.motion.events import slips
-from flyball.analysis.motion.events.instant import Part
-from flyball.constraints.modes import SLIP
-from flyball.equations.sliding import FIRST, FRESH, direction
-from flyball.numerics.cone.dense.problem import EVEN, PUSHES, TURNS, WITH
-from flyball.tables.system import SwitchNumbers
+from flyball.constraints.switch_kinds import SLIP
+from flyball.engine.loads import ONSET_LENGTH, ONSET_SPEED, direction_in_space
+from flyball.numerics.complementarity.dense_problem import AT_REST, FRICTION_DISC, FRICTION_DISC_2, UNILATERAL
+from flyball.simulation.events import instant_problem
+from flyball.simulation.events.instant_problem import ProblemRow
+from flyball.tables.table_definitions import SwitchNumbers
 
 G = 9.81
 TIGHT = {"method": "dop853", "rtol": 1e-11, "atol": 1e-12}
@@ -294,17 +294,17 @@ def slipping(rate, way, length=0.2):
 def test_a_straight_slip_keeps_its_direction_past_rest(speed):
     """Friction is smooth up to the instant at which a slip ends: past it the speed along the same direction is negative."""
     d = np.array([0.6, -0.8])
-    assert direction(1.0, tuple(d), tuple(speed * d)) == pytest.approx((*d, speed), rel=1e-14)
+    assert direction_in_space(1.0, tuple(d), tuple(speed * d)) == pytest.approx((*d, speed), rel=1e-14)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_instants_take_the_direction_of_a_motion_for_what_has_just_begun_to_slide(seed):
     rng = np.random.default_rng(seed)
     a = rng.uniform(0.0, 2 * np.pi)
-    way, u = FRESH * np.array([np.cos(a), np.sin(a)]), 0.2 * FIRST * rng.normal(size=2)
+    way, u = ONSET_LENGTH * np.array([np.cos(a), np.sin(a)]), 0.2 * ONSET_SPEED * rng.normal(size=2)
     u *= np.sign(way @ u)
-    found = slips._heading(slipping(u, way), [1, 2])
-    assert found == pytest.approx(np.ravel(direction(0.2, tuple(way), tuple(u))[:2]), abs=1e-13)
+    found = instant_problem._slip_direction(slipping(u, way), [1, 2])
+    assert found == pytest.approx(np.ravel(direction_in_space(0.2, tuple(way), tuple(u))[:2]), abs=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -312,7 +312,7 @@ def test_instants_take_the_direction_of_a_motion_for_what_has_just_begun_to_slid
 )
 def test_a_slip_begins_that_is_slow_and_gets_faster(speed, faster, begins):
     d = np.array([0.6, 0.8])
-    assert slips._begins(slipping(speed * d, (0.0, 0.0)), [1, 2], d, faster * d) == begins
+    assert instant_problem._slip_begins(slipping(speed * d, (0.0, 0.0)), [1, 2], d, faster * d) == begins
 
 
 def test_a_slip_is_let_go_with_the_friction_that_it_held():
@@ -322,7 +322,11 @@ def test_a_slip_is_let_go_with_the_friction_that_it_held():
     numbers.kinetic_friction[1:] = mu
     S = SimpleNamespace(switch_numbers=numbers)
     n = SimpleNamespace(fired=lambda guards, *kinds: {1}, kind=[0, SLIP, SLIP], S=S)
-    parts = [Part(0, PUSHES), Part(1, TURNS, gain=mu, of=0), Part(2, WITH, gain=mu, of=0)]
-    found = x, np.full(3, EVEN), np.array([np.inf, 3.0, 3.0]), np.full(3, 1e-9)
-    out = slips.loose(n, parts, found, np.zeros(0, int))
+    parts = [
+        ProblemRow(0, UNILATERAL),
+        ProblemRow(1, FRICTION_DISC, gain=mu, of=0),
+        ProblemRow(2, FRICTION_DISC_2, gain=mu, of=0),
+    ]
+    found = x, np.full(3, AT_REST), np.array([np.inf, 3.0, 3.0]), np.full(3, 1e-9)
+    out = instant_problem.sliding_at_cone(n, parts, found, np.zeros(0, int))
     assert [-p.gain * x[0] * p.lean for _, p in sorted(out.items())] == pytest.approx(x[1:], rel=1e-14)

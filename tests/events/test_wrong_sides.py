@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.events.branches import Corners
+from flyball.simulation.events.nonsmooth_laws import Corners
 from tests.layers import both_layers
 
 pytestmark = both_layers

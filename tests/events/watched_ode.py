@@ -7,13 +7,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flyball.numerics.integrators import clock as ex
-from flyball.numerics.integrators.expected import expect
-from flyball.numerics.integrators.explicit import answer
-from flyball.numerics.integrators.loop import TRY, advance
-from flyball.numerics.integrators.tableaux import tableau
-from flyball.numerics.integrators.watched import begun, onward
-from flyball.numerics.integrators.watching import EVENT, START, Watch, watching
+from flyball.numerics.event_location.event_steps import finish_step_with_events, start_event_segment
+from flyball.numerics.event_location.guards import (
+    EVENT_FOUND,
+    START_VALUES,
+    GuardState,
+    allocate_guard_state,
+    predict_sensed,
+)
+from flyball.numerics.integrators import time_loop as ex
+from flyball.numerics.integrators.butcher_tableaux import tableau
+from flyball.numerics.integrators.explicit_runge_kutta import run_explicit_task
+from flyball.numerics.integrators.time_loop import TRY_STEP, advance
 
 
 class Equations(NamedTuple):
@@ -29,8 +34,8 @@ def derivative(t, y, dy, S, W):
     dy[:n], dy[n:] = y[n:], S.f(t, y[:n], y[n:])
     S.latest[:] = [t, y.copy()]
     W.count.stage += 1
-    for j in np.flatnonzero(W.met == W.count.stage):
-        W.met_g[j] = S.g(t, y[:n], y[n:])
+    for j in np.flatnonzero(W.compared_stages == W.count.stage):
+        W.compared_values[j] = S.g(t, y[:n], y[n:])
     return 0
 
 
@@ -61,19 +66,19 @@ def watch(t, y, S, W, row):
 def note(S, W, row):
     t, y = S.latest
     n = len(y) // 2
-    W.moving[0 if row == START else 1] = y[:n], y[n:], S.f(t, y[:n], y[n:])
+    W.moving[0 if row == START_VALUES else 1] = y[:n], y[n:], S.f(t, y[:n], y[n:])
     W.g[row] = S.g(t, y[:n], y[n:])
 
 
 def look(t, h, x, S, W, row):
-    expect(W, x, h)
+    predict_sensed(W, x, h)
     W.g[row] = S.g(t + x * h, W.sensed[0, : W.moving.shape[2]], W.sensed[1, : W.moving.shape[2]])
 
 
 def ask(own, S, W, R, c, task):
-    if task == TRY:
+    if task == TRY_STEP:
         W.count.stage = 0
-    return answer(own, S, W, R, c, task)
+    return run_explicit_task(own, S, W, R, c, task)
 
 
 def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", most=10_000, h_max=np.inf, kept=()):
@@ -81,7 +86,7 @@ def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", mo
     R, y = tableau(method), np.array(y, float)
     n = len(y) // 2
     S = Equations(f, lambda *a: np.asarray(g(*a), float), [0.0, y])
-    W: Watch = watching(
+    W: GuardState = allocate_guard_state(
         np.array(way),
         np.array(kept or [0] * len(way)),
         R.c,
@@ -91,21 +96,30 @@ def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", mo
         [],
         (np.zeros((2, 2 * n)), np.zeros(0)),
     )
-    real, count = ex.ClockReals.blank(), ex.ClockCounts.blank()
+    real, count = ex.StepReals.blank(), ex.StepCounts.blank()
     real.t_end, real.rtol, real.atol, real.span, real.scale, real.largest = t_end, rtol, 1e-2 * rtol, t_end, 1.0, t_end
     real.h_max = min(h_max, t_end)
     count.quota, count.limit, count.controlled = 1000, most, 2 * n
-    Y = np.zeros((ex.STATES, 2 * n))
+    Y = np.zeros((ex.STATE_ROWS, 2 * n))
     Y[0] = y
     K = np.zeros((len(R.c) + 1, 2 * n))
-    c = ex.Clock(real, count, np.array(times, float), Y, K, np.zeros(0, np.int64), np.zeros((6, 0)))
+    c = ex.StepState(real, count, np.array(times, float), Y, K, np.zeros(0, np.int64), np.zeros((6, 0)))
     out, rows, events = np.zeros((64, 1 + 2 * n)), [], []
-    callbacks = ask, (derivative, arrive, tangent, inspect), report, begun, onward, watch, note, look
+    callbacks = (
+        ask,
+        (derivative, arrive, tangent, inspect),
+        report,
+        start_event_segment,
+        finish_step_with_events,
+        watch,
+        note,
+        look,
+    )
     while True:
         used = advance(callbacks, S, W, R, c, out)
         rows.append(out[:used].copy())
         status = count.status
-        if status == EVENT:
+        if status == EVENT_FOUND:
             events.append((real.t, tuple(np.flatnonzero(W.fired)), Y[0].copy()))
             if act is not None and act(real.t, Y[0], events[-1][1]):
                 break

@@ -132,13 +132,13 @@ def test_example_opens_with_a_sentence(name):
 @pytest.mark.parametrize("name", FILES)
 def test_example_is_drawn(name):
     """Every part of it has a place in the recording that pictures and the page are made of."""
-    from flyball.view.animate import record
-    from flyball.view.payload import payload
+    from flyball.view.animation import record_motion
+    from flyball.view.page import pack_recording
 
     r = mechanism(name).simulate(0.1, outputs=5)
-    recording = record(r)
+    recording = record_motion(r)
     assert {b.name for b in recording.bodies} == {b.name for b in (*r.model.bodies, *r.model.ground)}
-    assert payload(recording)
+    assert pack_recording(recording)
 
 
 def test_examples_with_events_are_known():

@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 import sympy
 
-from flyball.graph.derivative import jacobian, replaced, tangents
-from flyball.graph.node import Graph, Symbol, Undecided
-from flyball.graph.values import evaluate, reached, symbols
+from flyball.expression_graph.evaluation import (
+    directional_derivatives,
+    evaluate,
+    jacobian,
+    nodes_in_order,
+    substitute,
+    symbols_of,
+)
+from flyball.expression_graph.graph import Graph, Symbol, UndeterminedDecision
 from flyball.math import scalar
 from flyball.math.vec import mm, quaternion_matrix
 
@@ -43,7 +49,7 @@ def test_a_formula_on_expressions_gives_its_numbers_and_derivatives():
 def test_derivatives_are_those_of_sympy(name):
     g = Graph()
     x = g.symbol("x")
-    slope = tangents([getattr(scalar, name)(x * x)], [(x, 1.0)])[0]
+    slope = directional_derivatives([getattr(scalar, name)(x * x)], [(x, 1.0)])[0]
     s = sympy.Symbol("x")
     exact = sympy.diff(getattr(sympy, name)(s * s), s).subs(s, 0.6)
     assert evaluate([slope], {"x": 0.6})[0] == pytest.approx(float(exact), rel=1e-13)
@@ -53,18 +59,18 @@ def test_what_moves_decides_nothing():
     g = Graph()
     x, length = g.symbol("x"), g.symbol("length", 2.0)
     assert (length * length).real == 4.0 and length > 1.0
-    with pytest.raises(Undecided, match="moves"):
+    with pytest.raises(UndeterminedDecision, match="moves"):
         _ = (x * length).real > 0.0
     assert evaluate([scalar.choose(x - 1.0, x, length)], {"x": 3.0})[0] == 3.0
-    assert symbols([x * length + 1.0]) == [x, length]
+    assert symbols_of([x * length + 1.0]) == [x, length]
 
 
 def test_parts_are_replaced():
     g = Graph()
     x, y = g.symbol("x"), g.symbol("y")
-    (found,) = replaced([scalar.sin(x * y) + x], [(x, 2.0)])
+    (found,) = substitute([scalar.sin(x * y) + x], [(x, 2.0)])
     assert found is scalar.sin(2.0 * y) + 2.0
-    assert len(reached([found])) == 5
+    assert len(nodes_in_order([found])) == 5
 
 
 def test_a_name_stands_for_one_thing():
@@ -75,9 +81,9 @@ def test_a_name_stands_for_one_thing():
 
 
 def test_tables_keep_their_names_and_derivatives_have_primes():
-    from flyball.graph.derivative import tangents
-    from flyball.graph.printers.latex import latex
-    from flyball.graph.printers.text import text
+    from flyball.expression_graph.evaluation import directional_derivatives
+    from flyball.expression_graph.printers.latex import latex
+    from flyball.expression_graph.printers.text import text
     from flyball.model.table import Table
 
     g = Graph()
@@ -86,4 +92,4 @@ def test_tables_keep_their_names_and_derivatives_have_primes():
     value, slope, bend = g.table(Table("lift", x=(0.0, 1.0, 2.0, 3.0), y=(0.0, 2.0, 1.0, 0.5)).data(), 0, x)
     assert [text(value), text(slope), text(bend)] == ["lift(x)", "lift'(x)", "lift''(x)"]
     assert latex(slope) == r"\operatorname{lift}'(x)"
-    assert tangents([value, slope], [(x, 1.0)]) == [slope, bend]
+    assert directional_derivatives([value, slope], [(x, 1.0)]) == [slope, bend]

@@ -9,17 +9,16 @@ import numpy as np
 import pytest
 
 from flyball.errors import ModelError
-from flyball.graph.derivative import jacobian
-from flyball.graph.node import Graph, Symbol
-from flyball.graph.printers import routine as limits
-from flyball.graph.printers.c import c_sources
-from flyball.graph.printers.casadi import casadi_function
-from flyball.graph.printers.numba import numba_module
-from flyball.graph.printers.python import python_functions, python_module
-from flyball.graph.printers.routine import Argument, Routine
-from flyball.graph.values import evaluate
+from flyball.expression_graph.evaluation import evaluate, jacobian
+from flyball.expression_graph.graph import Graph, Symbol
+from flyball.expression_graph.printers import routines as limits
+from flyball.expression_graph.printers.c import c_sources
+from flyball.expression_graph.printers.casadi import casadi_function
+from flyball.expression_graph.printers.numba import numba_module
+from flyball.expression_graph.printers.python import python_functions, python_module
+from flyball.expression_graph.printers.routines import Argument, Routine
 from flyball.math import scalar
-from flyball.math.spline import packed
+from flyball.math.spline import pack_spline
 
 STRICT = ["-Wall", "-Wextra", "-std=c99", "-pedantic", "-Werror", "-O1"]
 
@@ -47,7 +46,7 @@ def every_operation(x, y):
 def table(g, x, beyond="line", moved=()):
     points = np.array([-1.0, -0.3, 0.2, 1.0, 1.7])
     pieces = np.arange(16.0).reshape(4, 4) - 7.0
-    data = [float(v) for v in packed(points, np.arange(5.0), pieces, beyond)]
+    data = [float(v) for v in pack_spline(points, np.arange(5.0), pieces, beyond)]
     for k, node in moved:
         data[k] = node
     return [x_ for x_ in g.table(np.array(data, object), 0, x)]
@@ -216,6 +215,6 @@ def test_what_is_too_large_or_has_no_argument_is_refused(monkeypatch):
     x, y = g.symbol("x"), g.symbol("wind")
     with pytest.raises(ModelError, match="f depends on wind, which is no argument"):
         python_module([Routine("f", [Argument("x", x)], {"y": x + y})], "")
-    monkeypatch.setattr(limits, "MANY", 3)
+    monkeypatch.setattr(limits, "MAX_OPERATIONS", 3)
     with pytest.raises(ModelError, match="f takes 4 operations, and straight-line code is written up to 3"):
         c_sources([Routine("f", [Argument("x", x)], {"y": ((x + 1.0) * x + 1.0) * x})], "m", "")

@@ -8,14 +8,14 @@ import pytest
 import sympy
 from sympy.parsing.sympy_parser import parse_expr
 
-from flyball.graph.node import Graph, Symbol
-from flyball.graph.printers import latex as latex_printer
-from flyball.graph.printers import text as text_printer
-from flyball.graph.printers.latex import latex
-from flyball.graph.printers.mathml import formula, mathml
-from flyball.graph.printers.spelling import name
-from flyball.graph.printers.text import text
-from flyball.graph.values import evaluate
+from flyball.expression_graph.evaluation import evaluate
+from flyball.expression_graph.graph import Graph, Symbol
+from flyball.expression_graph.printers import latex as latex_printer
+from flyball.expression_graph.printers import text as text_printer
+from flyball.expression_graph.printers.formula_layout import latex_name
+from flyball.expression_graph.printers.latex import latex
+from flyball.expression_graph.printers.mathml import formula, mathml
+from flyball.expression_graph.printers.text import text
 from flyball.math.scalar import atan2, choose, cos, sin, sqrt
 
 
@@ -100,7 +100,7 @@ def test_text_is_read_back_as_the_same_value(make, plain, typeset):
     ],
 )
 def test_names(given, expected):
-    assert name(given) == expected
+    assert latex_name(given) == expected
 
 
 def test_named_parts_and_matrices():

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from flyball.graph.node import Graph
-from flyball.graph.printers.text import text
-from flyball.graph.simplify.arctangents import Algebra
-from flyball.graph.simplify.numbers import known, snapped
-from flyball.graph.simplify.simplify import simplified
-from flyball.graph.values import evaluate, reached
+from flyball.expression_graph.evaluation import evaluate, nodes_in_order
+from flyball.expression_graph.graph import Graph
+from flyball.expression_graph.printers.text import text
+from flyball.expression_graph.simplification.arctangents import ArctangentSubstitution
+from flyball.expression_graph.simplification.reading_cost import exact_number, without_rounding
+from flyball.expression_graph.simplification.simplify import simplified
 from flyball.math import scalar
 
 NAMES = ("a", "b", "x", "y", "u", "v")
@@ -190,10 +190,10 @@ def test_an_angle_near_a_right_one_is_none(make, off):
 
 @pytest.mark.parametrize("number", [math.pi / 2.0, 2.0 * math.pi / 3.0, 1.0 / 3.0, math.sqrt(2.0) / 2.0])
 def test_numbers_are_known_to_rounding_only(number):
-    assert known(number) is not None
+    assert exact_number(number) is not None
     for x in (number + 1e-13, number - 1e-13):
-        assert known(x) is None
-        assert snapped(x) == x
+        assert exact_number(x) is None
+        assert without_rounding(x) == x
 
 
 @pytest.mark.parametrize(
@@ -216,9 +216,9 @@ def test_arctangents_in_angles_that_are_sums_and_multiples(angle, at):
     """With w = atan2(b, a), v = 2 w + u / 2 and z = u - w: the values of cosine and sine, and no arctangent is left."""
     g = Graph()
     a, b, u, w, v, z = (g.symbol(n) for n in "abuwvz")
-    algebra = Algebra([(w, scalar.atan2(b, a), None), (v, 2.0 * w + 0.5 * u, None), (z, u - w, None)])
+    algebra = ArctangentSubstitution([(w, scalar.atan2(b, a), None), (v, 2.0 * w + 0.5 * u, None), (z, u - w, None)])
     found = algebra([cos(angle(u, w, v, z)), sin(angle(u, w, v, z))])
-    assert not any(n.op == "atan2" for n in reached(found))
+    assert not any(n.op == "atan2" for n in nodes_in_order(found))
     x, y, s = at
     turn = math.atan2(y, x)
     value = angle(s, turn, 2.0 * turn + 0.5 * s, s - turn)

@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from flyball.graph.node import Graph
-from flyball.graph.printers.text import TextPrinter, text
-from flyball.graph.printers.wrapping import wrapped
-from flyball.graph.simplify.brief import brief
-from flyball.graph.simplify.cost import length
-from flyball.graph.simplify.shared import shared
-from flyball.graph.simplify.simplify import simplified
-from flyball.graph.values import evaluate, reached
+from flyball.expression_graph.evaluation import evaluate, nodes_in_order
+from flyball.expression_graph.graph import Graph
+from flyball.expression_graph.printers.formula_layout import wrap_fragments
+from flyball.expression_graph.printers.text import TextPrinter, text
+from flyball.expression_graph.simplification.common_subexpressions import (
+    extract_common_subexpressions,
+    simplified_with_symbols,
+)
+from flyball.expression_graph.simplification.reading_cost import symbol_count
+from flyball.expression_graph.simplification.simplify import simplified
 from flyball.math.scalar import cos, sin, sqrt
 
 
@@ -35,8 +37,8 @@ def nested(depth):
 @pytest.mark.parametrize("depth", [3, 6, 12])
 def test_what_would_swell_has_names(depth):
     g, x, y = nested(depth)
-    (found,), definitions = brief([y])
-    assert length([found, *(d for _, d in definitions)]) < 30.0 * (depth + 2)
+    (found,), definitions = simplified_with_symbols([y])
+    assert symbol_count([found, *(d for _, d in definitions)]) < 30.0 * (depth + 2)
     at = {s.data.name: v for s, v in zip(x, np.random.default_rng(depth).uniform(-0.1, 0.1, len(x)), strict=True)}
     assert put_in([found], definitions, at)[0] == pytest.approx(evaluate([y], at)[0], rel=1e-11)
 
@@ -50,7 +52,7 @@ def test_simplifying_many_operations_stays_quick_and_true():
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], object)
         R = R @ np.roll(np.roll(turn, k % 3, axis=0), k % 3, axis=1)
     found = simplified(R)
-    assert len(reached(found.ravel().tolist())) < 1500
+    assert len(nodes_in_order(found.ravel().tolist())) < 1500
     at = dict(zip(names, np.random.default_rng(0).uniform(-3.0, 3.0, 25), strict=True))
     np.testing.assert_allclose(evaluate(list(found.ravel()), at), evaluate(list(R.ravel()), at), atol=1e-11)
 
@@ -59,10 +61,10 @@ def test_names_are_given_to_what_recurs_and_to_no_symbol_that_is_there():
     g = Graph()
     w, x, y = g.symbol("w_1"), g.symbol("x"), g.symbol("y")
     s = sqrt((x + y) ** 2 + (x - w) ** 2)
-    found, definitions = shared([s * x, s * y + 1.0, w / s], gain=8.0)
+    found, definitions = extract_common_subexpressions([s * x, s * y + 1.0, w / s], gain=8.0)
     assert [d[0].data.name for d in definitions] == ["c_1"]
     assert [text(f) for f in found] == ["x*c_1", "1 + y*c_1", "w_1/c_1"]
-    assert shared([x + y, x * y]) == ([x + y, x * y], [])
+    assert extract_common_subexpressions([x + y, x * y]) == ([x + y, x * y], [])
 
 
 def test_lines_are_broken_where_few_parentheses_are_open():
@@ -74,4 +76,4 @@ def test_lines_are_broken_where_few_parentheses_are_open():
         "alpha0*(alpha1 + alpha5 + alpha2*(alpha3 + alpha4))",
         "+ alpha6*(alpha7 + alpha8 + alpha9 + alpha10)",
     ] or all(len(line) <= 50 for line in lines)
-    assert "".join(wrapped(["ab", " + (c", " + d)", " + e"], 6)) == "ab + (c + d) + e"
+    assert "".join(wrap_fragments(["ab", " + (c", " + d)", " + e"], 6)) == "ab + (c + d) + e"

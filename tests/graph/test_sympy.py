@@ -9,12 +9,11 @@ import sympy
 from scipy.interpolate import CubicSpline
 
 from flyball.errors import ModelError
-from flyball.graph.derivative import tangents
-from flyball.graph.node import Graph, Symbol
-from flyball.graph.printers.sympy import SympyPrinter, fraction
-from flyball.graph.values import evaluate
+from flyball.expression_graph.evaluation import directional_derivatives, evaluate
+from flyball.expression_graph.graph import Graph, Symbol
+from flyball.expression_graph.printers.sympy import SympyPrinter, fraction
 from flyball.math import scalar
-from flyball.math.spline import packed
+from flyball.math.spline import pack_spline
 from flyball.math.vec import quaternion_matrix
 
 AT = {"x": 0.7, "y": -0.4}
@@ -53,7 +52,7 @@ def test_there_and_back():
     slopes = [sympy.diff(e, printer(x)) for e in there if not e.has(sympy.floor, sympy.sign, sympy.Min, sympy.Max)]
     own = [
         s
-        for e, s in zip(there, tangents(nodes, [(x, 1.0)]))
+        for e, s in zip(there, directional_derivatives(nodes, [(x, 1.0)]))
         if not e.has(sympy.floor, sympy.sign, sympy.Min, sympy.Max)
     ]
     np.testing.assert_allclose(evaluate(printer.back(slopes, g), AT), np.array(evaluate(own, AT), float), rtol=1e-13)
@@ -94,7 +93,7 @@ def test_symbols_are_real_and_masses_positive():
 def table(g, x):
     points = np.linspace(-1.0, 2.0, 7)
     cubic = CubicSpline(points, np.sin(points))
-    data = packed(points, np.sin(points), cubic.c[::-1].T, "line")
+    data = pack_spline(points, np.sin(points), cubic.c[::-1].T, "line")
     return g.table([float(v) for v in data], 0, x), cubic
 
 

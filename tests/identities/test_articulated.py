@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.compiled import compiled
-from flyball.equations.articulated import articulate, articulated_solve
-from flyball.equations.engine import MOTION
-from flyball.equations.mass import mass_entries
-from flyball.equations.tree import column
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.engine.articulated_body import factor_articulated, mass_entries, solve_articulated
+from flyball.engine.entry_point import MOTION
+from flyball.engine.kinematics import twist_column
 from flyball.math.vec import quaternion_matrix
-from flyball.results.records import Records
-from flyball.tables.system import (
+from flyball.results.recorded_kinematics import RecordedMotion
+from flyball.tables.table_definitions import (
     FREE,
     PLANAR,
     PRISMATIC,
@@ -27,7 +26,7 @@ from flyball.tables.system import (
     WELD,
     Bodies,
     Tree,
-    blank,
+    zero_table,
 )
 from tests.mechanisms import planar_rod
 
@@ -45,7 +44,7 @@ def tables(parents, kinds):
     nv = np.array([TREE_NV[k] for k in kinds])
     parent, joint, none = np.array(parents, np.int64), np.array(kinds, np.int64), np.full(len(nv), -1)
     hung = Tree(parent, joint, np.zeros_like(nv), np.cumsum(nv) - nv, np.zeros_like(nv), nv, none, none.copy())
-    return SimpleNamespace(tree=hung, bodies=blank(Bodies, len(parents), float))
+    return SimpleNamespace(tree=hung, bodies=zero_table(Bodies, len(parents), float))
 
 
 def rotation(random):
@@ -95,7 +94,7 @@ def dense(S, W):
         a = b
         while a >= 0:
             for k in range(S.tree.nv[a]):
-                w, v = column(S, W, a, k)
+                w, v = twist_column(S, W, a, k)
                 J[:, S.tree.v[a] + k] = np.r_[w, np.add(v, np.cross(w, W.BK[b, :3] - W.O[a]))]
             a = S.tree.parent[a]
         R = W.BK[b, 3:12].reshape(3, 3)
@@ -125,7 +124,7 @@ def singular(M):
 def solved(S, W, f, x=None):
     """Accelerations and efforts with the factor in W."""
     x, effort = np.zeros_like(f) if x is None else x.copy(), np.full_like(f, 77.0)
-    articulated_solve(S, W, f, x, effort)
+    solve_articulated(S, W, f, x, effort)
     return x, effort
 
 
@@ -157,9 +156,9 @@ def test_one_factor_solves_for_every_force(seed, kind):
     S, W = forest(seed, **KINDS[kind])
     M = dense(S, W)
     if singular(M):
-        assert articulate(S, W) > 0
+        assert factor_articulated(S, W) > 0
         return
-    assert articulate(S, W) == 0
+    assert factor_articulated(S, W) == 0
     for f in np.random.default_rng(seed).normal(size=(3, len(M))):
         x, effort = solved(S, W, f)
         exact = np.linalg.solve(M, f)
@@ -186,10 +185,10 @@ def test_prescribed_velocities_take_their_effort(seed, kind):
     M = dense(S, W)
     free = np.setdiff1d(np.arange(len(M)), told)
     if singular(M[np.ix_(free, free)]):
-        assert articulate(S, W) > 0
+        assert factor_articulated(S, W) > 0
         return
     f, given = random.normal(size=(2, len(M)))
-    assert articulate(S, W) == 0
+    assert factor_articulated(S, W) == 0
     x, effort = solved(S, W, f, given)
     assert (x[told] == given[told]).all()
     size = np.abs(M @ x).max()
@@ -203,8 +202,8 @@ def test_mechanisms_far_away_move_as_near_ones(seed):
     """The same forest 10 km from the world's origin: only the places themselves are rounded more coarsely there."""
     (S, W), (_, far) = forest(seed, massless=False), forest(seed, massless=False, centre=(1e4, -2e4, 5e3))
     f = np.random.default_rng(seed).normal(size=W.X.shape[0])
-    assert articulate(S, W) == 0
-    assert articulate(S, far) == 0
+    assert factor_articulated(S, W) == 0
+    assert factor_articulated(S, far) == 0
     x, y = solved(S, W, f)[0], solved(S, far, f)[0]
     assert y == pytest.approx(x, abs=1e-9 * np.abs(x).max())
     mass_entries(S, W)
@@ -230,7 +229,7 @@ def slender(axis):
 def test_nothing_at_the_end_has_no_inertia():
     S, W = hinges([0, 0, 1], [0, 1, 0])
     S.bodies.mass[0], S.bodies.inertia[0] = 1.0, np.eye(3).ravel()
-    assert articulate(S, W) == 1 + 1, "the second velocity"
+    assert factor_articulated(S, W) == 1 + 1, "the second velocity"
 
 
 @pytest.mark.parametrize("axis", [(0.3, -0.7, 0.4), (0, 0, 1), (1, 1e-3, 0)])
@@ -238,21 +237,21 @@ def test_a_rod_does_not_resist_turning_about_itself(axis):
     """Whatever rounding makes of its inertia there; nor does it when two other hinges are taken out before."""
     S, W = hinges(axis)
     S.bodies.mass[0], S.bodies.inertia[0] = 1.0, slender(axis)
-    assert articulate(S, W) == 1
+    assert factor_articulated(S, W) == 1
     S, W = hinges(axis, [0.1, 0.9, 0.8], [0.9, -0.3, 0.2])
     S.bodies.mass[2], S.bodies.inertia[2] = 1.0, slender(axis)
-    assert articulate(S, W) == 1
+    assert factor_articulated(S, W) == 1
     S.tree.law[0] = 0
-    assert articulate(S, W) == 0, "a driver needs no inertia"
+    assert factor_articulated(S, W) == 0, "a driver needs no inertia"
 
 
 def test_two_hinges_on_one_axis_share_no_inertia():
     S, W = hinges([1, 2, 3], [1, 2, 3])
     S.bodies.mass[1], S.bodies.inertia[1] = 1.0, np.diag([0.3, 0.5, 0.7]).ravel()
     W.BK[1, :3] = 0.3, 0.1, -0.2
-    assert articulate(S, W) == 1
+    assert factor_articulated(S, W) == 1
     S.bodies.mass[0], S.bodies.inertia[0] = 1e-9, 1e-9 * np.eye(3).ravel()
-    assert articulate(S, W) == 0, "a small inertia is one"
+    assert factor_articulated(S, W) == 0, "a small inertia is one"
 
 
 def test_complex_steps_go_through():
@@ -265,7 +264,7 @@ def test_complex_steps_go_through():
     S.bodies.mass[b] += h * 1j
     dM = dense(S, SimpleNamespace(**{k: a.astype(complex) for k, a in vars(W).items()})).imag / h
     C = SimpleNamespace(**{k: a.astype(complex) for k, a in vars(W).items()})
-    assert articulate(S, C) == 0
+    assert factor_articulated(S, C) == 0
     x, _ = solved(S, C, f.astype(complex))
     exact = np.linalg.solve(M, -dM @ x.real)
     assert np.abs(exact).max() > 1e-3
@@ -312,15 +311,15 @@ def test_newton_and_euler_agree(planar, floating):
     Records know nothing of the mass matrix, of articulated bodies, or of the generalised forces.
     """
     m, hung = tree(planar, floating)
-    c = compiled(m, tree=hung)
+    c = compile_mechanism(m, tree=hung)
     S, W, s = c.values.system, c.work, c.structure
     v = c.values.v + 5.0 * np.cos(np.arange(s.nv))
     status, dy = c.at(0.0, c.values.q, v, MOTION)
     assert status == 0
-    assert articulate(S, W) == 0
+    assert factor_articulated(S, W) == 0
     x, _ = solved(S, W, W.velocities.applied)
     assert x == pytest.approx(dy[s.nq : s.nq + s.nv], abs=1e-10 * np.abs(x).max())
-    r = Records(c.values, c.values.q[None], v[None], x[None])
+    r = RecordedMotion(c.values, c.values.q[None], v[None], x[None])
     left, terms = np.zeros(s.nv), 0.0
     for b in range(len(S.tree.parent)):
         p, R, w, _, alpha, a = (np.ravel(part) for part in r.body(b))
@@ -331,7 +330,7 @@ def test_newton_and_euler_agree(planar, floating):
         k = b
         while k >= 0:
             for i in range(S.tree.nv[k]):
-                turn, shift = column(S, W, k, i)
+                turn, shift = twist_column(S, W, k, i)
                 power = np.dot(shift, force) + np.dot(turn, torque + np.cross(p - W.O[k], force))
                 left[S.tree.v[k] + i] += power
                 terms = max(terms, abs(power))
@@ -346,10 +345,10 @@ def test_a_mechanism_far_away_falls_as_a_near_one(planar):
     found = []
     for centre in ((0, 0, 0), (1e4, -1e4, 0)):
         m, hung = tree(planar, False, np.array(centre, float))
-        c = compiled(m, tree=hung)
+        c = compile_mechanism(m, tree=hung)
         v = 2.0 * np.cos(np.arange(c.structure.nv))
         c.at(0.0, c.values.q, v, MOTION)
-        assert articulate(c.values.system, c.work) == 0
+        assert factor_articulated(c.values.system, c.work) == 0
         found.append(solved(c.values.system, c.work, c.work.velocities.applied)[0])
     near, far = found
     assert far == pytest.approx(near, abs=1e-9 * np.abs(near).max())
@@ -358,14 +357,14 @@ def test_a_mechanism_far_away_falls_as_a_near_one(planar):
 def test_driven_joints_of_a_mechanism():
     """A shoulder that follows its driver feels the torque that Newton and Euler ask for: see the dense M and f."""
     m, hung = tree(False, False)
-    c = compiled(m, tree=hung)
+    c = compile_mechanism(m, tree=hung)
     s, W = c.structure, c.work
     S = c.values.system._replace(tree=Tree(*(x.copy() for x in c.values.system.tree)))
     assert c.at(0.0, c.values.q, c.values.v, MOTION)[0] == 0
     S.tree.law[0] = 0
     M = dense(S, W)
     f = W.velocities.applied.copy()
-    assert articulate(S, W) == 0
+    assert factor_articulated(S, W) == 0
     x, effort = solved(S, W, f, np.r_[3.0, np.zeros(s.nv - 1)])
     assert x[0] == 3.0
     assert x[1:] == pytest.approx(np.linalg.solve(M[1:, 1:], f[1:] - 3.0 * M[1:, 0]), rel=1e-10)

@@ -6,9 +6,9 @@ At a state and velocities that fulfil nothing: by differences along a motion, fo
 import numpy as np
 import pytest
 
-from flyball.analysis.assemble import assemble
-from flyball.analysis.compiled import compiled
-from flyball.equations.tree import retract
+from flyball.assembly.assemble import assemble
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.engine.kinematics import retract
 from tests.contract.zoo import CASES
 from tests.identities.test_joint_layer import HINGES, PARTS, coupled, with_joint
 
@@ -18,7 +18,7 @@ T, H = 0.4, 1e-5
 def layers(model):
     """The assembled state, moved a little off the constraints, in absolute and in joint coordinates."""
     a = assemble(model)
-    tree = compiled(model, tree=HINGES)
+    tree = compile_mechanism(model, tree=HINGES)
     for c, (q, v) in ((a.compiled, (a.q, a.v)), (tree, tree.take(a.compiled, 0.0, a.q, a.v))):
         rng = np.random.default_rng(5)
         q = q.copy()

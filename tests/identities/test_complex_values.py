@@ -7,18 +7,18 @@ import pytest
 
 import flyball as fb
 from flyball import forces, joints
-from flyball.analysis.compiled import compiled
-from flyball.analysis.linear.derivatives import Equations, State
-from flyball.equations.scratch import work
-from flyball.equations.velocities import least_squares
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.derivatives.equation_derivatives import EquationDerivatives, MechanismState
+from flyball.engine.entry_point import allocate_work
+from flyball.engine.kinematics import least_squares
 from flyball.errors import ExpressionError, ModelError
-from flyball.model.coupling import Coupling
+from flyball.model.expression_parser import FUNCTIONS
 from flyball.model.expressions import Expression, number
 from flyball.model.geometry import triad
-from flyball.model.grammar import FUNCTIONS
+from flyball.model.joint import Coupling
 from flyball.model.shapes import SHAPES
-from flyball.tables.inertia import inverse_inertia
-from flyball.tables.spanning import spanning
+from flyball.tables.coordinate_choice import spanning_joints
+from flyball.tables.mass_properties import inverse_inertia
 from flyball.tables.structure import Choices, structure
 from flyball.tables.values import values
 from tests import mechanisms
@@ -33,7 +33,7 @@ RIGHT_ANGLES = {"Universal": {"axes"}, "WheelOnLine": {"at", "axis", "centre"}} 
 
 def structures(m):
     """In absolute coordinates, and in joint coordinates if it has any."""
-    tree = spanning(m)
+    tree = spanning_joints(m)
     return [structure(m), *([structure(m, Choices(tree=tree))] if tree else [])]
 
 
@@ -273,12 +273,12 @@ def test_least_squares_carry_the_derivative():
 
 def equations(m, tree, parameters=None):
     """The equations in the drawn state, at some accelerations and multipliers."""
-    c = compiled(m, parameters=parameters, tree=tree)
+    c = compile_mechanism(m, parameters=parameters, tree=tree)
     g = np.random.default_rng(2)
     nv, nr = c.structure.nv, len(c.structure.rows)
     v, vdot, lam = (g.standard_normal(n) for n in (nv, nv, nr))
-    q = compiled(m, tree=tree).values.q
-    return Equations(State(c, 0.3, q, v, c.z.copy(), vdot, lam, np.zeros(nv)))
+    q = compile_mechanism(m, tree=tree).values.q
+    return EquationDerivatives(MechanismState(c, 0.3, q, v, c.z.copy(), vdot, lam, np.zeros(nv)))
 
 
 @pytest.mark.parametrize(("where", "name"), zoo.CASES)
@@ -291,7 +291,7 @@ def test_equations_of_complex_tables(where, name):
     else:
         m = zoo.joined(where, name)
     m, names = with_parameters(m)
-    tree = spanning(m)
+    tree = spanning_joints(m)
     for layer in ((), tree) if tree else ((),):
         x = equations(m, layer)
         for field, parameter in names.items():
@@ -310,7 +310,7 @@ def test_real_parameters_give_floats():
     x = values(s, {"crank": 0.21})
     floats = {k: a.dtype for k, a in x.system._asdict().items() if isinstance(a, np.ndarray) and a.dtype.kind != "i"}
     assert set(floats.values()) == {np.dtype(float)}
-    assert x.q.dtype == x.v.dtype == work(s, x.system).G.dtype == float
+    assert x.q.dtype == x.v.dtype == allocate_work(s, x.system).G.dtype == float
 
 
 def test_one_complex_parameter_makes_all_complex():
@@ -318,7 +318,7 @@ def test_one_complex_parameter_makes_all_complex():
     x = values(s, {"speed": 10.0 + 1j * STEP})
     floats = {k: a.dtype for k, a in x.system._asdict().items() if isinstance(a, np.ndarray) and a.dtype.kind != "i"}
     assert set(floats.values()) == {np.dtype(complex)}
-    assert x.q.dtype == x.v.dtype == work(s, x.system).G.dtype == complex
+    assert x.q.dtype == x.v.dtype == allocate_work(s, x.system).G.dtype == complex
     assert not x.system.frames.position.imag.any() and not x.system.frames.rotation.imag.any()
 
 

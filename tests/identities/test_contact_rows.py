@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flyball.constraints import corner, touch
+from flyball.constraints import ball_on_box, corner_on_box
 
 CORES = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.4), (0.3, 0.2, 0.1))
 TANGENTS = [(which, up) for which in (1, 2) for up in (1, 2, 3, -1, -2, -3)]
@@ -58,20 +58,20 @@ def errors(row, par, hint=0.0, seed=1):
 
 @pytest.mark.parametrize("core", CORES)
 def test_gap_of_a_ball_on_a_rounded_box(core):
-    assert max(errors(touch.gap_row, (*core, 0.1, 0.0, 3.0, 0.3, 1.0))) < 1e-5
+    assert max(errors(ball_on_box.gap_row, (*core, 0.1, 0.0, 3.0, 0.3, 1.0))) < 1e-5
 
 
 @pytest.mark.parametrize(("core", "tangent"), list(itertools.product(CORES, TANGENTS)))
 def test_slip_of_a_ball_on_a_rounded_box(core, tangent):
     which, up = tangent
-    assert errors(touch.slip_row, (*core, 0.1, float(which), float(up), 0.3, 1.0))[1] < 1e-5
+    assert errors(ball_on_box.slip_row, (*core, 0.1, float(which), float(up), 0.3, 1.0))[1] < 1e-5
 
 
 @pytest.mark.parametrize("face", range(6))
 def test_height_and_slip_of_a_corner_above_a_face(face):
     par = (0.3, 0.2, 0.1, 0.0, 1.0, 3.0, 0.0, 1.0)
-    assert max(errors(corner.height_row, par, float(face))) < 1e-5
-    assert errors(corner.slide_row, par, float(face))[1] < 1e-5
+    assert max(errors(corner_on_box.height_row, par, float(face))) < 1e-5
+    assert errors(corner_on_box.slide_row, par, float(face))[1] < 1e-5
 
 
 def test_tangents_are_axes_across_the_normal():
@@ -79,7 +79,7 @@ def test_tangents_are_axes_across_the_normal():
     for _, (which, up) in itertools.product(range(5), TANGENTS):
         n = rng.normal(size=3)
         n = tuple(n / np.linalg.norm(n))
-        t = [touch.tangent((0.0,) * 4 + (float(k), float(up)), n, (0.0,) * 3)[0] for k in (1, 2)]
+        t = [ball_on_box.tangent((0.0,) * 4 + (float(k), float(up)), n, (0.0,) * 3)[0] for k in (1, 2)]
         frame = np.array([*t, n])
         assert np.allclose(frame @ frame.T, np.eye(3), atol=1e-12)
         assert which in (1, 2)
@@ -87,7 +87,7 @@ def test_tangents_are_axes_across_the_normal():
 
 @pytest.mark.parametrize("face", range(6))
 def test_margin_of_a_corner_on_a_face(face):
-    assert max(errors(corner.margin_row, (30.0, 20.0, 10.0, 0.0, 1.0, 0.5, 0.0, 1.0), float(face))) < 1e-5
+    assert max(errors(corner_on_box.margin_row, (30.0, 20.0, 10.0, 0.0, 1.0, 0.5, 0.0, 1.0), float(face))) < 1e-5
 
 
 def test_a_corner_over_an_edge_is_on_the_face_in_front_of_which_its_body_lies():
@@ -95,5 +95,5 @@ def test_a_corner_over_an_edge_is_on_the_face_in_front_of_which_its_body_lies():
     at_edge = ((0.3, 0.2, 0.0), *axes)
     for degrees, face in ((100.0, 2.0), (170.0, 2.0), (-60.0, 0.0), (-80.0, 0.0)):
         par = (0.3, 0.2, 1e30, 0.0, 0.0, np.deg2rad(degrees), 0.0, 1.0)
-        assert corner.foot(par, ((0.0,) * 3, *axes), at_edge, 1.0, None) == face
-        assert corner.foot(par, ((0.0,) * 3, *axes), ((0.31, 0.2, 0.0), *axes), 2.0, None) == 0.0
+        assert corner_on_box.foot(par, ((0.0,) * 3, *axes), at_edge, 1.0, None) == face
+        assert corner_on_box.foot(par, ((0.0,) * 3, *axes), ((0.31, 0.2, 0.0), *axes), 2.0, None) == 0.0

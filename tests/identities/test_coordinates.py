@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.assemble import assemble
-from flyball.analysis.compiled import compiled
-from flyball.equations.engine import MOTION
-from flyball.equations.mass import mass_entries
-from flyball.equations.records import load
-from flyball.results.records import Records
-from flyball.tables import coordinates
-from flyball.tables.cost import cost, least
+from flyball.assembly.assemble import assemble
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.engine.articulated_body import mass_entries
+from flyball.engine.entry_point import MOTION
+from flyball.engine.kinematics import load_record
+from flyball.results.recorded_kinematics import RecordedMotion
+from flyball.tables import reference_configuration
+from flyball.tables.coordinate_choice import least_cost, right_hand_side_cost
 from tests.mechanisms import bricard, example, four_bar, planar_rod, spatial_four_bar
 from tests.verification.test_reactions import actuated
 
@@ -108,13 +108,13 @@ def test_joint_coordinates_give_the_same_accelerations(case):
     model = make()
     a = assemble(model, t=T)
     q, v = spun(model, a)
-    tree = compiled(model, tree=hinges)
+    tree = compile_mechanism(model, tree=hinges)
     Q, V = tree.take(a.compiled, T, q, v)
     bodies = {}
     for c, x, u in ((a.compiled, q, v), (tree, Q, V)):
         status, _ = c.at(T, x, u, MOTION)
         assert status == 0
-        r = Records(c.values, x[None], u[None], c.work.velocities.solved[None])
+        r = RecordedMotion(c.values, x[None], u[None], c.work.velocities.solved[None])
         for name, b in c.structure.place.items():
             if b >= 0:
                 bodies.setdefault(name, []).append([np.ravel(part) for part in r.body(b)])
@@ -140,7 +140,7 @@ def mass_matrix(c, t, q):
         c.at(t, q, unit)
         parts = []
         for b in range(len(S.tree.parent)):
-            _, R, w, u, _, _ = load(W.BK, b)
+            _, R, w, u, _, _ = load_record(W.BK, b)
             parts.append(
                 (S.bodies.mass[b], np.array(u), S.bodies.inertia[b].reshape(3, 3), np.reshape(R, (3, 3)).T @ w)
             )
@@ -159,7 +159,7 @@ def test_mass_matrix_is_that_of_the_bodies(case):
     make, hinges = CASES[case]
     model = make()
     model.drivers.clear()  # they would prescribe some of the velocities
-    c = compiled(model, tree=hinges)
+    c = compile_mechanism(model, tree=hinges)
     S, s = c.values.system, c.structure
     exact = mass_matrix(c, 0.0, c.values.q)
     assert np.linalg.eigvalsh(exact).min() > 0
@@ -181,7 +181,7 @@ def test_joint_layer_solves_the_equations_of_motion(case):
     make, hinges = CASES[case]
     model = make()
     a = assemble(model, t=T)
-    c = compiled(model, tree=hinges)
+    c = compile_mechanism(model, tree=hinges)
     Q, V = c.take(a.compiled, T, *spun(model, a))
     S, s, W = c.values.system, c.structure, c.work
     M = mass_matrix(c, T, Q)
@@ -222,14 +222,14 @@ def test_many_joints_are_read_as_few_are(planar, monkeypatch):
     """From where the bodies are: joint coordinates come back, whichever way they are read."""
     m = ladder(planar)
     tree = tuple(j.name for j in m.joints)
-    plain, c = compiled(m), compiled(m, tree=tree)
+    plain, c = compile_mechanism(m), compile_mechanism(m, tree=tree)
     q = c.values.q + np.random.default_rng(4).uniform(-1.5, 1.5, len(c.values.q))
     v = np.random.default_rng(5).normal(size=len(q))
     there = plain.take(c, 0.0, q, v)
     back = c.take(plain, 0.0, *there)
     assert back[0] == pytest.approx(q, abs=1e-11)
     assert back[1] == pytest.approx(v, abs=1e-10)
-    monkeypatch.setattr(coordinates, "MANY", 10**9)
+    monkeypatch.setattr(reference_configuration, "MANY_JOINTS", 10**9)
     assert c.take(plain, 0.0, *there)[0] == pytest.approx(back[0], abs=1e-13)
 
 
@@ -284,8 +284,8 @@ def test_a_deep_tree_with_many_loops_is_not_made_to_see_that_it_costs_more():
     """Of a net of rods on balls the mass matrix alone costs more than absolute coordinates."""
     small, large = ball_net(6), ball_net(21)
     joint = small.simulate(1e-4, outputs=2, coordinates="joint").values.structure
-    assert 0.2 * cost(joint) < least(small, joint.tree) <= cost(joint)
-    assert cost(small.simulate(1e-4, outputs=2).values.structure) < cost(joint)
+    assert 0.2 * right_hand_side_cost(joint) < least_cost(small, joint.tree) <= right_hand_side_cost(joint)
+    assert right_hand_side_cost(small.simulate(1e-4, outputs=2).values.structure) < right_hand_side_cost(joint)
     assert "the mass matrix alone" in large.simulate(1e-4, outputs=2).health.coordinates
 
 

@@ -9,10 +9,10 @@ import pytest
 
 import flyball as fb
 from flyball import joints as room
-from flyball.analysis.assemble import assemble
-from flyball.analysis.compiled import compiled
-from flyball.equations.engine import MOTION
-from flyball.results.records import Records
+from flyball.assembly.assemble import assemble
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.engine.entry_point import MOTION
+from flyball.results.recorded_kinematics import RecordedMotion
 from tests.contract.zoo import CASES, declared, two_bodies
 
 HINGES = ["H0", "H1"]
@@ -106,7 +106,7 @@ PARTS = {
 def both_layers(model):
     """Body -> its record in absolute and in joint coordinates, at the same state."""
     a = assemble(model)
-    tree = compiled(model, tree=HINGES)
+    tree = compile_mechanism(model, tree=HINGES)
     Q, V = tree.take(a.compiled, 0.0, a.q, a.v)
     bodies = {}
     for c, q, v in ((a.compiled, a.q, a.v), (tree, Q, V)):
@@ -114,7 +114,7 @@ def both_layers(model):
         status, dy = c.at(0.2, q, v, MOTION)
         assert status == 0
         s = c.structure
-        r = Records(c.values, q[None], v[None], dy[None, s.nq : s.nq + s.nv])
+        r = RecordedMotion(c.values, q[None], v[None], dy[None, s.nq : s.nq + s.nv])
         for name, b in s.place.items():
             if b >= 0:
                 bodies.setdefault(name, []).append([np.ravel(part) for part in r.body(b)])

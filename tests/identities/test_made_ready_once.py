@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.compiled import compiled
-from flyball.analysis.motion.start import begin
+from flyball.assembly.compiled_mechanism import compile_mechanism
 from flyball.errors import FlyballError
-from flyball.model.kept import Kept
-from flyball.tables.numbers import numbers
-from flyball.tables.spanning import spanning
+from flyball.model.snapshot import ResultCache
+from flyball.simulation.initial_state import find_initial_state
+from flyball.tables.coordinate_choice import spanning_joints
+from flyball.tables.element_numbers import element_numbers
 from flyball.tables.structure import Choices, structure
-from flyball.tables.system import NUMBERS, arrays
+from flyball.tables.table_definitions import NUMBERS, named_arrays
 from flyball.tables.values import Values, values
 from tests import mechanisms
 from tests.complex_steps import with_parameters
@@ -32,7 +32,7 @@ CLOCKED = ("seconds", "compiling")  # what the clock says of a motion differs fr
 
 
 def bits(x: Values) -> dict[str, bytes]:
-    found = {k: a for name in NUMBERS for k, a in arrays(getattr(x.system, name), name)} | {"q": x.q, "v": x.v}
+    found = {k: a for name in NUMBERS for k, a in named_arrays(getattr(x.system, name), name)} | {"q": x.q, "v": x.v}
     return {name: a.tobytes() for name, a in found.items()}
 
 
@@ -51,7 +51,7 @@ def answers(mechanism: fb.Mechanism, /, **parameters: float) -> dict[str, bytes]
 
 def same_tables(m: fb.Mechanism, chosen: random.Random) -> None:
     """With other values of some parameters, in both coordinate layers, real and complex."""
-    tree = spanning(m)
+    tree = spanning_joints(m)
     names = list(m.parameters)
     for _ in range(12):
         some = chosen.sample(names, min(len(names), chosen.choice((1, 1, 2))))
@@ -121,14 +121,14 @@ def test_whatever_was_asked_and_changed_before(name):
 def test_analyses_leave_the_tables_as_they_are():
     m = mechanisms.example("governor.toml")
     wanted = answers(deepcopy(m))
-    x = compiled(m).values
+    x = compile_mechanism(m).values
     before = bits(x)
     assert not m.mobility().sets
     steady = m.equilibrium(turning=["bearing.angle"])
     m.modes(about=steady)
     m.simulate(0.02, coordinates="absolute", stabilization="partitioning")
     m.simulate(0.02, coordinates="absolute", stabilization="baumgarte", alpha=5.0)
-    assert compiled(m).values is x
+    assert compile_mechanism(m).values is x
     assert bits(x) == before
     assert answers(m) == wanted
 
@@ -162,7 +162,7 @@ def test_a_snapshot_is_the_same_until_something_changes():
 
 
 def test_tables_that_differ_keep_nothing_of_the_others():
-    x = compiled(mechanisms.example("slider_crank.toml")).values
+    x = compile_mechanism(mechanisms.example("slider_crank.toml")).values
     for made in (x, x.structure):
         assert dataclasses.replace(made).kept is not made.kept
 
@@ -197,22 +197,24 @@ def test_a_parameter_of_the_model_can_make_another_thing_of_a_point_mass(coordin
     for off in (0.0, 0.5, 0.0):  # held where it is, hung beside it
         m.parameters["off"] = off
         assert answers(m, off=off) == answers(deepcopy(m), off=off)
-        assert compiled(m).structure.nv == compiled(deepcopy(m)).structure.nv == (2 if off == 0.0 else 3)
+        assert (
+            compile_mechanism(m).structure.nv == compile_mechanism(deepcopy(m)).structure.nv == (2 if off == 0.0 else 3)
+        )
 
 
 def test_numbers_that_another_thread_finds_first_are_not_taken_for_ours(monkeypatch):
     m = mechanisms.example("slider_crank.toml")
-    drop = Kept.drop
+    drop = ResultCache.drop
 
     def meanwhile(self, kind, key):
         drop(self, kind, key)
         if kind == "first numbers":
             monkeypatch.undo()
-            numbers(m, {"speed": 3.0})
+            element_numbers(m, {"speed": 3.0})
 
-    monkeypatch.setattr(Kept, "drop", meanwhile)
-    assert numbers(m, {"speed": 7.0}).env["speed"] == 7.0
-    assert numbers(m, {"speed": 3.0}).env["speed"] == 3.0
+    monkeypatch.setattr(ResultCache, "drop", meanwhile)
+    assert element_numbers(m, {"speed": 7.0}).env["speed"] == 7.0
+    assert element_numbers(m, {"speed": 3.0}).env["speed"] == 3.0
 
 
 def test_functions_whose_globals_change_are_made_again():
@@ -230,7 +232,7 @@ def test_functions_whose_globals_change_are_made_again():
 def test_starts_that_are_handed_out_again_share_nothing(coordinates):
     """What a motion does to its start, and who reads its result later, is nothing to the next motion."""
     model = mechanisms.four_bar().snapshot()
-    first, second, third = (begin(model, 0.0, None, None, coordinates, switches=True) for _ in range(3))
+    first, second, third = (find_initial_state(model, 0.0, None, None, coordinates, switches=True) for _ in range(3))
     for a, b in ((first, second), (second, third)):
         assert a.base is not b.base
         assert a.wound is not b.wound
@@ -249,14 +251,14 @@ def test_starts_of_other_forces_are_those_of_fresh_mechanisms(where, coordinates
     """Every number of every element once differs from the values filled in first: of forces most starts are shared."""
     m, names = with_parameters(with_forces(where))
     m, other = m.snapshot(), 1.0 + 1e-3
-    begin(m, 0.0, None, None, coordinates, switches=True)
+    find_initial_state(m, 0.0, None, None, coordinates, switches=True)
     shared = set()
     for field, name in names.items():
         try:
-            here = begin(m, 0.0, {name: other}, None, coordinates, switches=True)
+            here = find_initial_state(m, 0.0, {name: other}, None, coordinates, switches=True)
         except FlyballError:
             continue
-        there = begin(m.copy().snapshot(), 0.0, {name: other}, None, coordinates, switches=True)
+        there = find_initial_state(m.copy().snapshot(), 0.0, {name: other}, None, coordinates, switches=True)
         for a, b in ((here.base, there.base), (here.assembly, there.assembly)):
             assert a.y.tobytes() == b.y.tobytes(), field
             assert bits(a.compiled.values) == bits(b.compiled.values), field

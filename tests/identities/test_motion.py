@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis import simulate
-from flyball.analysis.assemble import assemble
-from flyball.analysis.compiled import Compiled, compiled
-from flyball.equations import motion, projection
-from flyball.equations.engine import MOTION, motion_kernel
-from flyball.numerics.integrators import clock as explicit
-from flyball.numerics.integrators.tableaux import tableau
+from flyball.assembly.assemble import assemble
+from flyball.assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from flyball.engine import motion, projection
+from flyball.engine.entry_point import MOTION, run_task
+from flyball.numerics.integrators import time_loop as explicit
+from flyball.numerics.integrators.butcher_tableaux import tableau
+from flyball.simulation import simulate
 from tests.layers import both_layers, cached
 from tests.mechanisms import G, bricard, door, example, four_bar, spatial_four_bar
 from tests.verification.test_reactions import actuated
@@ -37,7 +37,7 @@ def ready(name, stabilize):
     """A compiled mechanism and a state slightly off its constraints, so that projection has work to do."""
     make, tree = MECHANISMS[name]
     model = make()
-    c = compiled(model, tree=tree)
+    c = compile_mechanism(model, tree=tree)
     if tree:
         q, v = c.values.q, c.values.v
     else:
@@ -60,7 +60,7 @@ def test_compiled_is_plain_python(name):
     """The right-hand side, projection included, run as the plain function it is: the same numbers to 1e-12."""
     c, y = ready(name, projection.STAGES)
     plain, _ = ready(name, projection.STAGES)
-    clock = explicit.Clock(
+    clock = explicit.StepState(
         np.r_[1e-3, np.zeros(9)],
         np.zeros(9, np.int64),
         np.zeros(0),
@@ -69,7 +69,7 @@ def test_compiled_is_plain_python(name):
         np.zeros(0, np.int64),
         np.zeros((6, 0)),
     )
-    status = motion_kernel(c.values.system, c.work, tableau("rk45"), clock, np.zeros((0, 0)), MOTION)
+    status = run_task(c.values.system, c.work, tableau("rk45"), clock, np.zeros((0, 0)), MOTION)
     dy = np.zeros(len(y))
     again = motion.derivative(1e-3, y.copy(), dy, plain.values.system, plain.work)
     assert status == again == 0
@@ -190,8 +190,8 @@ def test_chunks_change_nothing(monkeypatch, make):
     assert all(a <= b for a, b in pairwise(calls))
     assert calls[-1] == 1.0
     assert equal(whole, stepwise)
-    original = Compiled.bound
-    monkeypatch.setattr(Compiled, "bound", lambda self, R, clock, out: original(self, R, clock, out[:3]))
+    original = CompiledMechanism.bound
+    monkeypatch.setattr(CompiledMechanism, "bound", lambda self, R, clock, out: original(self, R, clock, out[:3]))
     narrow = make().simulate(1.0, outputs=101)
     assert equal(whole, narrow)
     assert (narrow.health.violation, narrow.health.steps) == (whole.health.violation, whole.health.steps)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.equations.tree import column
+from flyball.engine.kinematics import twist_column
 from flyball.math.vec import dot
-from flyball.tables.spanning import spanning
+from flyball.tables.coordinate_choice import spanning_joints
 from flyball.tables.structure import Choices, structure
 from tests.contract.zoo import CASES
 from tests.examples.test_examples import FILES, mechanism
@@ -39,7 +39,7 @@ def residual(r):
         arm = np.array(r.records.body(b)[0]) - W.O[b]
         moment = torque + np.cross(arm, force, axis=0)  # about the joint's point
         for k in range(S.tree.nv[b]):
-            turn, shift = (np.stack([x + 0.0 * force[0] for x in part]) for part in column(S, W, b, k))
+            turn, shift = (np.stack([x + 0.0 * force[0] for x in part]) for part in twist_column(S, W, b, k))
             along = (turn * moment).sum(axis=0) + (shift * force).sum(axis=0) - driven.get(b, 0.0)
             unit = length if turn.any() else 1.0
             largest = max(largest, np.abs(along).max() / unit)
@@ -123,7 +123,7 @@ def test_tree_joints_carry_nothing_along_their_coordinates(case):
         force, torque, p = r.reactions.through[b, :3], r.reactions.through[b, 3:], r.records.body(b)[0]
         at_joint = torque + np.cross(np.subtract(p, r.records.W.O[b]), force, axis=0)
         for k in range(S.tree.nv[b]):
-            turn, shift = column(S, r.records.W, b, k)
+            turn, shift = twist_column(S, r.records.W, b, k)
             effort = r[driver[b]].effort if b in driver else 0.0
             assert dot(turn, at_joint) + dot(shift, force) == pytest.approx(effort + 0.0 * r.t, abs=1e-10 * largest)
 
@@ -144,6 +144,6 @@ def test_a_driver_that_follows_pushes_what_it_follows():
 def test_frames_that_are_kept_up_to_date_exist(case):
     """Those of bodies that the loops run over are no more than there are; forces without frames ask for none."""
     m = MORE[case]().snapshot()
-    for tree in ((), spanning(m)):
+    for tree in ((), spanning_joints(m)):
         t = structure(m, Choices(tree=tree)).tables
         assert t["sizes"].ground_frames <= t["sizes"].moving_frames <= len(t["frame_body"])

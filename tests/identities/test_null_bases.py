@@ -5,8 +5,16 @@ import pytest
 import scipy.sparse as sp
 
 from flyball.numerics.rank import null_space
-from flyball.numerics.saddle import null_basis, surely_independent
-from flyball.numerics.sparse_rank import FEW, by_pivots, negative_pivots, null_spaces, rank, weak_pivots
+from flyball.numerics.sparse_rank import (
+    FEW,
+    clearly_independent,
+    negative_pivots,
+    null_basis,
+    null_spaces,
+    rank_by_pivots,
+    sparse_matrix_rank,
+    weak_pivots,
+)
 
 
 def rows(m: int, n: int, seed: int = 0) -> np.ndarray:
@@ -30,7 +38,7 @@ def test_rows_that_nearly_depend_on_others_are_not_sure(apart, sure):
     A = rows(80, 120)
     A[40] = A[41] + apart * A[40]
     A /= np.linalg.norm(A, axis=1)[:, None]
-    assert surely_independent(sp.csr_matrix(A)) == sure
+    assert clearly_independent(sp.csr_matrix(A)) == sure
 
 
 def test_pivots_count_what_eigenvalues_count():
@@ -59,12 +67,12 @@ def test_pivots_say_what_singular_values_say_or_nothing(apart):
     d = np.linalg.svd(A, compute_uv=False)
     least = int((d > 1e-8 * d[0]).sum())
     assert max(A.shape) > FEW
-    assert rank(sp.csr_matrix(A)) == rank(A) == least
+    assert sparse_matrix_rank(sp.csr_matrix(A)) == sparse_matrix_rank(A) == least
     found, lam, _ = null_spaces(sp.csr_matrix(A))
     assert (found, lam.shape) == (least, (200, 200 - least))
     assert np.linalg.matrix_rank(lam) == 200 - least
     assert np.linalg.norm(lam.T @ A, axis=1) == pytest.approx(0.0, abs=1e-8)
-    assert (by_pivots(sp.csr_matrix(A)) is None) == (1e-9 < apart < 1e-4)
+    assert (rank_by_pivots(sp.csr_matrix(A)) is None) == (1e-9 < apart < 1e-4)
 
 
 def test_all_dependencies_of_many_are_found():
@@ -73,6 +81,6 @@ def test_all_dependencies_of_many_are_found():
     for k in range(0, 240, 3):
         A[k] = A[k + 1] - A[k + 2]
     A /= np.linalg.norm(A, axis=1)[:, None]
-    count, lam = by_pivots(sp.csr_matrix(A))
+    count, lam = rank_by_pivots(sp.csr_matrix(A))
     assert (count, lam.shape) == (160, (240, 80))
     assert np.abs(lam.T @ A).max() < 1e-12

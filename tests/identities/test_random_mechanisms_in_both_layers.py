@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.assemble import assemble
-from flyball.analysis.compiled import compiled
-from flyball.equations.engine import MOTION
+from flyball.assembly.assemble import assemble
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.engine.entry_point import MOTION
 from tests.contract.zoo import JOINTS
 from tests.identities.test_results_in_both_layers import agree, spanning_tree
 from tests.results.at_states import assembled, in_other_coordinates
@@ -87,7 +87,7 @@ def test_the_same_at_the_same_state(family):
             continue
         compared += 1
         close = RUBBED if rubbed(m) else 1e-9
-        o = in_other_coordinates(r, compiled(m, tree=tree), a.compiled)
+        o = in_other_coordinates(r, compile_mechanism(m, tree=tree), a.compiled)
         size = max(np.abs(x).max(), 1.0)
         for layer, result in (("absolute", r), ("joint", o)):
             found = absolute(result, a.compiled.structure)
@@ -126,7 +126,7 @@ def test_every_kind_of_tree_joint_takes_part():
     seen = set()
     for family in ("chains", "trees", "loops", "redundant", "extremes"):
         for _, m, _, tree in cases(family):
-            joints = compiled(m, tree=tree).structure.tree_joints.values()
+            joints = compile_mechanism(m, tree=tree).structure.tree_joints.values()
             seen |= {(type(t.joint).__name__, m.planar, t.reversed) for t in joints}
     can = {(c.__name__, False) for c in JOINTS if c.spatial and c.chain is not None}
     can |= {(c.__name__, True) for c in JOINTS if c.planar_normal and c.chain is not None}

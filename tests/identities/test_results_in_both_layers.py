@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.assemble import assemble
-from flyball.analysis.compiled import compiled
+from flyball.assembly.assemble import assemble
+from flyball.assembly.compiled_mechanism import compile_mechanism
 from flyball.model.body import GROUND
-from flyball.tables import switches
+from flyball.tables import constraint_rows
 from tests.contract.zoo import CASES as ZOO
 from tests.contract.zoo import declared
 from tests.examples.test_examples import FILES, mechanism
@@ -110,7 +110,7 @@ def spanning_tree(model, seed=0):
 def compare(model, tree, close=1e-9):
     a = assemble(model)
     r = assembled(a)
-    agree(r, in_other_coordinates(r, compiled(model, tree=tree), a.compiled), close)
+    agree(r, in_other_coordinates(r, compile_mechanism(model, tree=tree), a.compiled), close)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -134,7 +134,7 @@ def test_every_joint_hung_the_other_way_round(where, name):
     """Named from the body beyond: its chain is gone back, its reaction is that on the nearer body."""
     m = hung(where)
     m.add(getattr(fb, name)("J", "b", "a", **declared(where, name)))
-    c = compiled(m, tree=[*HINGES, "J"])
+    c = compile_mechanism(m, tree=[*HINGES, "J"])
     assert c.structure.tree_joints["J"].reversed
     compare(m, [*HINGES, "J"])
 
@@ -156,7 +156,7 @@ def test_more(case):
 def test_examples(name):
     """In motion; one of their trees, whichever it is."""
     m = mechanism(name)
-    if switches.declared(m):
+    if constraint_rows.declared_switches(m):
         pytest.skip("what holds in it is of its motion: see tests/events")
     a = assemble(m)
     r = m.simulate(0.05, outputs=4, coordinates="absolute")
@@ -165,4 +165,4 @@ def test_examples(name):
     tree = spanning_tree(m)
     if not tree:
         pytest.skip("no joint of it can be a tree joint")
-    agree(r, in_other_coordinates(r, compiled(m, tree=tree), a.compiled))
+    agree(r, in_other_coordinates(r, compile_mechanism(m, tree=tree), a.compiled))

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.analysis.compiled import compiled
-from flyball.analysis.steps import tangent_rate, tangent_step
-from flyball.equations.tree import retract
-from flyball.numerics.rank import null_space, parts, rank, span
+from flyball.assembly.compiled_mechanism import compile_mechanism, tangent_rate, tangent_step
+from flyball.engine.kinematics import retract
+from flyball.numerics.rank import column_space, fundamental_subspaces, null_space, rank
 from tests.mechanisms import example, four_bar, free_body
 
 
@@ -16,7 +15,7 @@ from tests.mechanisms import example, four_bar, free_body
 @pytest.mark.parametrize("layer", ["absolute", "joint"])
 def test_a_step_leads_from_one_position_to_another(make, layer):
     m = make()
-    c = compiled(m, tree=[j.name for j in m.joints][:1] if layer == "joint" else ())
+    c = compile_mechanism(m, tree=[j.name for j in m.joints][:1] if layer == "joint" else ())
     random = np.random.default_rng(0)
     for _ in range(5):
         q, d = c.values.q.copy(), 0.7 * random.normal(size=c.structure.nv)
@@ -30,7 +29,7 @@ def test_a_step_leads_from_one_position_to_another(make, layer):
 
 
 def test_half_a_turn_is_a_step_with_an_end():
-    c = compiled(free_body())
+    c = compile_mechanism(free_body())
     q, other = np.array([0, 0, 0, 1.0, 0, 0, 0]), np.array([0, 0, 0, 0, 0, 0, 1.0])
     d = tangent_step(c, q, other)
     assert np.isfinite(d).all()
@@ -41,11 +40,11 @@ def test_rank_and_its_spaces():
     """A product of known rank; nothing at all; what counts as zero is relative unless a size is given."""
     random = np.random.default_rng(1)
     A = random.normal(size=(7, 3)) @ random.normal(size=(3, 5))
-    p = parts(A)
+    p = fundamental_subspaces(A)
     assert (p.rank, p.dependencies.shape, p.null.shape) == (3, (7, 4), (5, 2))
     assert np.abs(p.dependencies.T @ A).max() < 1e-13
     assert np.abs(A @ p.null).max() < 1e-13
     assert np.allclose(p.span @ np.diag(p.values) @ p.seen.T, A)
-    assert span(A).shape == (7, 3)
+    assert column_space(A).shape == (7, 3)
     assert (rank(np.zeros((0, 4))), null_space(np.zeros((0, 4))).shape, rank(np.zeros((2, 2)))) == (0, (4, 4), 0)
     assert (rank(1e-12 * A), rank(1e-12 * A, size=1.0)) == (3, 0)

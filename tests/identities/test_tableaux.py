@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flyball.numerics.integrators.tableaux import TABLEAUX, tableau
+from flyball.numerics.integrators.butcher_tableaux import TABLEAUX, tableau
 
 
 @pytest.mark.parametrize(("name", "order"), [("rk45", 5), ("dop853", 8)])

@@ -78,7 +78,7 @@ def test_a_jolt_of_a_driver():
 def test_nothing_is_inspected_without_such_laws():
     m = cart()
     m.add(fb.PointForce("push", "cart", force=("3*sin(2*t) + t**2 - 4*t", 0)))
-    from flyball.equations.within import kept
+    from flyball.engine.pulse_detection import inspection_buffer
     from tests.layers import started
 
-    assert kept(started(m.snapshot()).compiled.values.system).shape[1] == 0
+    assert inspection_buffer(started(m.snapshot()).compiled.values.system).shape[1] == 0

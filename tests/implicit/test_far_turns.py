@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
-from flyball.math import cayley
-from flyball.numerics.integrators.implicit import hermite
-from flyball.numerics.integrators.implicit.desk import START
-from flyball.numerics.integrators.implicit.hermite import END
+from flyball.math import rotation
+from flyball.numerics.integrators import implicit_method
+from flyball.numerics.integrators.implicit_method import END_ROW
+from flyball.numerics.integrators.implicit_workspace import STEP_START
 from tests.mechanisms import free_body
 
 METHODS = pytest.mark.parametrize(("method", "turn"), [("variational", 1.8), ("variational", 3.0), ("variational", 7.0),
@@ -59,20 +59,20 @@ def test_what_is_between_steps_has_their_values_and_rates():
     """Cubics within a step: places and turns begin and end where the step does, with its velocities there."""
     h, near = 0.1, 1e-6
     v, d, rate, z = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 1)), np.zeros((4, 1))
-    v[[START, END]] = (1.0, -2.0, 0.5, 0.3), (1.5, -1.0, 0.9, -0.4)
-    d[END] = *cayley.step(cayley.quaternion((0.14, -0.13, 0.08))), 0.02
-    rate[[START, END]], z[[START, END]] = ((0.7,), (-0.2,)), ((2.0,), (2.1,))
+    v[[STEP_START, END_ROW]] = (1.0, -2.0, 0.5, 0.3), (1.5, -1.0, 0.9, -0.4)
+    d[END_ROW] = *rotation.cayley_step(rotation.cayley_quaternion((0.14, -0.13, 0.08))), 0.02
+    rate[[STEP_START, END_ROW]], z[[STEP_START, END_ROW]] = ((0.7,), (-0.2,)), ((2.0,), (2.1,))
     K = SimpleNamespace(v=v, d=d, rate=rate, z=z, ends=np.zeros((2, 4)), turns=np.array([0]))
 
     def at(x):
         out = np.zeros(4), np.zeros(4), np.zeros(1)
-        hermite.between(K, x, h, *out)
-        turn = Rotation.from_quat(np.roll(cayley.quaternion(tuple(out[0][:3])), -1))
+        implicit_method.interpolate_hermite(K, x, h, *out)
+        turn = Rotation.from_quat(np.roll(rotation.cayley_quaternion(tuple(out[0][:3])), -1))
         return turn, np.r_[out[0][3], out[2]]
 
-    for x, k in ((0.0, START), (1.0, END)):
+    for x, k in ((0.0, STEP_START), (1.0, END_ROW)):
         (here, f), (before, a), (after, b) = at(x), at(x - near), at(x + near)
-        there = Rotation.from_quat(np.roll(cayley.quaternion(tuple(d[k, :3])), -1))
+        there = Rotation.from_quat(np.roll(rotation.cayley_quaternion(tuple(d[k, :3])), -1))
         assert (there.inv() * here).magnitude() < 1e-14
         assert f == pytest.approx([d[k, 3], z[k, 0]], abs=1e-14)
         assert (before.inv() * after).as_rotvec() / (2 * near * h) == pytest.approx(v[k, :3], abs=1e-6)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from flyball.numerics.lu import analyse, constrained_order, lu_factor, lu_solve, times
+from flyball.numerics.sparse_factorisation import analyse_lu, constrained_order, lu_factor, lu_solve, sparse_product
 from tests.compiled import compiled
 
 
 @compiled
 def factor_and_solve(P, A, L, U, D, Y, x, product):
     status = lu_factor(P, A, L, U, D, Y)
-    times(P, A, x, product)
+    sparse_product(P, A, x, product)
     lu_solve(P, L, U, D, x)
     return status
 
@@ -42,7 +42,7 @@ def test_solution_is_that_of_a_dense_solver(dtype):
     i, j = np.nonzero(dense)
     groups = np.r_[np.arange(n) // 2, n // 2 + np.arange(rows)]
     order = constrained_order(groups, np.arange(n // 2 + rows) >= n // 2, i, j)
-    P, place = analyse(n + rows, i, j, order)
+    P, place = analyse_lu(n + rows, i, j, order)
     A = np.zeros(len(P.Aj), dtype)
     A[place] = dense[i, j]
     L, U, D = np.zeros(len(P.Lj), dtype), np.zeros(len(P.Uj), dtype), np.zeros(n + rows, dtype)

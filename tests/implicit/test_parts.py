@@ -5,14 +5,13 @@ import pytest
 from scipy.sparse import csr_matrix
 
 import flyball as fb
-from flyball.analysis.linear.derivatives import Equations, State
-from flyball.analysis.linear.loads import STEP
-from flyball.analysis.motion.implicit.layout import layout
-from flyball.analysis.motion.start import begin
-from flyball.analysis.motion.touches import with_places
-from flyball.equations.residual import stepped
-from flyball.equations.tasks import PARTS, PUSHES, Bench
-from flyball.tables.system import HELD, OFF, SLIDING
+from flyball.derivatives.equation_derivatives import COMPLEX_STEP, EquationDerivatives, MechanismState
+from flyball.engine.calls import INERTIAL_TERMS, RESIDUAL_TERMS, ResidualBatch
+from flyball.engine.residual import residuals_kernel
+from flyball.simulation.implicit.jacobian_pattern import jacobian_layout
+from flyball.simulation.initial_state import find_initial_state
+from flyball.simulation.method_choice import with_contact_points
+from flyball.tables.table_definitions import HELD, OFF, SLIDING
 from tests.contract.test_everything import everything
 from tests.contract.zoo import joined
 from tests.mechanisms import example
@@ -40,31 +39,33 @@ MODELS |= {"everything": everything, "sledge": sledge}
 @pytest.mark.parametrize("name", MODELS)
 def test_jacobians_from_parts_are_those_of_the_whole(name, coordinates):
     """At random velocities, accelerations and multipliers."""
-    start = begin(with_places(MODELS[name]().snapshot(), None), 0.0, None, None, coordinates, switches=True)
+    start = find_initial_state(
+        with_contact_points(MODELS[name]().snapshot(), None), 0.0, None, None, coordinates, switches=True
+    )
     c = start.assembly.compiled
     s, S, rng = c.structure, c.system, np.random.default_rng(0)
-    x = State.moving(c, 0.1, start.y[: s.nq], start.y[s.nq : s.nq + s.nv] + rng.normal(size=s.nv))
+    x = MechanismState.moving(c, 0.1, start.y[: s.nq], start.y[s.nq : s.nq + s.nv] + rng.normal(size=s.nv))
     x.vdot, x.lam = rng.normal(size=s.nv), rng.normal(size=len(s.rows))
-    full = Equations(x)
+    full = EquationDerivatives(x)
     SC, WC = full.complex_tables
     for slip in S.forces.switch[S.forces.family == SLIDING]:
         WC.modes.mode[slip], WC.modes.mode[S.switches.other[slip]] = OFF, HELD
-    made, nv = layout(s, S), s.nv
+    made, nv = jacobian_layout(s, S), s.nv
 
     def by(kinds, terms, task):
         steps = np.zeros((len(kinds) * terms.groups, 3 * nv + 1), complex)
         for n, kind in enumerate(kinds):
-            steps[n * terms.groups + terms.group, kind * nv + np.arange(nv)] = 1j * STEP
+            steps[n * terms.groups + terms.group, kind * nv + np.arange(nv)] = 1j * COMPLEX_STEP
         out = np.zeros((len(steps), made.places), complex)
         t, y, vdot, lam = np.array([x.t + 0j]), x.y.astype(complex), x.vdot.astype(complex), x.lam.astype(complex)
-        bench = Bench(t, y, vdot, lam, steps, out)
-        stepped(SC, WC, bench, bench, bench, task)
+        bench = ResidualBatch(t, y, vdot, lam, steps, out)
+        residuals_kernel(SC, WC, bench, bench, bench, task)
         entry, step, place = terms.pick.T
-        found = [out[step + n * terms.groups, place].imag / STEP for n in range(len(kinds))]
+        found = [out[step + n * terms.groups, place].imag / COMPLEX_STEP for n in range(len(kinds))]
         size = nv + len(s.rows), nv
         return [csr_matrix((f, (terms.i[entry], terms.j[entry])), shape=size).toarray() for f in found]
 
-    (P, D), (M,) = by((0, 1), made.terms, PARTS), by((2,), made.mass, PUSHES)
+    (P, D), (M,) = by((0, 1), made.terms, RESIDUAL_TERMS), by((2,), made.mass, INERTIAL_TERMS)
     for J, whole in ((P, full.by_position), (D, full.by_velocity), (M, full.by_acceleration)):
         exact = whole.toarray()[np.r_[np.arange(nv), np.arange(full.at["n"].start, full.at["n"].stop)]]
         size = nv if J is M else len(exact)

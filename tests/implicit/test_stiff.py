@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.start import begin
-from flyball.analysis.motion.stiff import fastest
-from flyball.numerics.arnoldi import largest
-from flyball.numerics.integrators import clock as ex
+from flyball.numerics.eigen import dominant_eigenvalue
+from flyball.numerics.integrators import time_loop as ex
+from flyball.simulation.initial_state import find_initial_state
+from flyball.simulation.solver_switching import largest_eigenvalue
 
 
 def bushing(damping, *more):
@@ -20,16 +20,16 @@ def bushing(damping, *more):
 
 
 def clock_at(start):
-    real, y = ex.ClockReals.blank(), np.zeros((ex.STATES, len(start.y)))
-    y[ex.NOW] = start.y
-    return ex.Clock(real, ex.ClockCounts.blank(), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, int))
+    real, y = ex.StepReals.blank(), np.zeros((ex.STATE_ROWS, len(start.y)))
+    y[ex.CURRENT] = start.y
+    return ex.StepState(real, ex.StepCounts.blank(), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, int))
 
 
 @pytest.mark.parametrize("damping", [0.0, 10.0, 50.0, 1000.0])
 def test_fastest_eigenvalue(damping):
     """Root of m s^2 + c s + k = 0, with its damping: a pair but for the last."""
-    start = begin(bushing(damping).snapshot(), 0.0, None, None, "joint")
-    found = fastest(start.assembly.compiled, clock_at(start), 1e4)
+    start = find_initial_state(bushing(damping).snapshot(), 0.0, None, None, "joint")
+    found = largest_eigenvalue(start.assembly.compiled, clock_at(start), 1e4)
     roots = np.roots([1e-3, damping, 1e6])
     root = roots[np.argmax(np.abs(roots))]
     assert complex(found.real, abs(found.imag)) == pytest.approx(complex(root.real, abs(root.imag)), rel=1e-5)
@@ -39,12 +39,14 @@ def test_largest_eigenvalue_of_a_matrix():
     """As of all its eigenvalues; and of one whose start spans two directions only, by three products."""
     matrix = np.random.default_rng(1).normal(size=(7, 7))
     values = np.linalg.eigvals(matrix)
-    assert abs(largest(lambda x: matrix @ x, np.ones(7), 7)) == pytest.approx(np.abs(values).max(), rel=1e-9)
+    assert abs(dominant_eigenvalue(lambda x: matrix @ x, np.ones(7), 7)) == pytest.approx(
+        np.abs(values).max(), rel=1e-9
+    )
     pair = np.diag(np.arange(1.0, 7.0))
     pair[:2, :2] = [[-3.0, 9.0], [-9.0, -3.0]]
-    found = largest(lambda x: pair @ x, np.eye(6)[0], 5)
+    found = dominant_eigenvalue(lambda x: pair @ x, np.eye(6)[0], 5)
     assert (found.real, abs(found.imag)) == pytest.approx((-3.0, 9.0))
-    assert largest(lambda x: x * np.nan, np.ones(3), 2) == 0.0
+    assert dominant_eigenvalue(lambda x: x * np.nan, np.ones(3), 2) == 0.0
 
 
 def on_a_tip(mass, stiffness, ratio, *more):

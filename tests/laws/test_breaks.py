@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.laws.breaks import acts_briefly, found_beforehand, reached, timed
+from flyball.laws.breakpoints import acts_briefly, find_breakpoints, sign_changes, time_dependent_laws
 from tests.laws.written import program
 
 
 def sharp(text: str, t0: float = 0.0, t1: float = 10.0) -> np.ndarray:
     code, const, at = program(text)
-    b = found_beforehand(timed(code, [at]), const, t0, t1)
+    b = find_breakpoints(time_dependent_laws(code, [at]), const, t0, t1)
     assert not b.given_up
     return b.times[
         b.sharp & (b.times > t0 + 1e-9) & (b.times < t1 - 1e-9)
@@ -60,7 +60,7 @@ def test_corners(law, expected):
 def test_brief_actions(form, centre, width):
     """Steps that end at breaks: the interval about the centre is a few widths long, or the action is no brief one."""
     code, const, at = program(form.format(c=centre, w=width))
-    b = found_beforehand(timed(code, [at]), const, 0.0, 10.0)
+    b = find_breakpoints(time_dependent_laws(code, [at]), const, 0.0, 10.0)
     assert not b.given_up and not b.sharp.any() and len(b.times) < 60
     edges = np.r_[0.0, b.times, 10.0]
     k = np.searchsorted(edges, centre)
@@ -74,14 +74,14 @@ def test_brief_actions(form, centre, width):
 def test_what_lasts_long_needs_no_breaks():
     for law in ["exp(-t)", "exp(3*sin(2*pi*t))", "tanh(sin(t))", "bow(0.4*t)**2"]:
         code, const, at = program(law)
-        assert len(found_beforehand(timed(code, [at]), const, 0.0, 10.0).times) <= 3
+        assert len(find_breakpoints(time_dependent_laws(code, [at]), const, 0.0, 10.0).times) <= 3
 
 
 def test_what_cannot_be_found_is_told():
     """A law with more corners than anyone wants, and one with corners that heap up at one place."""
     for law in ["sign(sin(1e6*t))", "sign(sin(1/(t - 5)))"]:
         code, const, at = program(law)
-        assert found_beforehand(timed(code, [at]), const, 0.0, 10.0).given_up == (at,)
+        assert find_breakpoints(time_dependent_laws(code, [at]), const, 0.0, 10.0).given_up == (at,)
 
 
 def test_the_state_is_left_to_samples():
@@ -92,17 +92,17 @@ def test_the_state_is_left_to_samples():
 
 def test_signs_of_a_law_of_time():
     code, const, at = program("sin(2*pi*200*t) - 0.1")
-    times, up, complete = reached(code, const, at, 0.0, 1.0)
+    times, up, complete = sign_changes(code, const, at, 0.0, 1.0)
     first = np.arcsin(0.1) / (2 * np.pi)
     expected = np.sort(np.r_[np.arange(200) + first, np.arange(200) + 0.5 - first]) / 200
     assert complete and times == pytest.approx(expected, rel=1e-13)
     assert (up == (np.arange(400) % 2 == 0)).all()
     with pytest.raises(ValueError, match="more than time"):
-        reached(*program("value - t"), 0.0, 1.0)
+        sign_changes(*program("value - t"), 0.0, 1.0)
 
 
 def test_zero_at_a_place_where_an_interval_is_cut():
     """A table passes zero at its break 0.5; t^3 is 0.5 at the middle of the time up to where the table ends."""
     code, const, at = program("bow(t**3)")
-    times, up, complete = reached(code, const, at, 0.0, 3.0)
+    times, up, complete = sign_changes(code, const, at, 0.0, 3.0)
     assert complete and times[0] == pytest.approx(0.5 ** (1 / 3), abs=1e-14) and up[0]

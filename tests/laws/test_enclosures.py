@@ -6,9 +6,8 @@ import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from flyball.laws.breaks import found_beforehand, reached, timed
-from flyball.laws.intervals.enclose import Law
-from flyball.laws.intervals.steps import read
+from flyball.laws.breakpoints import find_breakpoints, sign_changes, time_dependent_laws
+from flyball.laws.interval_evaluation import IntervalLaw, read_steps
 from tests.laws.written import program, values
 
 SMOOTH = ["sin", "cos", "exp", "tanh", "atan", "sinh", "cosh", "sqrt", "log", "asin", "acos", "tan", "bow"]
@@ -51,9 +50,9 @@ def test_ranges_hold_values_and_slopes(text, start, width):
     if made is None:
         return
     code, const, at = made
-    steps = read(code, at)
+    steps = read_steps(code, at)
     with np.errstate(all="ignore"):
-        law = Law(steps, const)
+        law = IntervalLaw(steps, const)
         (lo, hi), (down, up) = law.enclose(range(len(steps)), (np.array([start]), np.array([start + width])), {})[
             len(steps) - 1
         ]
@@ -80,9 +79,9 @@ def test_no_change_of_sign_is_missed(text):
     if made is None:
         return
     code, const, at = made
-    if read(code, at)[-1].on == 0:
+    if read_steps(code, at)[-1].on == 0:
         return
-    times, up, complete = reached(code, const, at, 0.0, 3.0)
+    times, up, complete = sign_changes(code, const, at, 0.0, 3.0)
     if not complete:
         return
     t = np.linspace(0.0, 3.0, 3001) + 1e-4
@@ -105,7 +104,7 @@ def test_between_breaks_laws_are_smooth(text):
     if made is None:
         return
     code, const, at = made
-    b = found_beforehand(timed(code, [at]), const, 0.0, 3.0)
+    b = find_breakpoints(time_dependent_laws(code, [at]), const, 0.0, 3.0)
     if b.given_up:
         return
     h = 1e-5

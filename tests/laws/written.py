@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import flyball as fb
-from flyball.laws.program import compile_law
+from flyball.laws.compilation import compile_law
 from flyball.model.expressions import Expression
 
 TABLES = (

@@ -3,8 +3,7 @@
 import pytest
 
 from flyball.model import units
-from flyball.model.common_units import COMMON, common_unit
-from flyball.model.units import KINDS
+from flyball.model.units import COMMON, KINDS, common_unit
 
 
 def by_pint(unit):

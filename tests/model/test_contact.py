@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.contact import kinds
-from flyball.contact import tables as ct
-from flyball.contact.surfaces import ACROSS, KINETIC, RESTITUTION, ROLLING, STATIC
-from flyball.model.io import dumps, loads
-from flyball.tables.contact import Touching, touching
-from flyball.tables.numbers import numbers
+from flyball.collision import shape_kinds
+from flyball.collision import tables as ct
+from flyball.model.toml_file import dumps, loads
+from flyball.tables.contact_tables import ContactTables, contact_tables
+from flyball.tables.element_numbers import element_numbers
+from flyball.tables.table_definitions import ACROSS, KINETIC, RESTITUTION, ROLLING, STATIC
 
 BOX = fb.Box(edges=(0.2, 0.2, 0.2))
 
 
-def tables(m: fb.Mechanism, *names: str) -> Touching:
+def tables(m: fb.Mechanism, *names: str) -> ContactTables:
     s = m.snapshot()
-    return touching(s, numbers(s), names or [*(b.name for b in s.bodies), *(b.name for b in s.bulk)])
+    return contact_tables(s, element_numbers(s), names or [*(b.name for b in s.bodies), *(b.name for b in s.bulk)])
 
 
-def meet(t: Touching, a: int, b: int) -> bool:
+def meet(t: ContactTables, a: int, b: int) -> bool:
     """Whether two shapes may touch, as the search decides it."""
     i, j = t.geometry.shape_i[a], t.geometry.shape_i[b]
     if i[ct.MOVER] == j[ct.MOVER] or not (i[ct.MEMBER] & j[ct.MASK] and j[ct.MEMBER] & i[ct.MASK]):
@@ -31,12 +31,12 @@ def meet(t: Touching, a: int, b: int) -> bool:
     return sorted((i[ct.MOVER], j[ct.MOVER])) not in t.geometry.apart.tolist()
 
 
-def pairs(t: Touching) -> set[tuple[str, str]]:
+def pairs(t: ContactTables) -> set[tuple[str, str]]:
     n = len(t.geometry.shape_i)
     return {(t.name(a), t.name(b)) for a in range(n) for b in range(a + 1, n) if meet(t, a, b)}
 
 
-def row(t: Touching, a: str, b: str) -> np.ndarray:
+def row(t: ContactTables, a: str, b: str) -> np.ndarray:
     """What the surfaces of two parts are to each other."""
     names = [t.name(k) for k in range(len(t.part))]
     i, j = (t.geometry.shape_i[names.index(x), ct.MATERIAL] for x in (a, b))
@@ -124,8 +124,8 @@ def test_shapes_lie_from_the_centre_of_mass() -> None:
     m.add(fb.Body("a", shape=[fb.Sphere(radius=0.1), fb.Box(edges=(0.2, 0.4, 0.6), position=(1, 0, 0))], density=1000))
     m.add(fb.Contact(friction=0.3))
     g = tables(m).geometry
-    com = numbers(m).bodies["a"].com
-    assert g.shape_i[:, ct.KIND].tolist() == [kinds.SPHERE, kinds.BOX]
+    com = element_numbers(m).bodies["a"].com
+    assert g.shape_i[:, ct.KIND].tolist() == [shape_kinds.SPHERE, shape_kinds.BOX]
     assert g.shape_x[0, ct.PLACE : ct.PLACE + 3] == pytest.approx(-com)
     assert g.shape_x[1, ct.PLACE : ct.PLACE + 3] == pytest.approx(np.array([1, 0, 0]) - com)
     assert g.shape_x[1, ct.PAR : ct.PAR + 3] == pytest.approx([0.1, 0.2, 0.3])
@@ -189,7 +189,7 @@ def test_many_bodies_in_the_plane() -> None:
                     angle=[0, 0.5], angular_velocity=2, velocity=(1, 0)))  # fmt: skip
     m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1)), position=(0, -0.1)), fb.Contact(friction=0.1))
     t = tables(m)
-    assert t.geometry.shape_i[:, ct.KIND].tolist() == [kinds.PLANE, kinds.SPHERE, kinds.SPHERE]
+    assert t.geometry.shape_i[:, ct.KIND].tolist() == [shape_kinds.PLANE, shape_kinds.SPHERE, shape_kinds.SPHERE]
     assert t.geometry.shape_x[0, ct.AXES : ct.AXES + 9].reshape(3, 3)[:, 2] == pytest.approx([0, 1, 0])
     assert np.linalg.det(t.geometry.shape_x[0, ct.AXES : ct.AXES + 9].reshape(3, 3)) == pytest.approx(1)
     pose = t.carriers.movers.pose[1]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.contact import kinds
-from flyball.contact import tables as ct
+from flyball.collision import shape_kinds
+from flyball.collision import tables as ct
 from flyball.errors import ModelError
-from flyball.tables.contact import touching
-from flyball.tables.numbers import numbers
+from flyball.tables.contact_tables import contact_tables
+from flyball.tables.element_numbers import element_numbers
 from tests.model.test_shapes import SAMPLES
 
 FORMLESS = {"Torus"}
@@ -28,15 +28,15 @@ def far(G: ct.Geometry, i: int, d: np.ndarray) -> float:
     return (
         x[ct.PLACE : ct.PLACE + 3] @ d
         + {
-            kinds.SPHERE: lambda: par[0],
-            kinds.BOX: lambda: par[:3] @ np.abs(u),
-            kinds.CAPSULE: lambda: par[0] + par[1] * abs(u[2]),
-            kinds.CYLINDER: lambda: par[0] * across + par[1] * abs(u[2]),
-            kinds.CONE: lambda: max(par[0] * across, par[1] * u[2]),
-            kinds.ELLIPSOID: lambda: np.sqrt((par[:3] ** 2) @ u**2),
-            kinds.HULL: lambda: par[0] + (vertex @ u).max(),
-            kinds.POLYGON: lambda: par[0] + (vertex @ u).max(),
-            kinds.HEMISPHERE: lambda: par[0] * (1.0 if u[2] > 0 else across),
+            shape_kinds.SPHERE: lambda: par[0],
+            shape_kinds.BOX: lambda: par[:3] @ np.abs(u),
+            shape_kinds.CAPSULE: lambda: par[0] + par[1] * abs(u[2]),
+            shape_kinds.CYLINDER: lambda: par[0] * across + par[1] * abs(u[2]),
+            shape_kinds.CONE: lambda: max(par[0] * across, par[1] * u[2]),
+            shape_kinds.ELLIPSOID: lambda: np.sqrt((par[:3] ** 2) @ u**2),
+            shape_kinds.HULL: lambda: par[0] + (vertex @ u).max(),
+            shape_kinds.POLYGON: lambda: par[0] + (vertex @ u).max(),
+            shape_kinds.HEMISPHERE: lambda: par[0] * (1.0 if u[2] > 0 else across),
         }[kind]()
     )
 
@@ -44,7 +44,7 @@ def far(G: ct.Geometry, i: int, d: np.ndarray) -> float:
 def put(shape: fb.Mechanism, planar: bool, **fields: object) -> tuple[fb.Mechanism, ct.Geometry]:
     m = fb.Mechanism("one", planar=planar)
     m.add(fb.Body("b", shape=shape, mass=1, inertia=1 if planar else (1, 1, 1), **fields), fb.Contact(friction=0.1))
-    return m, touching(m.snapshot(), numbers(m), ["b"]).geometry
+    return m, contact_tables(m.snapshot(), element_numbers(m), ["b"]).geometry
 
 
 @pytest.mark.parametrize("shape", SAMPLES, ids=lambda s: type(s).__name__)
@@ -54,7 +54,7 @@ def test_forms_reach_as_far_as_the_surface(shape) -> None:
             put(shape, False)
         return
     _, G = put(shape, False)
-    env = numbers(fb.Mechanism("none")).env
+    env = element_numbers(fb.Mechanism("none")).env
     n = fb.model.element.resolve(shape, env)
     p, R = shape.pose(n)
     v = p + shape.surface(n, 256)[0] @ R.T
@@ -91,7 +91,7 @@ def test_outlines_reach_as_far_as_the_surface(shape) -> None:
 def test_round_bars_in_the_plane(kind) -> None:
     """Standing they are circles, lying a segment with round ends and a rectangle."""
     _, G = put(kind(radius=0.1, length=0.4), True)
-    assert (G.shape_i[0, ct.KIND] == kinds.SPHERE) == (kind is fb.Cylinder)
+    assert (G.shape_i[0, ct.KIND] == shape_kinds.SPHERE) == (kind is fb.Cylinder)
     m, G = put(kind(radius=0.1, length=0.4, orientation=(0, np.pi / 2, 0), position=(1, 2)), True)
     assert far(G, 0, np.array([1.0, 0, 0])) == pytest.approx(1 + (0.3 if kind is fb.Capsule else 0.2))
     assert far(G, 0, np.array([0.0, 1, 0])) == pytest.approx(2.1)
@@ -113,8 +113,8 @@ def test_a_landscape() -> None:
     m = fb.Mechanism("hills")
     m.add(fb.Ground("hills", shape=fb.HeightField(heights=x + y * y, dx=0.5, dy=0.25), position=(1, 0, 0)))
     m.add(fb.Contact(friction=0.5))
-    G = touching(m.snapshot(), numbers(m), []).geometry
-    assert G.shape_i[0, ct.KIND] == kinds.FIELD
+    G = contact_tables(m.snapshot(), element_numbers(m), []).geometry
+    assert G.shape_i[0, ct.KIND] == shape_kinds.FIELD
     assert G.shape_x[0, ct.PAR : ct.PAR + 4].tolist() == [4, 5, 0.5, 0.25]
     assert G.shape_x[0, :3].tolist() == [1, 0, 0]
     assert G.vertex.ravel()[:20] == pytest.approx((x + y * y).ravel())
@@ -130,7 +130,7 @@ def test_many_hulls_of_many_sizes() -> None:
     m = fb.Mechanism("stones")
     m.add(fb.Bodies("stones", shape=fb.Hull(vertices=points), density=2000, position=np.zeros((3, 3)), scale=sizes))
     m.add(fb.Contact(friction=0.5))
-    t = touching(m.snapshot(), numbers(m), ["stones"])
+    t = contact_tables(m.snapshot(), element_numbers(m), ["stones"])
     com = t.carriers.com["stones"]
     for k, s in enumerate(sizes):
         d = rng.normal(size=3)
@@ -138,5 +138,5 @@ def test_many_hulls_of_many_sizes() -> None:
     equal = fb.Mechanism("stones")
     equal.add(fb.Bodies("stones", shape=fb.Hull(vertices=points), density=2000, position=np.zeros((100, 3))))
     equal.add(fb.Contact(friction=0.5))
-    one = touching(equal.snapshot(), numbers(equal), ["stones"])
+    one = contact_tables(equal.snapshot(), element_numbers(equal), ["stones"])
     assert len(one.geometry.vertex) * 3 == len(t.geometry.vertex)

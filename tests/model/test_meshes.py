@@ -13,8 +13,8 @@ import trimesh
 
 import flyball as fb
 from flyball.model.element import resolve
-from flyball.model.io import dumps
-from flyball.model.shapes.polyhedron import integrals
+from flyball.model.shapes.geometry import polyhedron_integrals
+from flyball.model.toml_file import dumps
 
 TETRAHEDRON = {
     "vertices": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
@@ -60,7 +60,7 @@ def test_icospheres_come_to_the_sphere() -> None:
     errors = []
     for n in (2, 3, 4):
         mesh = trimesh.creation.icosphere(subdivisions=n, radius=2.0)
-        i = integrals(mesh.vertices, mesh.faces)
+        i = polyhedron_integrals(mesh.vertices, mesh.faces)
         assert i.centre == pytest.approx([0] * 3, abs=1e-13)
         errors.append([1 - i.volume / (4 / 3 * np.pi * 8), *(1 - np.diag(i.gyration) / 1.6)])
         assert (np.array(errors[-1]) > 0).all()  # its corners lie on the sphere, all else inside

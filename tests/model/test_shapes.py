@@ -14,10 +14,10 @@ from scipy.spatial.transform import Rotation
 import flyball as fb
 from flyball.model.element import Length, element, positive, resolve
 from flyball.model.inertia import mass_properties
-from flyball.model.io import dumps, loads
 from flyball.model.shapes import SHAPES
-from flyball.model.shapes.polyhedron import flaws, welded
+from flyball.model.shapes.geometry import surface_defects, weld_vertices
 from flyball.model.shapes.solid import Solid
+from flyball.model.toml_file import dumps, loads
 
 ELL = ((0, 0), (2, 0), (2, 1), (0.5, 1), (0.5, 3), (0, 3))
 TETRAHEDRON = {
@@ -85,7 +85,7 @@ def test_surfaces_are_closed_and_face_outwards(s: Solid, fine: int) -> None:
     v, f = s.surface(numbers(s), fine)
     assert f.min() == 0
     assert len(np.unique(f)) == len(v)
-    assert flaws(*welded(v, f)) == ""
+    assert surface_defects(*weld_vertices(v, f)) == ""
 
 
 @pytest.mark.parametrize("s", SAMPLES, ids=lambda s: type(s).__name__)

@@ -166,12 +166,12 @@ def test_the_added_joint_and_force_work(runs):
 def test_the_engine_of_edited_sources_is_not_in_the_cache(runs):
     """A callee in another file than the kernel's: gravity pulls the other way. `test_cache` runs a small kernel so."""
     copy, *_ = runs
-    ask = "from flyball.compiler.store import is_known\nfrom flyball.equations.engine import engine\n"
+    ask = "from flyball.compiler.object_code import is_stored\nfrom flyball.engine.entry_point import engine\n"
     ask += "print(json.dumps({'cold': not is_known(engine)}))\n"
     assert not copy.run(ask)["cold"]
-    copy.edit("equations/loads.py", "sub(gravity, load3", "sub(neg(gravity), load3")
+    copy.edit("engine/loads.py", "sub(gravity, load3", "sub(neg(gravity), load3")
     assert copy.run(ask)["cold"]
-    copy.edit("equations/loads.py", "sub(neg(gravity), load3", "sub(gravity, load3")
+    copy.edit("engine/loads.py", "sub(neg(gravity), load3", "sub(gravity, load3")
     assert not copy.run(ask)["cold"]
 
 
@@ -180,7 +180,7 @@ import json, sys
 import flyball as fb
 from flyball.elements import BodyForce, Damping, Joint, blocks, element
 from flyball.math.vec import scale
-from flyball.compiler.notice import TIMES
+from flyball.compiler.object_code import COMPILE_SECONDS
 
 SHARE = 1.0
 

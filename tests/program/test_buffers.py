@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from flyball.compiler.buffers import JoinedBuffer, StructBuffer, StructPool
-from flyball.compiler.layout import Complex1, Float1, Float2, Int1, Record
+from flyball.compiler.kernels import JoinedBuffer, StructBuffer, StructPool
+from flyball.compiler.struct_layout import Complex1, Float1, Float2, Int1, Record
 
 
 class Inner(NamedTuple):

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from flyball.compiler import sources, store
-from flyball.compiler.sources import PACKAGE, sources_of
-from flyball.equations.engine import engine
-from flyball.equations.residual import stepped
-from flyball.equations.variation import variation_kernel
-from flyball.numerics.ldl import factor_kernel
+from flyball.compiler import formulas, object_code
+from flyball.compiler.formulas import PACKAGE, sources_of
+from flyball.engine.entry_point import engine
+from flyball.engine.residual import residuals_kernel
+from flyball.engine.sensitivity_equations import variation_kernel
+from flyball.numerics.sparse_factorisation import ldl_factor_kernel
 from tests.program.copied import Copy
 
 
@@ -23,17 +23,23 @@ def names_of(kernel):
 
 def test_an_edit_of_one_loop_does_not_compile_the_others():
     """A kernel's stamp covers what it imports, registries with all they find, and nothing else."""
-    of_engine, of_residual, of_factor = map(names_of, (engine, stepped, factor_kernel))
-    explicit = "numerics/integrators/explicit.py"
+    of_engine, of_residual, of_factor = map(names_of, (engine, residuals_kernel, ldl_factor_kernel))
+    explicit = "numerics/integrators/explicit_runge_kutta.py"
     assert explicit in of_engine
     assert explicit not in of_residual | of_factor
-    for shared in ("equations/rows.py", "constraints/skew.py", "forces/bushing.py", "tables/system.py", "math/vec.py"):
+    for shared in (
+        "engine/rows.py",
+        "constraints/skew_lines.py",
+        "forces/bushing.py",
+        "tables/table_definitions.py",
+        "math/vec.py",
+    ):
         assert shared in of_engine & of_residual
-    assert "numerics/ldl.py" in of_engine & of_factor
+    assert "numerics/sparse_factorisation.py" in of_engine & of_factor
     of_variation = names_of(variation_kernel)
     assert explicit in of_variation
-    assert not of_variation & {"equations/rows.py", "equations/loads.py", "forces/bushing.py", "equations/engine.py"}
-    assert not of_factor & {"equations/rows.py", "forces/bushing.py"}
+    assert not of_variation & {"engine/rows.py", "engine/loads.py", "forces/bushing.py", "engine/entry_point.py"}
+    assert not of_factor & {"engine/rows.py", "forces/bushing.py"}
     assert not {x for x in of_engine if x.startswith(("model/", "analysis/", "joints/"))}
 
 
@@ -47,32 +53,32 @@ def test_stamps_see_every_way_to_import(tmp_path, monkeypatch):
     (tmp_path / "numerics" / "__init__.py").write_text("from ..math.e import x")
     text = "from .b import *\nfrom . import c\nfrom .. import numerics\ndef f():\n    from .d import y\n"
     (room / "a.py").write_text(text)
-    monkeypatch.setattr(sources, "PACKAGE", tmp_path)
-    monkeypatch.setattr(sources, "COMPILED", ("math", "numerics"))
-    names = {p.name for p in sources.sources_of(room / "a.py") if tmp_path in p.parents}
+    monkeypatch.setattr(formulas, "PACKAGE", tmp_path)
+    monkeypatch.setattr(formulas, "COMPILED", ("math", "numerics"))
+    names = {p.name for p in formulas.sources_of(room / "a.py") if tmp_path in p.parents}
     assert names == {"a.py", "b.py", "c.py", "d.py", "e.py", "__init__.py"}
     elsewhere = tmp_path.parent / "loop.py"
     elsewhere.write_text("")
-    assert sources.compiled_files() < set(sources.sources_of(elsewhere))
+    assert formulas.compiled_files() < set(formulas.sources_of(elsewhere))
 
 
 def test_the_files_used_longest_ago_are_removed(tmp_path, monkeypatch):
     """Beyond so many bytes; whatever else is in the folder stays."""
-    monkeypatch.setattr(store, "MOST", 250)
+    monkeypatch.setattr(object_code, "MAX_FOLDER_BYTES", 250)
     other = tmp_path / "mine.o"
     other.write_bytes(bytes(1000))
     files = [tmp_path / f"kernel-{k:024x}.o" for k in range(4)]
     for k, path in enumerate(files):
         path.write_bytes(bytes(100))
         os.utime(path, (k, k))
-    store.touch(files[1])
-    store.remove_oldest(tmp_path)
+    object_code.mark_used(files[1])
+    object_code.remove_oldest(tmp_path)
     assert sorted(tmp_path.iterdir()) == [files[1], files[3], other]
 
 
 FACTOR = """
 import numpy as np
-from flyball.numerics.ldl import analyse, factor_kernel
+from flyball.numerics.sparse_factorisation import analyse_ldl, ldl_factor_kernel
 P, _ = analyse(1, np.zeros(0, int), np.zeros(0, int))
 L, D, Y = np.zeros(len(P.Li)), np.zeros(1), np.zeros(1)
 """

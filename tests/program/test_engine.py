@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.start import begin
-from flyball.compiler.buffers import StructBuffer
 from flyball.compiler.formulas import call, formula
-from flyball.compiler.kernels import BoundKernel, kernel
-from flyball.equations.engine import ARRIVE, MOTION, REPORT, RESIDUAL, engine, motion_kernel
-from flyball.equations.tasks import Sheet
-from flyball.numerics.integrators.clock import Clock, ClockCounts, ClockReals
-from flyball.numerics.integrators.tableaux import Tableau, tableau
-from flyball.tables.system import Bodies, System, Work
+from flyball.compiler.kernels import BoundKernel, StructBuffer, kernel
+from flyball.engine.calls import OutputBuffer
+from flyball.engine.entry_point import ARRIVE, MOTION, REPORT, RESIDUAL, engine, run_task
+from flyball.numerics.integrators.butcher_tableaux import Tableau, tableau
+from flyball.numerics.integrators.time_loop import StepCounts, StepReals, StepState
+from flyball.simulation.initial_state import find_initial_state
+from flyball.tables.table_definitions import Bodies, System, Work
 from tests.layers import LAYERS
 
 
@@ -40,24 +39,24 @@ def classical(address, S, W, R, clock, sheet, h, steps):
 
 @kernel
 def classical_kernel(
-    address: int, S: System, W: Work, R: Tableau, clock: Clock, sheet: Sheet, h: float, steps: int
+    address: int, S: System, W: Work, R: Tableau, clock: StepState, sheet: OutputBuffer, h: float, steps: int
 ) -> int:
     return classical(address, S, W, R, clock, sheet, h, steps)
 
 
 def desk(model, coordinates):
     """What the engine needs: tables, scratch, a clock at the start, and a sheet to write on."""
-    start = begin(model.snapshot(), 0.0, None, None, coordinates)
+    start = find_initial_state(model.snapshot(), 0.0, None, None, coordinates)
     c = start.assembly.compiled
     s, S = c.structure, c.values.system
     n = len(start.y)
-    clock = Clock(
-        ClockReals.blank(), ClockCounts.blank(), np.zeros(0), np.zeros((3, n)), np.zeros((1, n)), np.zeros(0, np.int64),
+    clock = StepState(
+        StepReals.blank(), StepCounts.blank(), np.zeros(0), np.zeros((3, n)), np.zeros((1, n)), np.zeros(0, np.int64),
         np.zeros((6, 0)),
     )  # fmt: skip
     clock.y[0] = start.y
     width = 1 + n + s.nv + 3 * len(S.rows.law) + 3 * len(s.measured) + len(s.prescribed)
-    return s, S, c.work, tableau("rk45"), clock, Sheet(np.zeros((3, width)))
+    return s, S, c.work, tableau("rk45"), clock, OutputBuffer(np.zeros((3, width)))
 
 
 @pytest.mark.parametrize("coordinates", LAYERS)
@@ -73,23 +72,23 @@ def test_a_loop_of_ones_own_calls_the_engine(coordinates):
 def test_tasks_agree_with_each_other(coordinates):
     """The row of output holds accelerations and multipliers that leave no residual, of a mechanism with loops."""
     s, S, W, R, clock, sheet = desk(fb.load("examples/slider_crank.toml"), coordinates)
-    assert motion_kernel(S, W, R, clock, sheet.rows, ARRIVE) == 0
+    assert run_task(S, W, R, clock, sheet.rows, ARRIVE) == 0
     moved = sheet.rows[0, 0]
     assert 0.0 <= moved < 1e-9
-    assert motion_kernel(S, W, R, clock, sheet.rows, MOTION) == 0
+    assert run_task(S, W, R, clock, sheet.rows, MOTION) == 0
     vdot = clock.K[0, s.nq : s.nq + s.nv].copy()
     nr = len(S.rows.law)
     lam = W.rows.multiplier.copy()
     out = np.zeros((3, sheet.rows.shape[1]))
     out[1, : s.nv], out[2, :nr] = vdot, lam
-    assert motion_kernel(S, W, R, clock, out, RESIDUAL) == 0
+    assert run_task(S, W, R, clock, out, RESIDUAL) == 0
     free = np.ones(s.nv, bool)
     free[[int(S.tree.v[b]) for b in s.prescribed.values()]] = False
     largest = np.abs(lam).max(initial=1.0)
     assert np.abs(out[0, : s.nv][free]).max(initial=0.0) < 1e-9 * largest
     assert np.abs(out[0, s.nv : s.nv + 2 * nr]).max(initial=0.0) < 1e-9
     row = np.zeros((1, 1 + clock.y.shape[1] + s.nv + nr + len(s.prescribed)))
-    assert motion_kernel(S, W, R, clock, row, REPORT) == 0
+    assert run_task(S, W, R, clock, row, REPORT) == 0
     assert row[0, 0] == 0.0
     assert row[0, 1 : 1 + clock.y.shape[1]] == pytest.approx(clock.y[0], abs=1e-12)
 
@@ -99,7 +98,7 @@ def test_other_tables_than_those_it_was_made_for_are_refused():
     _, S, W, R, clock, sheet = desk(fb.load("examples/slider_crank.toml"), "absolute")
     complex_tables = S._replace(bodies=Bodies(*(x.astype(complex) for x in S.bodies)))
     with pytest.raises(Exception, match=r"Frames\.position: an array of complex128"):
-        motion_kernel(complex_tables, W, R, clock, sheet.rows, MOTION)
+        run_task(complex_tables, W, R, clock, sheet.rows, MOTION)
 
 
 def test_a_kernel_with_its_structures_bound_to_it():
@@ -110,7 +109,7 @@ def test_a_kernel_with_its_structures_bound_to_it():
     for t in (0.0, 0.3):
         clock.real.t = t
         clock.y[0, s.nq : s.nq + s.nv] *= 1.0 - t
-        status = motion_kernel(S, W, R, clock, sheet.rows, MOTION)
+        status = run_task(S, W, R, clock, sheet.rows, MOTION)
         expected, lam = clock.K.copy(), W.rows.multiplier.copy()
         clock.K[:], W.rows.multiplier[:], W.velocities.solved[:] = 0.0, 0.0, 0.0
         assert bound(MOTION) == status

@@ -17,7 +17,7 @@ PUBLIC = [n for n in dir(fb) if not n.startswith("_")]
 ANALYSES = [
     (n, f)
     for n, f in inspect.getmembers(fb.Mechanism, inspect.isfunction)
-    if f.__module__.startswith("flyball.methods")
+    if f.__module__.startswith("flyball.mechanism_methods")
 ]
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import flyball as fb
-from flyball.compiler.sources import compiled_files
+from flyball.compiler.formulas import compiled_files
 from flyball.model.element import Element
 from tests.program.copied import PACKAGE
 

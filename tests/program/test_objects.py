@@ -11,12 +11,21 @@ import sys
 import numpy as np
 import pytest
 
-from flyball.compiler.ahead import all_kernels, missing
-from flyball.compiler.emit import FAILED, object_code
+from flyball.compiler.ahead_of_time import all_kernels, missing_kernels
 from flyball.compiler.kernels import kernel
-from flyball.compiler.layout import Float1
-from flyball.compiler.machine import BASELINES, baseline, triple
-from flyball.compiler.store import SHIPPED, cache_folder, file_name, folders, read
+from flyball.compiler.object_code import (
+    BASELINES,
+    FAILED,
+    SHIPPED,
+    baseline,
+    cache_folder,
+    compile_kernel,
+    file_name,
+    object_folders,
+    read_object,
+    target_triple,
+)
+from flyball.compiler.struct_layout import Float1
 from tests.program.copied import Copy
 
 C_LIBRARY = {
@@ -71,7 +80,7 @@ for name in sys.argv[2:]:
     m = fb.load(f"{sys.argv[1]}/{name}.toml")
     r = m.simulate(0.02, **({"method": fb.Stepping(step=1e-3)} if m.contacts else {"specialize": False}))
     out[name] = hashlib.sha256(b"".join(np.ascontiguousarray(x).tobytes() for x in (r.q, r.v, r.vdot))).hexdigest()
-from flyball.equations.engine import engine
+from flyball.engine.entry_point import engine
 print(json.dumps(out | {"origin": engine.origin, "numba": "numba" in sys.modules}))
 """
 
@@ -86,13 +95,13 @@ def process(code: str, *args: str, **env: str) -> dict:
 
 
 @pytest.mark.skipif(shutil.which("nm") is None, reason="binutils are not installed")
-@pytest.mark.skipif(not triple().endswith("gnu"), reason="objects of another format")
+@pytest.mark.skipif(not target_triple().endswith("gnu"), reason="objects of another format")
 def test_objects_need_the_c_library_only(tmp_path):
     """Neither Python nor Numba's runtime: so they run where neither compiler is."""
     seen = set()
     for k in all_kernels():
-        for _, folder in folders():
-            if (code := read(folder / file_name(k, baseline()))) is not None:
+        for _, folder in object_folders():
+            if (code := read_object(folder / file_name(k, baseline()))) is not None:
                 path = tmp_path / "kernel.o"
                 path.write_bytes(code)
                 lines = subprocess.run(
@@ -106,9 +115,11 @@ def test_objects_need_the_c_library_only(tmp_path):
 
 def test_a_motion_whose_code_is_found_imports_no_numba(tmp_path):
     """And its numbers are, to the last bit, those of the other baseline."""
-    others = [x for x in BASELINES if x != baseline()] if triple().startswith("x86_64") else []
+    others = [x for x in BASELINES if x != baseline()] if target_triple().startswith("x86_64") else []
     every = sorted(path.stem for path in Copy.examples().glob("*.toml"))
-    made = cache_folder() is not None and not missing(cache_folder(), others)  # else compiling them takes minutes
+    made = cache_folder() is not None and not missing_kernels(
+        cache_folder(), others
+    )  # else compiling them takes minutes
     args = str(Copy.examples()), *(every if made else ("governor", "slider_crank", "andrews"))
     process(HASHES, *args)
     found = process(HASHES, *args)
@@ -141,9 +152,9 @@ def attributes():
     return out
 
 before = attributes()
-from flyball.compiler.emit import object_code
-from flyball.compiler.machine import baseline
-from flyball.numerics.ldl import factor_kernel
+from flyball.compiler.object_code import compile_kernel
+from flyball.compiler.object_code import baseline
+from flyball.numerics.sparse_factorisation import ldl_factor_kernel
 object_code(factor_kernel, (baseline(),))
 after = attributes()
 print(json.dumps([str(k) for k in before if before[k] != after.get(k)]))
@@ -156,10 +167,10 @@ def test_code_of_other_sources_is_not_used(tmp_path):
     copy = Copy(tmp_path)
     script = """
 import numpy as np
-from flyball.compiler.store import SHIPPED, code_of, file_name, write
-from flyball.compiler.machine import baseline
-from flyball.compiler.emit import object_code
-from flyball.numerics.ldl import analyse, factor_kernel
+from flyball.compiler.object_code import SHIPPED, code_of, file_name, write_object
+from flyball.compiler.object_code import baseline
+from flyball.compiler.object_code import compile_kernel
+from flyball.numerics.sparse_factorisation import analyse_ldl, ldl_factor_kernel
 if SHIP:
     write(SHIPPED / file_name(factor_kernel, baseline()), object_code(factor_kernel, (baseline(),))[0])
 P, _ = analyse(1, np.zeros(0, int), np.zeros(0, int))
@@ -196,13 +207,13 @@ def test_a_parameter_without_a_declared_layout_is_refused():
 
 
 def test_an_unknown_processor_is_refused():
-    code = "import json\nfrom flyball.compiler.machine import baseline\n"
+    code = "import json\nfrom flyball.compiler.object_code import baseline\n"
     code += "try:\n    baseline()\nexcept ValueError as error:\n    print(json.dumps(str(error)))"
     assert "x86-64-v3" in process(code, FLYBALL_TARGET="z80")
 
 
 def test_every_object_has_an_entry_for_each_baseline():
-    codes = object_code(first, tuple(BASELINES) if triple().startswith("x86_64") else (baseline(),))
+    codes = compile_kernel(first, tuple(BASELINES) if target_triple().startswith("x86_64") else (baseline(),))
     assert all(b"flyball_kernel" in code for code in codes)
     assert FAILED < 0
     assert SHIPPED.name == "objects"

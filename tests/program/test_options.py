@@ -13,17 +13,14 @@ import pytest
 import typer.main
 from typer.testing import CliRunner
 
+import flyball
 import flyball as fb
-import flyball.analysis
-from flyball.analysis.options import Options
+from flyball.analysis_options import Options
 from flyball.cli import app
-from flyball.cli.docs import described, summary
-from flyball.methods.design import Design
-from flyball.methods.freedom import Freedom
-from flyball.methods.motion import Motions
-from flyball.methods.statics import Statics
+from flyball.cli.options import argument_help, first_doc_line
+from flyball.mechanism_methods import DesignMethods, MobilityMethods, MotionMethods, StaticsMethods
 
-FAMILIES = (Motions, Statics, Design, Freedom)
+FAMILIES = (MotionMethods, StaticsMethods, DesignMethods, MobilityMethods)
 METHODS = {name: f for c in FAMILIES for name, f in vars(c).items() if inspect.isfunction(f)}
 COMMANDS = typer.main.get_command(app).commands
 NOT_COMMANDS = {"assemble", "mass_properties", "prepare"}  # `check` tells two; what is prepared is for Python
@@ -39,8 +36,9 @@ OTHERWISE = {("singularities", "branch")}  # by its number in the table, of a se
 
 
 def option_classes() -> dict[str, type[Options]]:
-    for module in pkgutil.walk_packages(flyball.analysis.__path__, "flyball.analysis."):
-        importlib.import_module(module.name)
+    for module in pkgutil.walk_packages(flyball.__path__, "flyball."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
 
     def below(c: type) -> list[type]:
         return [c, *(d for s in c.__subclasses__() for d in below(s))]
@@ -69,10 +67,10 @@ def test_every_argument_of_a_method_is_a_field_and_has_its_line(name):
         assert CLASSES[cls[1]].__dataclass_params__.frozen
     else:
         assert not asked
-    told = described(method)
+    told = argument_help(method)
     assert list(told) == list(asked)
     assert all(t.text.endswith(".") for t in told.values())
-    assert summary(method).endswith((".", "y = C x + D u."))
+    assert first_doc_line(method).endswith((".", "y = C x + D u."))
     for k, t in told.items():  # what can be chosen includes the default
         if t.choices and isinstance(asked[k].default, str):
             assert asked[k].default in t.choices

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import flyball as fb
-from flyball.analysis import progress
+from flyball import progress
 
 
 def pendulum() -> fb.Mechanism:
@@ -124,7 +124,7 @@ def test_the_bar_is_gone_after_an_interrupt_and_the_motion_up_to_then_is_kept(er
 ROOT = Path(__file__).parents[2]
 SCRIPT = """
 import sys
-from flyball.analysis import progress
+from flyball import progress
 progress.AFTER = 0.05
 from tests.program.test_progress import pendulum
 pendulum().simulate(10.0, rtol=1e-12, max_step=1e-4)

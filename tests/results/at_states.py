@@ -7,15 +7,15 @@ from functools import partial
 
 import numpy as np
 
-from flyball.analysis.assembly.start import Assembly
-from flyball.analysis.compiled import Compiled
-from flyball.analysis.mobility import mobility
-from flyball.equations.engine import MOTION
+from flyball.assembly.assembled_state import Assembly
+from flyball.assembly.compiled_mechanism import CompiledMechanism
+from flyball.engine.entry_point import MOTION
+from flyball.mobility.mobility import mobility
 from flyball.results.result import Result
 from tests.results.made_up import healthy
 
 
-def result_at(c: Compiled, times: Sequence[float], states: Sequence[tuple[np.ndarray, ...]]) -> Result:
+def result_at(c: CompiledMechanism, times: Sequence[float], states: Sequence[tuple[np.ndarray, ...]]) -> Result:
     """The mechanism at those times in those states (q, v, z), with its accelerations and multipliers there."""
     s, S, W = c.structure, c.values.system, c.work
     driven = S.tree.v[S.tree.law >= 0]
@@ -39,7 +39,7 @@ def assembled(a: Assembly) -> Result:
     return r
 
 
-def in_other_coordinates(r: Result, c: Compiled, from_: Compiled) -> Result:
+def in_other_coordinates(r: Result, c: CompiledMechanism, from_: CompiledMechanism) -> Result:
     """The same states of the same mechanism in the coordinates of ``c``; ``from_`` has those of the result."""
     states = []
     for t, q, v, z in zip(r.t.tolist(), r.q, r.v, r.states, strict=True):

@@ -7,13 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 
 import flyball as fb
-from flyball.results.bulk import Bulk
-from flyball.results.contact_health import ContactHealth
-from flyball.results.contacts import Contacts
-from flyball.results.convergence import Convergence
-from flyball.results.health import Health
+from flyball.results.body_sets import BodySetMotion
+from flyball.results.contacts import ContactBodies, Contacts, Convergence
+from flyball.results.health import ContactHealth, Health
 from flyball.results.result import Result
-from flyball.results.sides import Sides
 from flyball.tables.structure import structure
 from flyball.tables.values import values
 
@@ -92,11 +89,11 @@ def thrown(n: int = 5, planar: bool = False) -> Result:
     w = np.tile(np.array([0, 0, 4.0]), (n, 3, 1))
     q = np.tile(np.stack([np.cos(2 * t), 0 * t, 0 * t, np.sin(2 * t)], 1)[:, None], (1, 3, 1))
     J = (0.004 * mass * np.array([1, 1, 0.25]))[:, None, None] * np.eye(3)
-    r.bulk = {"balls": Bulk("balls", mass, J, np.zeros((3, 3)), p, q, v, w)}
+    r.bulk = {"balls": BodySetMotion("balls", mass, J, np.zeros((3, 3)), p, q, v, w)}
     k = 2 * n
     force = np.tile(np.array([[320.0], [5.0]]) * up + [[1.0, 0, 0], [0, 0, 0]], (n, 1))
     r.contacts = Contacts(
-        t, Sides(("block", "balls", "ground"), (-1, 3, -1)), 2 * np.arange(n + 1), np.tile([(4, 0), (4, 2)], (n, 1)),
+        t, ContactBodies(("block", "balls", "ground"), (-1, 3, -1)), 2 * np.arange(n + 1), np.tile([(4, 0), (4, 2)], (n, 1)),
         np.tile(start[:2], (n, 1)), np.tile(up, (k, 1)), np.linspace(0, -1e-4, k), force, np.tile([0, 1], n),
         np.full(k, 0.3), Convergence(t, 0.1 * t, 0.01 * t, np.arange(n), solver="Gauss-Seidel"), planar,
     )  # fmt: skip

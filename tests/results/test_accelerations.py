@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.results.doubts import UNSOLVED
+from flyball.results.diagnostics import MAX_ACCELERATION_VIOLATION
 from tests.layers import both_layers
 from tests.mechanisms import example
 from tests.robust.families import made
@@ -70,7 +70,7 @@ def train():
 )  # fmt: skip
 def test_rounding_is_no_reason_for_a_warning(make):
     r = make().simulate(0.2, outputs=5)
-    assert r.health.acceleration_violation < 1e-3 * UNSOLVED
+    assert r.health.acceleration_violation < 1e-3 * MAX_ACCELERATION_VIOLATION
     assert not any("accelerations" in w for w in r.health.warnings)
 
 
@@ -83,7 +83,7 @@ def test_redundant_mechanisms_are_not_suspected():
             r = case.mechanism.simulate(0.1, outputs=5, max_steps=1000)
         except fb.FlyballError:
             continue
-        assert r.health.acceleration_violation < UNSOLVED, f"redundant {seed}"
+        assert r.health.acceleration_violation < MAX_ACCELERATION_VIOLATION, f"redundant {seed}"
         looked += 1
     assert looked >= 8
 

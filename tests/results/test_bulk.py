@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.results.bulk import Bulk
+from flyball.results.body_sets import BodySetMotion
 from tests.results.made_up import slider_crank
 
 
-def rods(n: int = 3) -> Bulk:
+def rods(n: int = 3) -> BodySetMotion:
     """Two slender rods turning about the vertical through their mass centres; the second lies along another axis."""
     t = np.linspace(0.0, 1.0, n)
     a = 3.0 * t
@@ -25,14 +25,14 @@ def rods(n: int = 3) -> Bulk:
     J[0] = np.diag([0.0, 0.12, 0.12])  # 1.44 kg m^2 / 12 along x
     J[1] = np.diag([0.12, 0.12, 0.0])  # along z: no energy of turning about it
     com = np.array([[0.3, 0.0, 0.0], [0.0, 0.0, 0.5]])
-    return Bulk("rods", np.array([1.0, 2.0]), J, com, x, q, v, w)
+    return BodySetMotion("rods", np.array([1.0, 2.0]), J, com, x, q, v, w)
 
 
 def test_kinetic_and_potential_energy():
     b = rods()
     np.testing.assert_allclose(b.kinetic, 0.5 * 0.12 * 9.0 + 0.5 * 2.0 * 4.25, rtol=1e-14)
     np.testing.assert_allclose(b.potential(np.array([0, 0, -10.0])), 20.0 - 10.0 * np.linspace(0, 1, 3))
-    balls = Bulk("b", b.mass, 0.4 * np.eye(3) * b.mass[:, None, None], 0 * b.com, b.position, b.quaternion,
+    balls = BodySetMotion("b", b.mass, 0.4 * np.eye(3) * b.mass[:, None, None], 0 * b.com, b.position, b.quaternion,
                  b.velocity, b.angular_velocity)  # fmt: skip
     np.testing.assert_allclose(balls.kinetic, 0.5 * 0.4 * 3.0 * 9.0 + 4.25, rtol=1e-14)
 
@@ -48,7 +48,7 @@ def test_origins_of_reference_frames_circle_the_mass_centre():
 def test_arrays_that_do_not_fit_are_refused():
     b = rods()
     with pytest.raises(ValueError, match="quaternion must have shape"):
-        Bulk("b", b.mass, b.inertia, b.com, b.position, b.position, b.velocity, b.angular_velocity)
+        BodySetMotion("b", b.mass, b.inertia, b.com, b.position, b.position, b.velocity, b.angular_velocity)
 
 
 def test_energies_of_a_result_count_sets_and_what_contacts_exchange():

@@ -10,12 +10,11 @@ import pytest
 import xarray as xr
 
 import flyball as fb
-from flyball.results.contact_health import ContactHealth
-from flyball.results.contacts import ARRAYS
-from flyball.view.animate import POSES, kept, record
-from flyball.view.artist import draw
-from flyball.view.pictures import standard_pictures
+from flyball.results.contacts import CONTACT_COLUMNS
+from flyball.results.health import ContactHealth
+from flyball.view.animation import MAX_SET_POSES, record_motion, thinned_times
 from flyball.view.recording import Figure, PointPaths
+from flyball.view.result_plots import standard_pictures, write_pictures
 from tests.results.made_up import thrown
 
 PLANES = pytest.mark.parametrize("planar", [False, True])
@@ -69,7 +68,7 @@ def test_a_saved_result_with_contacts_comes_back_exactly(planar: bool, tmp_path:
     assert a.history is not None
     assert b.history is not None
     assert a.sides == b.sides
-    for name in (*ARRAYS, "begin", "t"):
+    for name in (*CONTACT_COLUMNS, "begin", "t"):
         assert getattr(a, name).tobytes() == getattr(b, name).tobytes(), name
     assert a.history.as_dict() == b.history.as_dict()
     for name in ("mass", "inertia", "com", "position", "quaternion", "velocity", "angular_velocity"):
@@ -85,7 +84,7 @@ def test_a_saved_result_with_contacts_comes_back_exactly(planar: bool, tmp_path:
 @PLANES
 def test_pictures_have_sets_ground_and_contact_forces(planar: bool) -> None:
     r = thrown(planar=planar)
-    seen = record(r)
+    seen = record_motion(r)
     (balls,) = seen.sets
     assert balls.colors == ("teal",)
     np.testing.assert_array_equal(balls.scale, [1, 1, 0.5])
@@ -114,7 +113,7 @@ def test_standard_pictures_and_reports_of_sets_and_contacts(planar: bool, tmp_pa
         shown = found["contacts"]
         assert isinstance(shown, Figure)
         np.testing.assert_array_equal(shown.panels[0].curves[0].values, 2.0)
-        draw(standard_pictures(r), tmp_path)
+        write_pictures(standard_pictures(r), tmp_path)
 
 
 def test_contact_forces_are_drawn_on_what_moves() -> None:
@@ -122,15 +121,15 @@ def test_contact_forces_are_drawn_on_what_moves() -> None:
     c = r.contacts
     assert c is not None
     r.contacts = dataclasses.replace(c, pair=c.pair[:, ::-1].copy())
-    drawn = record(r).contacts
+    drawn = record_motion(r).contacts
     assert drawn is not None
     np.testing.assert_array_equal(drawn.force, -c.force)
 
 
 def test_pictures_of_very_many_bodies_are_fewer() -> None:
-    assert len(kept(61, 1000)) == 61
-    few = kept(401, 100_000)
-    assert (few[0], few[-1], len(few)) == (0, 400, POSES // 100_000)
+    assert len(thinned_times(61, 1000)) == 61
+    few = thinned_times(401, 100_000)
+    assert (few[0], few[-1], len(few)) == (0, 400, MAX_SET_POSES // 100_000)
 
 
 def test_health_says_what_went_wrong_with_contacts() -> None:

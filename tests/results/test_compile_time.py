@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.compiler import emit
+from flyball.compiler import object_code
 from flyball.compiler.kernels import kernel
-from flyball.compiler.layout import Float1
-from flyball.compiler.machine import baseline
-from flyball.compiler.notice import announce, compiled_since
-from flyball.view.report import report
+from flyball.compiler.object_code import announce_compilation, baseline, compiled_since
+from flyball.compiler.struct_layout import Float1
+from flyball.view.report import report_html
 from tests.results.made_up import slider_crank
 
 
@@ -31,8 +30,8 @@ def test_compilations_are_counted():
         return p.x[0] + by
 
     begin = time.perf_counter()
-    emit.object_code(more, (baseline(),))  # whether or not there is a file of it
-    with announce(more):
+    object_code.compile_kernel(more, (baseline(),))  # whether or not there is a file of it
+    with announce_compilation(more):
         pass
     assert compiled_since(begin) < time.perf_counter() - begin
     assert more(Pair(np.ones(1)), 2.0) == 3.0
@@ -52,7 +51,7 @@ def test_told_apart(compiling, line, tile):
     r = slider_crank()
     r.health = dataclasses.replace(r.health, seconds=4.0, compiling=compiling)
     assert dict(r.health.lines())["time used"] == line
-    assert f"refused, {tile}<" in report(r)
+    assert f"refused, {tile}<" in report_html(r)
 
 
 def test_no_more_than_the_whole():

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.results.contacts import Contacts
-from flyball.results.convergence import Convergence
-from flyball.results.sides import OPEN, SLIP, STICK, Sides
+from flyball.results.contacts import OPEN, SLIP, STICK, ContactBodies, Contacts, Convergence
 
-SIDES = Sides(("box", "balls", "ground"), (-1, 3, -1))  # 0; 1, 2, 3; 4
+SIDES = ContactBodies(("box", "balls", "ground"), (-1, 3, -1))  # 0; 1, 2, 3; 4
 G = 9.81
 
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 import flyball as fb
 from flyball.cli import app
-from flyball.results.ledger import apart
+from flyball.results.energy_balance import budgets_by_part
 from tests.mechanisms import example
 
 
@@ -230,7 +230,7 @@ def test_parts_of_massless_links_have_names():
         m.add(
             fb.Body(n, mass=1, inertia=(1, 1, 1)), fb.Cylindrical(n.upper(), "ground", n, at=(0, 0, 0), axis=(0, 0, 1))
         )
-    assert [x.of for x in apart(m.simulate(0.1, outputs=3, coordinates="joint"))] == [" of 'a'", " of 'b'"]
+    assert [x.of for x in budgets_by_part(m.simulate(0.1, outputs=3, coordinates="joint"))] == [" of 'a'", " of 'b'"]
 
 
 @pytest.mark.parametrize("mass", [10.0, 1000.0])

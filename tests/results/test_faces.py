@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.results.numbers import clean, number, span, tuple_of
+from flyball.results.wording import number_text, range_text, tuple_text, without_rounding
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 OWED = {
@@ -63,7 +63,7 @@ def returned() -> set[str]:
     """Names of the classes that methods of a mechanism return."""
     out = set()
     for name, f in inspect.getmembers(fb.Mechanism, inspect.isfunction):
-        if f.__module__.startswith("flyball.methods") and not name.startswith("_"):
+        if f.__module__.startswith("flyball.mechanism_methods") and not name.startswith("_"):
             out |= set(re.findall(r"\w+", str(f.__annotations__.get("return", "")))) - {"None", "str", "Any"}
     return out
 
@@ -112,13 +112,13 @@ MEASURES = {
 
 
 def test_rounding_is_not_shown_as_a_number():
-    assert tuple_of([-2.639e-13, 0.0, 6.28318]) == "(0, 0, 6.283)"
-    assert tuple_of([-2.6e-13, 0.0, 1e-13]) == "(-2.6e-13, 0, 1e-13)"  # small, but nothing is larger
-    assert number(-1e-17, 0.3) == "0"
-    assert number(-0.0) == "0"
-    assert span(np.array([1e-14, 2.0, np.nan])) == "0 to 2"
-    assert span(np.array([3.0, 3.0 + 1e-15])) == "3"
-    np.testing.assert_array_equal(clean([np.nan, 1.0, -1e-11]), [np.nan, 0.0 + 1.0, 0.0])
+    assert tuple_text([-2.639e-13, 0.0, 6.28318]) == "(0, 0, 6.283)"
+    assert tuple_text([-2.6e-13, 0.0, 1e-13]) == "(-2.6e-13, 0, 1e-13)"  # small, but nothing is larger
+    assert number_text(-1e-17, 0.3) == "0"
+    assert number_text(-0.0) == "0"
+    assert range_text(np.array([1e-14, 2.0, np.nan])) == "0 to 2"
+    assert range_text(np.array([3.0, 3.0 + 1e-15])) == "3"
+    np.testing.assert_array_equal(without_rounding([np.nan, 1.0, -1e-11]), [np.nan, 0.0 + 1.0, 0.0])
 
 
 def test_a_result_says_between_which_values_it_stayed():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.laws.over_time import takes_arrays
+from flyball.laws.bytecode import takes_arrays
 
 T = np.linspace(0.0, 1.0, 41)
 LAWS = {

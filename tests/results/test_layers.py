@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.mass import report
+from flyball.check import mass_report
 from tests.identities.test_results_in_both_layers import agree
 from tests.mechanisms import G, four_bar
 from tests.results.test_result_files import same
@@ -143,7 +143,7 @@ def test_health_says_which_coordinates():
 def test_masses_and_energies_do_not_ask_for_coordinates():
     """Centres of mass and the inertia of all together where a motion ends, from either layer's coordinates."""
     r, o = (spinning().simulate(0.1, outputs=2, coordinates=c, rtol=1e-11, atol=1e-12) for c in ("absolute", "joint"))
-    one, two = (report(x.model, x.values, x.q[-1]) for x in (r, o))
+    one, two = (mass_report(x.model, x.values, x.q[-1]) for x in (r, o))
     for name in ("fork", "rotor"):
         assert two[name].position == pytest.approx(one[name].position, abs=1e-8)
     assert two.total.inertia == pytest.approx(one.total.inertia, abs=1e-8)

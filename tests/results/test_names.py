@@ -9,7 +9,7 @@ import pytest
 
 import flyball as fb
 from flyball.model.quantities import quantities
-from flyball.results.views.base import Named
+from flyball.results.part_views.base import NamedQuantities
 from tests.errors.test_new_elements import plane, space
 
 SQUARE = [(0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1), (0.1, -0.1)]
@@ -57,7 +57,7 @@ def test_every_name_is_an_attribute_and_a_curve(run):
             assert what in dir(run[owner])
             assert name in run
         else:
-            assert isinstance(run[name], Named)
+            assert isinstance(run[name], NamedQuantities)
 
 
 def test_every_attribute_is_a_curve(run):

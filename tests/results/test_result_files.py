@@ -17,10 +17,9 @@ import pytest
 import xarray as xr
 
 import flyball as fb
-from flyball.results import stored
-from flyball.results.files import checksum
+from flyball.results import files
+from flyball.results.files import data_checksum, read_group, text_type
 from flyball.results.result import Result
-from flyball.results.stored import taken, text_type
 from tests.results.made_up import slider_crank
 
 
@@ -197,7 +196,7 @@ def test_what_was_exchanged_inside_is_found(pair: tuple[str, str], result: Resul
     whole = (tmp_path / "r.nc").read_bytes()
 
     def swap(group) -> None:
-        held = taken(group)
+        held = read_group(group)
         a, b = (held[name] for name in pair)
         if isinstance(a, str):
             told = json.loads(group.variables["texts"][()])
@@ -221,7 +220,7 @@ def test_what_was_exchanged_inside_is_found(pair: tuple[str, str], result: Resul
 def as_before(path: Path, kind: int, **changes: str) -> None:
     """Write the file as earlier versions did: each text and each array a variable by itself."""
     with h5netcdf.File(path) as file:
-        held = taken(file.groups["flyball"]) | changes
+        held = read_group(file.groups["flyball"]) | changes
     with h5netcdf.File(path, "w") as file:
         group = file.create_group("flyball")
         group.attrs["format"], group.attrs["version"] = kind, "0.9"
@@ -234,7 +233,7 @@ def as_before(path: Path, kind: int, **changes: str) -> None:
                 group.dimensions[dim] = n
             group.create_variable(name, dims, data=x)
         if kind == 3:
-            group.attrs["checksum"] = checksum(held, kind)
+            group.attrs["checksum"] = data_checksum(held, kind)
 
 
 def test_files_of_one_variable_for_each_array_are_read(result: Result, tmp_path: Path) -> None:
@@ -251,7 +250,7 @@ def test_files_of_one_variable_for_each_array_are_read(result: Result, tmp_path:
 def test_arrays_written_one_by_one_are_the_same(result: Result, tmp_path: Path, monkeypatch) -> None:
     """Large ones are not put together in memory."""
     result.save(tmp_path / "r.nc")
-    monkeypatch.setattr(stored, "MOST", 10)
+    monkeypatch.setattr(files, "MAX_CONCATENATED", 10)
     result.save(tmp_path / "large.nc")
     same(fb.load_result(tmp_path / "r.nc"), fb.load_result(tmp_path / "large.nc"))
 
@@ -264,7 +263,7 @@ def test_files_from_before_checksums_are_read_with_a_note(tmp_path: Path) -> Non
     result.model.add(fb.Table("b", x=(0, 1, 2), y=(0, 1, 0), beyond="repeat"))
     result.save(tmp_path / "r.nc")
     with h5netcdf.File(tmp_path / "r.nc") as file:
-        text = taken(file.groups["flyball"])["model"]
+        text = read_group(file.groups["flyball"])["model"]
     text = text.replace('beyond = "line"\n', "").replace('beyond = "repeat"', 'outside = "periodic"')
     as_before(tmp_path / "r.nc", 2, model=text)
     back = fb.load_result(tmp_path / "r.nc")

@@ -21,7 +21,7 @@ NAMES = ["andrews.toml", "bricard.toml", "governor.toml", "rolling_disk.toml", "
 def test_they_are_those_at_the_states(name, coordinates):
     m = mechanisms.example(name)
     r = m.simulate(0.02, outputs=5, coordinates=coordinates)
-    assert r.unsolved is not None
+    assert r.deferred_accelerations is not None
     p = m.prepare(coordinates=coordinates)
     if not r.values.structure.terms or all(t.hint < 0 for t in r.values.structure.terms):
         found = np.array([p.acceleration(t, q, v) for t, q, v in zip(r.t, r.q, r.v, strict=True)])
@@ -64,8 +64,8 @@ def test_a_copy_has_found_all_and_leaves_the_scratch_behind(again):
     m = mechanisms.example("andrews.toml")
     r = m.simulate(0.02, outputs=7)
     made = again(r)
-    assert made.unsolved is None
-    assert made.owed is None
+    assert made.deferred_accelerations is None
+    assert made.deferred_works is None
     assert made.vdot.tobytes() == m.simulate(0.02, outputs=7).vdot.tobytes()
 
 
@@ -108,15 +108,15 @@ def test_works_that_were_interrupted_are_found_the_next_time():
     m = mechanisms.example("slider_crank.toml")
     wanted = m.simulate(1.0, outputs=5).states
     r = m.simulate(1.0, outputs=5)
-    find = r.owed
+    find = r.deferred_works
 
     def interrupted():
         raise KeyboardInterrupt
 
-    r.owed = interrupted
+    r.deferred_works = interrupted
     with pytest.raises(KeyboardInterrupt):
         _ = r.states
-    r.owed = find if r.owed is interrupted else r.owed
+    r.deferred_works = find if r.deferred_works is interrupted else r.deferred_works
     assert np.array_equal(r.states, wanted)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flyball.constraints.modes import ONE_WAY, RATCHET, STOP
-from flyball.model.touch import Touch
+from flyball.constraints.switch_kinds import ONE_WAY, RATCHET, STOP
+from flyball.model.contact_point import Touch
 from flyball.results.result import Result
 
 PAST, PULLED = 1e-7, 1e-6

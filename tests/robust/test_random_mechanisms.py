@@ -55,9 +55,8 @@ def test_what_was_refused_or_wrong_once(family, seed):
 
 
 def test_every_element_of_the_registry_takes_part():
-    from flyball.model.coupling import Coupling
     from flyball.model.element import Element
-    from flyball.model.joint import Joint
+    from flyball.model.joint import Coupling, Joint
 
     rooms = ("flyball.joints.", "flyball.forces.")
     known = {k for k, c in Element.registry.items() if c.__module__.startswith(rooms)}

@@ -14,11 +14,11 @@ import pytest
 from typer.testing import CliRunner
 
 import flyball as fb
-from flyball.analysis.motion import engines
-from flyball.analysis.motion.engines import Account
 from flyball.cli import app
-from flyball.special import Refused
-from flyball.tables.system import FINISH
+from flyball.codegen import Refused
+from flyball.simulation import solver_switching
+from flyball.simulation.solver_switching import CostAccount
+from flyball.tables.table_definitions import FINISH
 from tests.mechanisms import door, example, four_bar
 
 
@@ -68,8 +68,8 @@ class Maker:
 @pytest.fixture
 def maker(monkeypatch) -> Maker:
     found = Maker()
-    monkeypatch.setattr(engines, "special", found)
-    monkeypatch.setattr(engines, "SPENT", Account())
+    monkeypatch.setattr(solver_switching, "special", found)
+    monkeypatch.setattr(solver_switching, "SPENT", CostAccount())
     return found
 
 
@@ -98,7 +98,7 @@ def test_partitioning_has_no_made_code(maker):
 
 
 def test_not_wanted_is_not_looked_for(monkeypatch):
-    monkeypatch.setattr(engines, "special", None)
+    monkeypatch.setattr(solver_switching, "special", None)
     assert four_bar().simulate(0.1, specialize=False).health.engine == "table-driven: asked for"
 
 

@@ -11,24 +11,19 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball import special
-from flyball.analysis.motion.start import begin
-from flyball.compiler.buffers import StructBuffer
-from flyball.compiler.store import read
-from flyball.equations.engine import motion_kernel
-from flyball.equations.projection import NONE, STAGES
-from flyball.equations.scratch import work
-from flyball.equations.tasks import COMPLETE
-from flyball.equations.within import ROWS
-from flyball.numerics.integrators import clock as ex
-from flyball.numerics.integrators.tableaux import tableau
-from flyball.special import keeping
-from flyball.special.recorder import Recorder
-from flyball.tables.system import (
-    RATE,
-    TERMS,
-    VALUE,
-)
+from flyball import codegen
+from flyball.codegen import store
+from flyball.codegen.procedures import ProcedureRecorder
+from flyball.compiler.kernels import StructBuffer
+from flyball.compiler.object_code import read_object
+from flyball.engine.calls import COMPLETE
+from flyball.engine.entry_point import allocate_work, run_task
+from flyball.engine.projection import NONE, STAGES
+from flyball.engine.pulse_detection import INSPECTION_ROWS
+from flyball.numerics.integrators import time_loop as ex
+from flyball.numerics.integrators.butcher_tableaux import tableau
+from flyball.simulation.initial_state import find_initial_state
+from flyball.tables.table_definitions import RATE, TERMS, VALUE
 from tests.contract.zoo import PLANAR, SPATIAL, joined
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -45,7 +40,7 @@ def rk():
 
 
 def values_of(model, coordinates="joint", parameters=None):
-    start = begin(model.snapshot(), 0.0, parameters, None, coordinates)
+    start = find_initial_state(model.snapshot(), 0.0, parameters, None, coordinates)
     return start.assembly.compiled.values, start.y
 
 
@@ -63,7 +58,7 @@ def states(x, y, seed=0):
 
 def solved(x, S, rows, stabilize=STAGES):
     """Every state projected, its accelerations and multipliers; and the scratch after the last."""
-    W, rows = work(x.structure, S), rows.copy()
+    W, rows = allocate_work(x.structure, S), rows.copy()
     (
         W.options.stabilization,
         W.options.solve_tolerance,
@@ -71,11 +66,11 @@ def solved(x, S, rows, stabilize=STAGES):
         W.options.velocity_tolerance,
     ) = stabilize, 1e-13, 1e-12 * x.length, 1e-12
     ny = W.y.shape[1]
-    clock = ex.Clock(
-        ex.ClockReals.blank(), ex.ClockCounts.blank(), np.zeros(0), np.zeros((ex.STATES, ny)), np.zeros((1, ny)),
-        np.zeros(0, np.int64), np.zeros((ROWS, 0)),
+    clock = ex.StepState(
+        ex.StepReals.blank(), ex.StepCounts.blank(), np.zeros(0), np.zeros((ex.STATE_ROWS, ny)), np.zeros((1, ny)),
+        np.zeros(0, np.int64), np.zeros((INSPECTION_ROWS, 0)),
     )  # fmt: skip
-    status = motion_kernel(S, W, rk(), clock, rows, COMPLETE)
+    status = run_task(S, W, rk(), clock, rows, COMPLETE)
     return status, rows, W
 
 
@@ -110,8 +105,8 @@ def equal(x, tables, ours):
 def same(model, coordinates, parameters=None, of=None):
     """Compare made code with the loops; ``of``: whose code it is, if not the mechanism's own."""
     x, y = values_of(model, coordinates, parameters)
-    plan = special.plan(x)
-    made, how = special.code(plan, x) if of is None else (of, "")
+    plan = codegen.plan(x)
+    made, how = codegen.code(plan, x) if of is None else (of, "")
     rows = solved(x, x.system, states(x, y))[1]  # closed by the loops: where rows are redundant rounding leads the way
     rows = rows[np.isfinite(rows).all(axis=1)]
     assert len(rows)
@@ -142,10 +137,10 @@ def test_examples(name, coordinates):
 def test_stewart():
     same(example("stewart.py"), "joint")
     x, _ = values_of(example("stewart.py"), "absolute")
-    plan = special.plan(x)
+    plan = codegen.plan(x)
     assert str(plan.size) in plan.refused
-    with pytest.raises(special.Refused, match="operations"):
-        special.code(plan, x)
+    with pytest.raises(codegen.Refused, match="operations"):
+        codegen.code(plan, x)
 
 
 @pytest.mark.parametrize(("where", "name"), [("space", n) for n in SPATIAL] + [("plane", n) for n in PLANAR])
@@ -165,7 +160,7 @@ def test_a_moment_on_a_body_without_inertia():
 def test_what_is_taken_for_granted_is_checked():
     """A procedure whose pivot is zero returns a number greater than none, by which the loops go on."""
     x, _ = values_of(example("andrews.toml"))
-    r = Recorder(x.structure, x.system)
+    r = ProcedureRecorder(x.structure, x.system)
     pivots = [r.graph.symbol(name) for name in "ab"]
     assert all(y.granted("nonzero") for y in pivots)
     p = r.add("FACTOR", {y.index: ("a", k) for k, y in enumerate(pivots)}, [])
@@ -184,11 +179,11 @@ def test_sampled_laws_of_drivers_are_their_second_derivatives():
     m.add(fb.Driver("drive", "P.displacement", "0.2*exp(-(t/0.3)**2)"))
     for coordinates in ("joint", "absolute"):
         x, _ = values_of(m, coordinates)
-        made, _ = special.code(special.plan(x), x)
+        made, _ = codegen.code(codegen.plan(x), x)
         (name,) = filter(None, made.laws)
         S = StructBuffer(made.system(x.system))
         of = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_void_p] * 2, ctypes.c_double, *[ctypes.c_void_p] * 4)
-        sensors, W = np.zeros(16), StructBuffer(work(x.structure, x.system))
+        sensors, W = np.zeros(16), StructBuffer(allocate_work(x.structure, x.system))
         for t in (0.1, 0.5):
             found = of(made.loaded.addresses[name])(S.address, W.address, t, *[sensors.ctypes.data] * 4)
             assert found == pytest.approx(0.2 * np.exp(-((t / 0.3) ** 2)) * (4 * t**2 / 0.09 - 2) / 0.09, rel=1e-12)
@@ -200,8 +195,8 @@ def test_other_values_run_the_same_code():
     more = {"stiffness": 9000.0, "torque": 0.05}
     x, _ = values_of(m)
     other, _ = values_of(m, parameters=more)
-    assert special.plan(other).key == special.plan(x).key
-    assert special.code(special.plan(other), other) == (made, "kept in this process")
+    assert codegen.plan(other).key == codegen.plan(x).key
+    assert codegen.code(codegen.plan(other), other) == (made, "kept in this process")
     same(m, "joint", more, made)
 
 
@@ -209,7 +204,7 @@ def test_a_zero_is_other_code():
     m = example("andrews.toml")
     x, _ = values_of(m)
     other, _ = values_of(m, parameters={"stiffness": 0.0})
-    assert special.plan(other).key != special.plan(x).key
+    assert codegen.plan(other).key != codegen.plan(x).key
 
 
 def test_code_is_known_by_the_values_that_formulas_decided_by():
@@ -220,32 +215,32 @@ def test_code_is_known_by_the_values_that_formulas_decided_by():
     changed = [("force_parameters", int(k)) for k in np.flatnonzero(of != others)]
     same = [("bodies.inertia", k) for k in range(4)]
     assert changed
-    assert keeping.digest(x, changed) != keeping.digest(other, changed)
-    assert keeping.digest(x, same) == keeping.digest(other, same)
+    assert store.digest(x, changed) != store.digest(other, changed)
+    assert store.digest(x, same) == store.digest(other, same)
 
 
 def test_files_on_disk(tmp_path, monkeypatch):
     m = example("governor.toml")
     x, _ = values_of(m)
-    plan = special.plan(x)
-    monkeypatch.setattr(keeping, "_folder", lambda: tmp_path)
+    plan = codegen.plan(x)
+    monkeypatch.setattr(store, "_folder", lambda: tmp_path)
 
     def forget():
-        for key in [k for k in keeping._found if k[0] == plan.key]:
-            del keeping._found[key]
+        for key in [k for k in store._found if k[0] == plan.key]:
+            del store._found[key]
 
     forget()
-    assert special.known(plan, x) == ""
-    assert special.code(plan, x)[1].startswith("made now")
+    assert codegen.known(plan, x) == ""
+    assert codegen.code(plan, x)[1].startswith("made now")
     (file,) = tmp_path.glob("made-*.o")
     forget()
-    assert special.known(plan, x) == "disk"
-    assert special.code(plan, x)[1] == "found on disk"
+    assert codegen.known(plan, x) == "disk"
+    assert codegen.code(plan, x)[1] == "found on disk"
     same(m, "joint")
     text = file.read_bytes()
     for damaged in (text[:-1], text[:1000] + bytes([text[1000] ^ 1]) + text[1001:], b"", b"something else"):
         file.write_bytes(damaged)
         forget()
-        assert special.known(plan, x) == ""
-        assert special.code(plan, x)[1].startswith("made now")
-        assert read(file) is not None
+        assert codegen.known(plan, x) == ""
+        assert codegen.code(plan, x)[1].startswith("made now")
+        assert read_object(file) is not None

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flyball.analysis.motion.engines import Engine
-from flyball.analysis.motion.start import begin
+from flyball.simulation.initial_state import find_initial_state
+from flyball.simulation.solver_switching import CodeSelection
 from tests.mechanisms import four_bar
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -44,8 +44,8 @@ def test_results_are_pickled_without_it():
 
 
 def test_what_a_motion_runs_on_is_pickled_without_it():
-    c = begin(four_bar().snapshot(), 0.0, None, None, "auto").assembly.compiled
-    Engine(c, True)
+    c = find_initial_state(four_bar().snapshot(), 0.0, None, None, "auto").assembly.compiled
+    CodeSelection(c, True)
     assert c.system.flat.any()
     again = pickle.loads(pickle.dumps(c))
     assert not again.system.flat.any()
@@ -56,8 +56,8 @@ def test_what_a_motion_runs_on_is_pickled_without_it():
 CODE = """
 import sys
 sys.path[:] = {path!r}
-from flyball.analysis.motion.engines import Engine
-from flyball.analysis.motion.start import begin
+from flyball.simulation.solver_switching import CodeSelection
+from flyball.simulation.initial_state import find_initial_state
 from tests.mechanisms import four_bar
 r = four_bar().simulate(0.3, specialize=True, progress=False, outputs=21)
 print(r.health.engine)

@@ -31,9 +31,9 @@ def test_examples(name, coordinates):
 def test_code_that_is_taken_on_the_way(name, monkeypatch):
     """A motion that goes on with made code after 8 steps is the one that began with it."""
     m = fb.load(Copy.examples() / name)
-    monkeypatch.setattr("flyball.special.price", lambda plan, where: 0.0)
-    monkeypatch.setattr("flyball.special.known", lambda plan, x: "")
-    monkeypatch.setattr("flyball.analysis.motion.engines.THERE", 0.0)
+    monkeypatch.setattr("flyball.codegen.price", lambda plan, where: 0.0)
+    monkeypatch.setattr("flyball.codegen.known", lambda plan, x: "")
+    monkeypatch.setattr("flyball.simulation.solver_switching.LOAD_COST", 0.0)
     left = m.simulate(0.5, outputs=11, method="dop853", rtol=1e-10)
     assert left.health.engine.startswith("made for this mechanism")
     made = m.simulate(0.5, outputs=11, method="dop853", rtol=1e-10, specialize=True)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.graph.node import Graph
-from flyball.graph.printers.llvm import Module, Procedure
+from flyball.codegen import machine_code
+from flyball.expression_graph.graph import Graph
+from flyball.expression_graph.printers.llvm import Module, Procedure
 from flyball.math.scalar import choose
-from flyball.special import machine
 from tests.mechanisms import example, four_bar
 
 SOME = {  # seconds of motion in which something happens, and not so many that differences grow
@@ -189,9 +189,9 @@ def test_a_branch_that_is_nan_is_a_value_like_any_other():
     graph = Graph()
     x = graph.symbol("x")
     stores = [(("b", k), f) for k, f in enumerate((choose(x, np.nan + 0.0 * x, x), choose(x, 2.0 * x, np.nan)))]
-    module = Module(machine.ARGUMENTS, lambda base: [])
+    module = Module(machine_code.ARGUMENTS, lambda base: [])
     module.add(Procedure("A", {x.index: ("a", 0)}, stores))
-    loaded = machine.Loaded(machine.assembled(str(module)), ["A"])
+    loaded = machine_code.LoadedProcedures(machine_code.object_code_of_text(str(module)), ["A"])
     pointer, number = ctypes.c_void_p, ctypes.c_double
     call = ctypes.CFUNCTYPE(number, pointer, pointer, number, *[pointer] * 4)(loaded.addresses["A"])
     for value in (-1.0, 1.0):

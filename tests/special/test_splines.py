@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from flyball.graph.node import Graph
-from flyball.graph.printers.llvm import Module, Procedure
-from flyball.math.spline import packed, spline
-from flyball.special import machine
+from flyball.codegen import machine_code
+from flyball.expression_graph.graph import Graph
+from flyball.expression_graph.printers.llvm import Module, Procedure
+from flyball.math.spline import pack_spline, spline
 
 X = np.array([0.3, 0.5, 1.1, 1.2, 2.0, 3.7, 4.0])
 Y = np.array([[1.0, -0.3, 2.0, 0.4, 0.0, 1.3, 1.0], [0.2, 0.1, -2.0, 0.7, 1.0, 0.9, 0.2]])
@@ -21,7 +21,7 @@ Y = np.array([[1.0, -0.3, 2.0, 0.4, 0.0, 1.3, 1.0], [0.2, 0.1, -2.0, 0.7, 1.0, 0
 def tables(beyond):
     """Two splines with the same breaks."""
     ends = "periodic" if beyond == "repeat" else "not-a-knot"
-    return [packed(X, y, CubicSpline(X, y, bc_type=ends).c[::-1].T, beyond) for y in Y]
+    return [pack_spline(X, y, CubicSpline(X, y, bc_type=ends).c[::-1].T, beyond) for y in Y]
 
 
 def text_of(data):
@@ -34,7 +34,7 @@ def text_of(data):
         for at in (0, len(data[0])):
             orders, _ = graph.functions.table(both, at)
             stores += [graph.call(f, place) for f in orders]
-    module = Module(machine.ARGUMENTS, lambda base: [])
+    module = Module(machine_code.ARGUMENTS, lambda base: [])
     reads = {node.index: ("a", k) for k, node in enumerate(x)}
     module.add(Procedure("A", reads, [(("b", k), f) for k, f in enumerate(stores)]))
     return str(module)
@@ -42,7 +42,7 @@ def text_of(data):
 
 def running(text):
     """The procedure as a Python function of two numbers."""
-    loaded = machine.Loaded(machine.assembled(text), ["A"])
+    loaded = machine_code.LoadedProcedures(machine_code.object_code_of_text(text), ["A"])
     pointer, number = ctypes.c_void_p, ctypes.c_double
     kind = ctypes.CFUNCTYPE(number, pointer, pointer, number, pointer, pointer, pointer, pointer)
     call = kind(loaded.addresses["A"])

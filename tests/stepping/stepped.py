@@ -2,39 +2,48 @@
 
 import numpy as np
 
-from flyball.analysis.motion.impulse.mechanism import tables
-from flyball.analysis.motion.start import begin
-from flyball.contact.tables import GAP, NORMAL, POINT, Contacts, Movers
-from flyball.equations.engine import engine
-from flyball.numerics.cone.rooms import rooms, unfilled
-from flyball.stepping.joined import BEGIN, FINISH, FREE, KEEP, MEAN, ROWS, START, VELOCITIES
-from flyball.stepping.joints import joined
+from flyball.collision.tables import GAP, NORMAL, POINT, Contacts, Movers
+from flyball.engine.entry_point import engine
+from flyball.numerics.complementarity.contact_problem import allocate_solver, empty_problem
+from flyball.simulation.impulse_stepping.mechanism_step import mechanism_kernel
+from flyball.simulation.impulse_stepping.setup import mechanism_tables
+from flyball.simulation.impulse_stepping.stepping_tables import (
+    TASK_APPLY_IMPULSES,
+    TASK_BEGIN,
+    TASK_FINAL_VELOCITIES,
+    TASK_FINISH,
+    TASK_FREE_VELOCITIES,
+    TASK_MEAN_VELOCITIES,
+    TASK_ROWS,
+    TASK_START,
+)
+from flyball.simulation.initial_state import find_initial_state
 
 
 class Stepped:
     """A mechanism and what it touches; ``touching(M)`` says what: (mover 1, mover 2, point, normal, gap, friction)."""
 
     def __init__(self, model, h, coordinates="absolute", contacts=0, touching=None, stops=None):
-        start = begin(model.snapshot(), 0.0, None, None, coordinates)
+        start = find_initial_state(model.snapshot(), 0.0, None, None, coordinates)
         self.names = [b.name for b in model.bodies]
         self.touching = touching
         self.compiled = start.assembly.compiled
         self.structure = self.compiled.structure
-        A = tables(start, self.names, 0, h, stops)
-        A.count.anyhow = 1  # the loop's shorter steps are not here
+        A = mechanism_tables(start, self.names, 0, h, stops)
+        A.count.accept_unsettled = 1  # the loop's shorter steps are not here
         lines = 2 * len(A.line)
         self.A = A._replace(job=np.zeros((2 * contacts + lines, 3), np.int64))
         n, nv = len(self.names), A.wide.shape[1]
         self.M = Movers(np.zeros((n, 12)), np.zeros((n, 6)))
         self.C = Contacts(np.zeros(8, np.int64), np.zeros((contacts, 4), np.int64), np.zeros((contacts, 8)))
-        self.P = unfilled(contacts, 0, len(A.group) - 1, lines, (6 * contacts + lines) * nv)
+        self.P = empty_problem(contacts, 0, len(A.group) - 1, lines, (6 * contacts + lines) * nv)
         self.P.group[:] = A.group
-        self.X, self.Y = rooms(self.P)[0], rooms(self.P)[0]
+        self.X, self.Y = allocate_solver(self.P)[0], allocate_solver(self.P)[0]
         A.door[0] = engine.address
-        self.ask(START)
+        self.ask(TASK_START)
 
     def ask(self, task, X=None):
-        status = joined(self.A, self.M, self.C, self.P, self.X if X is None else X, task)
+        status = mechanism_kernel(self.A, self.M, self.C, self.P, self.X if X is None else X, task)
         assert status == 0, status
 
     @property
@@ -72,17 +81,17 @@ class Stepped:
                 self.C.x[c, POINT : POINT + 3], self.C.x[c, NORMAL : NORMAL + 3], self.C.x[c, GAP] = point, normal, gap
             X.p[:] = Y.p[:] = 0.0
             X.line[:] = 0.0
-            self.ask(FREE)
-            self.ask(ROWS)
-            self.ask(BEGIN)
+            self.ask(TASK_FREE_VELOCITIES)
+            self.ask(TASK_ROWS)
+            self.ask(TASK_BEGIN)
             self.solve(X, P.bias[:n], P.mu[:n])
-            self.ask(KEEP)
-            self.ask(MEAN, Y)
+            self.ask(TASK_APPLY_IMPULSES)
+            self.ask(TASK_MEAN_VELOCITIES, Y)
             bias = np.array([(found[c][4] / h + self.seen(Y, c)[0], 0.0, 0.0) for c in range(n)]).reshape(n, 3)
             Y.wide[:] = 0.0
             self.solve(Y, bias, np.zeros(n))
-            self.ask(FINISH, Y)
-            self.ask(VELOCITIES)
+            self.ask(TASK_FINISH, Y)
+            self.ask(TASK_FINAL_VELOCITIES)
 
     def sides(self, c):
         """(sign, slice of velocities, J, Y) of each side of contact c that is in a group."""

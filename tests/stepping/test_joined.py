@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.compiler.buffers import StructBuffer
-from flyball.stepping.joined import no_mechanism
+from flyball.compiler.kernels import StructBuffer
+from flyball.simulation.impulse_stepping.stepping_tables import no_mechanism
 from tests.layers import LAYERS
 
 from .stepped import Stepped

@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
-from flyball.contact.tables import MOVER, SHAPE_1, SHAPE_2
-from flyball.stepping.joined import JoinedCounts
-from flyball.stepping.lifts import change_of_gap
+from flyball.collision.tables import MOVER, SHAPE_1, SHAPE_2
+from flyball.simulation.impulse_stepping.step_loop import change_of_gap
+from flyball.simulation.impulse_stepping.stepping_tables import MechanismCounts
 from tests.layers import LAYERS
 
 from .stepped import Stepped
@@ -148,7 +148,7 @@ def test_what_closing_joints_does_to_a_gap():
     shapes, at = np.zeros((2, MOVER + 1), np.int64), np.zeros((1, 4), np.int64)
     shapes[:, MOVER] = 0, 1
     at[0, [SHAPE_1, SHAPE_2]] = 0, 1
-    A = SimpleNamespace(pose=before, count=JoinedCounts.blank())
+    A = SimpleNamespace(pose=before, count=MechanismCounts.blank())
     P = SimpleNamespace(frame=np.r_[normal, np.zeros(6)][None], arm=arms.reshape(1, 6))
     M, C = SimpleNamespace(pose=after), SimpleNamespace(at=at)
     found = change_of_gap(SimpleNamespace(shape_i=shapes), A, M, C, P, 0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.stepping.penalty import mean_force
+from flyball.simulation.impulse_stepping.compliant_contact import mean_elastic_force
 
 G, R = 9.81, 0.1
 K = 1e7
@@ -227,7 +227,7 @@ def test_mean_force_of_a_power_law(n: float, change: float) -> None:
             return k * (y ** (power + 1) - mpmath.mpf(a) ** (power + 1)) / ((power + 1) * (y - mpmath.mpf(a)))
 
         wanted = float(mean(mpmath.mpf(b))), float(mpmath.diff(mean, mpmath.mpf(b)))
-    found = mean_force(k, n, a, b)
+    found = mean_elastic_force(k, n, a, b)
     assert found[0] == pytest.approx(wanted[0], rel=1e-12)
     assert found[1] == pytest.approx(wanted[1], rel=1e-7)
 

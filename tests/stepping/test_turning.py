@@ -6,13 +6,20 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.contact.tables import BEFORE, FOUND, Contacts
-from flyball.numerics.cone.operator import across
-from flyball.numerics.cone.rooms import rooms, unfilled
-from flyball.stepping.bounce import expand
-from flyball.stepping.record import book, book_turning
-from flyball.stepping.rows import warm
-from flyball.stepping.tables import BEFORE_KICK, COUNTS, REALS, REDUCED, TRACKS, TURNED_BEFORE, Pace
+from flyball.collision.tables import BEFORE, FOUND, Contacts
+from flyball.numerics.complementarity.contact_operator import to_world_frame
+from flyball.numerics.complementarity.contact_problem import allocate_solver, empty_problem
+from flyball.simulation.impulse_stepping.contact_constraints import account_contact, account_rolling, warm_start
+from flyball.simulation.impulse_stepping.restitution import add_expansion
+from flyball.simulation.impulse_stepping.stepping_tables import (
+    COUNTS,
+    HISTORY_COLUMNS,
+    HISTORY_IMPACT_SPIN,
+    HISTORY_IMPACT_VELOCITY,
+    REALS,
+    REDUCED_EXPANSIONS,
+    RunState,
+)
 from tests.cone.problems import KINDS, dense, random_problem
 
 G, R, RHO, SIGMA = 9.81, 0.1, 0.002, 0.001
@@ -69,7 +76,7 @@ def test_what_torques_take_in_impacts_is_frictions_too(restitution: float, law: 
 def test_an_expansion_goes_as_far_as_the_energy_before_the_impact(seed: int) -> None:
     """With torques of rolling and spinning friction: kinetic energy by masses and inertias, to rounding."""
     P, X, *_ = random_problem(seed, **KINDS["rolling friction"])
-    Z, E = rooms(P)[0], rooms(P)[0]
+    Z, E = allocate_solver(P)[0], allocate_solver(P)[0]
     nc, nodes = P.size[0], P.size[1]
     D, DK, *_ = dense(P, X)
     rng, first = np.random.default_rng(seed), X.v[:, :6].ravel().copy()
@@ -82,8 +89,14 @@ def test_an_expansion_goes_as_far_as_the_energy_before_the_impact(seed: int) -> 
         return total
 
     seen = (D @ first).reshape(nc, 6)
-    now, pace = np.zeros((nc, TRACKS)), Pace(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(8, np.int64))
-    now[:, BEFORE_KICK : BEFORE_KICK + 3], now[:, TURNED_BEFORE : TURNED_BEFORE + 3] = seen[:, :3], seen[:, 3:]
+    now, pace = (
+        np.zeros((nc, HISTORY_COLUMNS)),
+        RunState(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(8, np.int64)),
+    )
+    (
+        now[:, HISTORY_IMPACT_VELOCITY : HISTORY_IMPACT_VELOCITY + 3],
+        now[:, HISTORY_IMPACT_SPIN : HISTORY_IMPACT_SPIN + 3],
+    ) = seen[:, :3], seen[:, 3:]
     lost = -0.02 * seen.ravel()  # against what the contacts see: energy is lost
     more = 2.0 * rng.standard_normal((nc, 6))
     Z.p[:], Z.torque[:] = lost.reshape(nc, 6)[:, :3], lost.reshape(nc, 6)[:, 3:]
@@ -93,19 +106,19 @@ def test_an_expansion_goes_as_far_as_the_energy_before_the_impact(seed: int) -> 
     C = Contacts(np.zeros(8, np.int64), np.zeros((nc, 4), np.int64), np.zeros((nc, 8)))
     C.count[FOUND] = nc
     assert kinetic(X.v[:, :6].ravel()) < kinetic(first) < kinetic(E.v[:, :6].ravel())
-    expand(P, np.zeros((nc, 3)), Z, E, X, C, pace, now)
+    add_expansion(P, np.zeros((nc, 3)), Z, E, X, C, pace, now)
     assert kinetic(X.v[:, :6].ravel()) == pytest.approx(kinetic(first), rel=1e-12)
-    assert pace.count[REDUCED] == 1
+    assert pace.count[REDUCED_EXPANSIONS] == 1
 
 
 def test_impulses_and_torques_of_the_step_before_follow_their_contacts() -> None:
     """Renumbered, with other tangents and with unequal friction along these, they are the same in the world."""
     rng, n = np.random.default_rng(4), 5
-    P = unfilled(n, 0, 0, 0, 0, True)
-    X, Y = rooms(P)[0], rooms(P)[0]
+    P = empty_problem(n, 0, 0, 0, 0, True)
+    X, Y = allocate_solver(P)[0], allocate_solver(P)[0]
     pace, before, now = (
-        Pace(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(8, np.int64)),
-        *np.zeros((2, n, TRACKS)),
+        RunState(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(8, np.int64)),
+        *np.zeros((2, n, HISTORY_COLUMNS)),
     )
     P.at[:] = -1
     P.mu[:] = 1.0
@@ -118,7 +131,7 @@ def test_impulses_and_torques_of_the_step_before_follow_their_contacts() -> None
             P.frame[c] = np.r_[normal[c], u, 0.7 * np.cross(normal[c], u)]
 
     def world() -> np.ndarray:
-        return np.array([[across(P, c, *x[c]) for c in range(n)] for x in (X.p, X.torque)])
+        return np.array([[to_world_frame(P, c, *x[c]) for c in range(n)] for x in (X.p, X.torque)])
 
     normal = rng.normal(size=(n, 3))
     normal /= np.linalg.norm(normal, axis=1)[:, None]
@@ -126,13 +139,13 @@ def test_impulses_and_torques_of_the_step_before_follow_their_contacts() -> None
     X.p[:], X.torque[:] = 1.0 + rng.random((n, 3)), rng.normal(size=(n, 3))
     was = world()
     for c in range(n):
-        book(P, X, c, (0.0, 0.0, 0.0), pace, before)
-        book_turning(P, X, Y, c, pace, before)
+        account_contact(P, X, c, (0.0, 0.0, 0.0), pace, before)
+        account_rolling(P, X, Y, c, pace, before)
     C = Contacts(np.zeros(8, np.int64), np.zeros((n, 4), np.int64), np.zeros((n, 8)))
     C.count[FOUND], C.at[:, BEFORE] = n, (3, 0, -1, 4, 1)
     normal = normal[C.at[:, BEFORE]]
     tangents()
-    warm(C, P, X, now, before)
+    warm_start(C, P, X, now, before)
     old = C.at[:, BEFORE] >= 0
     assert world()[:, old] == pytest.approx(was[:, C.at[old, BEFORE]], abs=1e-14)
     assert not X.p[~old].any()

@@ -7,21 +7,21 @@ import pytest
 from scipy import stats
 from scipy.stats import qmc
 
-from flyball.analysis.runs.designs import points
+from flyball.studies.sampling import sample_points
 from tests.study.rigs import oscillator
 
 VARY = {"k": (50.0, 150.0), "mass": "normal(2, 0.1)"}
 
 
 def drawn(design, vary=VARY, samples=64, seed=3):
-    return points(oscillator(), vary, design, samples, seed)[0]
+    return sample_points(oscillator(), vary, design, samples, seed)[0]
 
 
 def test_grids_run_through_the_last_first():
-    x, axes = points(oscillator(), {"k": [1, 2], "mass": [3, 4, 5]}, "grid", None, None)
+    x, axes = sample_points(oscillator(), {"k": [1, 2], "mass": [3, 4, 5]}, "grid", None, None)
     assert x.tolist() == [[1, 3], [1, 4], [1, 5], [2, 3], [2, 4], [2, 5]]
     assert [a.tolist() for a in axes] == [[1, 2], [3, 4, 5]]
-    x, axes = points(oscillator(), {"k": [1, 2], "mass": [3, 4]}, "list", None, None)
+    x, axes = sample_points(oscillator(), {"k": [1, 2], "mass": [3, 4]}, "list", None, None)
     assert x.tolist() == [[1, 3], [2, 4]]
     assert axes == ()
 

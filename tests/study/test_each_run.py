@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.choice import SimulateOptions
-from flyball.analysis.motion.engines import KEPT
-from flyball.analysis.runs.compute import Question, compute, prepared
-from flyball.analysis.runs.reading import readings
-from flyball.analysis.runs.single import Motion
+from flyball.simulation.method_choice import SimulateOptions
+from flyball.simulation.solver_switching import IN_MEMORY_ONLY
+from flyball.studies.run_analyses import MotionAnalysis, study_quantities
+from flyball.studies.study import RunSpecification, compute_runs, with_generated_code
 from tests.mechanisms import example
 from tests.study.rigs import oscillator
 
@@ -26,8 +25,8 @@ def question(m, names, of, specialize=False, **more):
     usual = {k: p.default for k, p in inspect.signature(m.simulate).parameters.items()}
     given = usual | {"t_end": 0.01, "outputs": times, "specialize": specialize, "progress": False} | more
     o = SimulateOptions.asked(given)
-    single, m = Motion(), m.snapshot()
-    return Question(m, single, o, tuple(names), readings(of, partial(single.named, m)), times)
+    single, m = MotionAnalysis(), m.snapshot()
+    return RunSpecification(m, single, o, tuple(names), study_quantities(of, partial(single.named, m)), times)
 
 
 def single(q, points):
@@ -35,13 +34,13 @@ def single(q, points):
     out = q.empty(len(points))
     for k, point in enumerate(points):
         own = replace(q, model=q.model.copy().snapshot(), options=replace(q.options, specialize=False))
-        out.take(np.array([k]), compute(own, point[None]))
+        out.take(np.array([k]), compute_runs(own, point[None]))
     return out
 
 
 def checked(q, points):
     """The runs together, which are those by themselves, to the last bit."""
-    a, b = compute(prepared(q, points, len(points)), points), single(q, points)
+    a, b = compute_runs(with_generated_code(q, points, len(points)), points), single(q, points)
     assert a.status.tolist() == b.status.tolist()
     assert (a.reasons, a.remarks, a.doubtful) == (b.reasons, b.remarks, b.doubtful)
     for x, y in zip(a.values, b.values, strict=True):
@@ -62,8 +61,8 @@ def test_a_value_that_made_code_takes_for_granted():
     points = np.array([[0.0], [2.0], [0.0], [1.0]])
     q = question(oscillator(), ("c",), ["end(b.x)"], True)
     a = checked(q, points)
-    ready = prepared(q, points, 4)
-    assert ready.options.specialize == KEPT
+    ready = with_generated_code(q, points, 4)
+    assert ready.options.specialize == IN_MEMORY_ONLY
     engines = [ready.single.run(ready.model, ready.at(x)).health.engine for x in points]
     assert [x.startswith("made for this mechanism") for x in engines] == [True, False, True, False]
     assert a.values[0][1] != a.values[0][0] == a.values[0][2]

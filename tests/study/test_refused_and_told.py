@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.cli.flags import assigned
-from flyball.cli.optimize import _bounds
-from flyball.cli.study import _varied
+from flyball.cli.options import read_assignments
+from flyball.cli.study import _read_bounds, _read_variations
 from tests.study.rigs import oscillator
 
 
@@ -43,7 +42,11 @@ def test_a_parameter_that_nothing_has_is_refused():
 
 
 def test_what_is_given_twice_is_refused():
-    for read, texts in ((_varied, ["k=1,2", "k=3"]), (_bounds, ["k=1:2", "k"]), (assigned, ["A=1", "A=2"])):
+    for read, texts in (
+        (_read_variations, ["k=1,2", "k=3"]),
+        (_read_bounds, ["k=1:2", "k"]),
+        (read_assignments, ["A=1", "A=2"]),
+    ):
         with pytest.raises(fb.ModelError, match="given twice"):
             read(texts, "", "--flag")
 

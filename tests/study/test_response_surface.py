@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flyball.view.smoothing import surface_of_means
+from flyball.view.study_plots import surface_of_means
 from tests.study.rigs import oscillator
 
 

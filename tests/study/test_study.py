@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.choice import SimulateOptions
+from flyball.simulation.method_choice import SimulateOptions
 from tests.mechanisms import example
 from tests.study.rigs import oscillator, pushed
 

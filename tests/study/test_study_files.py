@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 import flyball as fb
-from flyball.analysis import study as module
+from flyball.studies import study as module
 from tests.study.rigs import oscillator
 
 VARY = {"k": np.linspace(50.0, 150.0, 200)}
@@ -69,7 +69,7 @@ def test_an_interrupted_study_goes_on(tmp_path):
 
 def test_a_killed_study_has_a_file_that_is_whole(tmp_path, monkeypatch):
     """It is written while it runs; a process that dies leaves the last one."""
-    monkeypatch.setattr(module, "EVERY", 0.0)
+    monkeypatch.setattr(module, "SAVE_INTERVAL", 0.0)
     file = tmp_path / "s.nc"
 
     class Killed(BaseException):

@@ -7,10 +7,10 @@ from functools import lru_cache
 import numpy as np
 
 import flyball as fb
-from flyball.analysis.motion.start import begin
-from flyball.equations.tasks import MOTION
-from flyball.graph.values import evaluate
-from flyball.symbolic.explicit.states import StateEquations
+from flyball.engine.calls import MOTION
+from flyball.expression_graph.evaluation import evaluate
+from flyball.simulation.initial_state import find_initial_state
+from flyball.symbolic.explicit.state_space import StateEquations
 
 
 def pendulum() -> fb.Mechanism:
@@ -38,13 +38,13 @@ def states_of(m: fb.Mechanism, coordinates: str = "auto", independent=(), inputs
 @lru_cache(maxsize=4)
 def _nodes(s: StateEquations) -> list:
     e, n = s.explicit.solution, s.explicit.solution.traced
-    own = [n.graph.node(y) for y in s.equations.formulated.own_q]
-    return e.inlined([*own, *n.v, *s.equations.formulated.vdot])
+    own = [n.graph.node(y) for y in s.equations.named_equations.user_q]
+    return e.inlined([*own, *n.v, *s.equations.named_equations.vdot])
 
 
 def engine(m: fb.Mechanism, coordinates: str, t: float, q, v, values=None) -> np.ndarray:
     """Accelerations (nv,) by the numeric engine; followers are where ``values`` say."""
-    c = begin(m.snapshot(), 0.0, None, None, coordinates).assembly.compiled
+    c = find_initial_state(m.snapshot(), 0.0, None, None, coordinates).assembly.compiled
     for name, at in c.structure.state_at.items():
         c.z[at] = (values or {}).get(name, c.z[at])
     status, dy = c.at(t, np.array(q, float), np.array(v, float), MOTION)

@@ -78,9 +78,9 @@ class Library:
 
 def given_at(eq, code, state):
     """Arguments of the exported functions at a state of the engine."""
-    t = eq.formulated.traced
-    values = eq.checked(eq.state(*state), {p.symbol.data.name: p.symbol for p in eq.formulated.places})
-    named = {"q": t.q, "v": t.v, "places": [p.symbol for p in eq.formulated.places]}
+    t = eq.named_equations.traced
+    values = eq.checked(eq.state(*state), {p.symbol.data.name: p.symbol for p in eq.named_equations.places})
+    named = {"q": t.q, "v": t.v, "places": [p.symbol for p in eq.named_equations.places]}
     return code.start | {"t": state[0]} | {k: [values[x.data.name] for x in s] for k, s in named.items()}
 
 

@@ -11,8 +11,8 @@ import pytest
 
 import flyball as fb
 from flyball.errors import ModelError
-from flyball.graph.node import Node
-from flyball.graph.values import evaluate, symbols
+from flyball.expression_graph.evaluation import evaluate, symbols_of
+from flyball.expression_graph.graph import Node
 from flyball.symbolic.document.parts import Formulas, Matrix
 from tests.mechanisms import example
 
@@ -129,7 +129,7 @@ def values(document, at):
         f for s in document.sections if s.name in ("kinematics", "abbreviations") for b in s.blocks for f in b.formulas
     ]
     while defined:
-        ready = [f for f in defined if all(x.data.name in known or not x.moving for x in symbols([f.right]))]
+        ready = [f for f in defined if all(x.data.name in known or not x.moving for x in symbols_of([f.right]))]
         assert ready, "abbreviations that stand for one another"
         for f in ready:
             known[f.left.plain] = evaluate([f.right], known)[0]

@@ -7,14 +7,14 @@ import pytest
 
 import flyball as fb
 from flyball import forces
-from flyball.analysis.compiled import compiled
-from flyball.equations.engine import MOTION
-from flyball.graph.values import evaluated
-from flyball.model.touching import has_contact
-from flyball.tables.names import velocity_names
-from flyball.tables.spanning import spanning
-from flyball.tables.system import LOAD
-from flyball.tracing.trace import plain, traced
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.engine.entry_point import MOTION
+from flyball.expression_graph.evaluation import evaluate_array
+from flyball.expression_graph.tracing import object_tables, trace_equations
+from flyball.model.contact import has_contact
+from flyball.tables.coordinate_choice import spanning_joints
+from flyball.tables.structure_definition import velocity_names
+from flyball.tables.table_definitions import LOAD
 from tests import mechanisms
 from tests.contract import zoo
 from tests.examples.test_examples import EQUATIONS
@@ -26,7 +26,7 @@ CLOSE = 1e-12
 
 def quaternions_of(c):
     """Places of quaternions in q."""
-    from flyball.equations.tree import quaternion_at
+    from flyball.engine.kinematics import quaternion_at
 
     at = (quaternion_at(c.values.system, b)[0] for b in range(len(c.values.system.tree.parent)))
     return [k for k in at if k >= 0]
@@ -65,17 +65,17 @@ def sizes_of(name, b, state, nv):
 
 def agree(m, states=STATES):
     m = m.snapshot()
-    for tree in {(), tuple(spanning(m))}:
-        c = compiled(m, tree=tree, coupled=bool(tree))
+    for tree in {(), tuple(spanning_joints(m))}:
+        c = compile_mechanism(m, tree=tree, coupled=bool(tree))
         if c.structure.nv == 0:
             continue
-        symbolic = traced(c.structure, plain(c.values.system))
+        symbolic = trace_equations(c.structure, object_tables(c.values.system))
         rng = np.random.default_rng(7)
         found = [engine_at(c, rng) for _ in range(states)]
         state = {k: np.array([f[0][k] for f in found]) for k in found[0][0]}
         for name in found[0][1]:
             b = np.array([f[1][name] for f in found])
-            a = evaluated(getattr(symbolic, name), state).astype(float)
+            a = evaluate_array(getattr(symbolic, name), state).astype(float)
             a = np.broadcast_to(a.reshape((*a.shape[: a.ndim - b.ndim + 1], *b.shape[1:])), b.shape)
             tolerance = CLOSE * sizes_of(name, b, state, c.structure.nv).reshape(-1, *[1] * (b.ndim - 1))
             bad = ~((np.abs(a - b) <= tolerance) | (np.isnan(a) & np.isnan(b)))
@@ -91,13 +91,13 @@ def test_coordinates_that_are_drawn_at_other_values_than_zero():
     )
     m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(1, 0)))
     m = m.snapshot()
-    c = compiled(m, tree=tuple(spanning(m)), coupled=True)
+    c = compile_mechanism(m, tree=tuple(spanning_joints(m)), coupled=True)
     drawn = [0.3, -0.7]
-    symbolic = traced(c.structure, plain(c.values.system), drawn=drawn)
+    symbolic = trace_equations(c.structure, object_tables(c.values.system), reference=drawn)
     state, found = engine_at(c, np.random.default_rng(7))
     state |= {f"q[{k}]": state[f"q[{k}]"] + x for k, x in enumerate(drawn)}
     for name in ("M", "f"):
-        ours = evaluated(getattr(symbolic, name), state).astype(float).reshape(found[name].shape)
+        ours = evaluate_array(getattr(symbolic, name), state).astype(float).reshape(found[name].shape)
         np.testing.assert_allclose(ours, found[name], rtol=1e-12, atol=1e-12)
 
 

@@ -8,9 +8,9 @@ import pytest
 
 import flyball as fb
 from flyball.errors import ModelError
-from flyball.graph.node import Graph
-from flyball.graph.values import reached
-from flyball.tracing.model import parameters
+from flyball.expression_graph.evaluation import nodes_in_order
+from flyball.expression_graph.graph import Graph
+from flyball.expression_graph.tracing import parameter_symbols
 from tests import mechanisms
 from tests.contract import zoo
 from tests.examples.test_examples import EQUATIONS
@@ -115,7 +115,7 @@ def test_angles_are_plain_in_the_plane():
         for coordinates in ("joint", "absolute"):
             eq = mechanisms.example(name).symbolic(coordinates=coordinates)
             found = [eq.g, eq.f, eq.gamma, *(eq[f"{j.name}.{k}"] for j in eq.model.joints for k in j.measured(True))]
-            operations = {x.op for e in found for x in reached(e.list())}
+            operations = {x.op for e in found for x in nodes_in_order(e.list())}
             assert not operations & {"atan2", "rounded"}
 
 
@@ -227,7 +227,7 @@ def test_why_these_coordinates_is_told():
 
 def test_parameters_with_a_unit_are_symbols_and_derived_ones_are_expressions_of_them():
     m = fb.Mechanism("o", planar=True, parameters={"k": "100 N/m", "x": 0.1, "n": "3", "twice": "2*k"})
-    found = parameters(m, Graph())
+    found = parameter_symbols(m, Graph())
     assert list(found) == ["k", "x", "n"]
     assert all(node.op == "symbol" for node in found.values())
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.symbolic.explicit.solve import Determinants, solve, solve_symmetric
+from flyball.symbolic.explicit.linear_systems import Determinants, solve_blocks, solve_symmetric
 from tests.analyses.linkages import four_bar_driven
 from tests.mechanisms import bricard, four_bar, free_body, spatial_four_bar
 from tests.symbolic.explicit_made import cart_pole, differs, pendulum, states_of
@@ -100,7 +100,7 @@ def test_small_systems_are_solved(n):
     """Cramer's rule, orthogonalisation, L D L^T: of full matrices of numbers."""
     rng = np.random.default_rng(n)
     A, B = rng.normal(size=(n, n)), rng.normal(size=(n, 2))
-    found = solve(A.astype(object), B.astype(object), Determinants())
+    found = solve_blocks(A.astype(object), B.astype(object), Determinants())
     np.testing.assert_allclose(found.astype(float), np.linalg.solve(A, B), rtol=1e-10, atol=1e-12)
     M = A @ A.T + np.eye(n)
     found = solve_symmetric(M.astype(object), B.astype(object), Determinants())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.model.touching import has_contact
+from flyball.model.contact import has_contact
 from tests.examples.test_examples import EVENTS
 from tests.mechanisms import EXAMPLES, example
 from tests.pages import assert_examples_run

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.graph.node import Graph, Symbol
-from flyball.graph.values import evaluate
-from flyball.symbolic.explicit.loops.single import single
-from flyball.symbolic.explicit.probe import Probe
+from flyball.expression_graph.evaluation import evaluate
+from flyball.expression_graph.graph import Graph, Symbol
+from flyball.symbolic.explicit.closed_form_loops import solve_single
+from flyball.symbolic.explicit.zero_test import Probe
 from tests.analyses.linkages import whitworth
 from tests.mechanisms import example, planar_rod
 from tests.symbolic.explicit_made import differs, states_of
@@ -166,7 +166,7 @@ def test_a_quadratic_with_any_leading_coefficient(leading, drawn):
     given = leading == "a parameter"
     p = g.symbol(Symbol("p", "parameter"), 2.0) if given else leading
     t, w = (g.symbol(Symbol(n, "coordinate")) for n in "tw")
-    found = single(p * w * w + 3.0 * w - (5.0 + t), w, Probe({"w": drawn, "t": 0.0})).value
+    found = solve_single(p * w * w + 3.0 * w - (5.0 + t), w, Probe({"w": drawn, "t": 0.0})).value
     for a, more in ((2.0, 0.0), (0.5, 1.0), (7.0, -2.0)) if given else ((leading, 0.0), (leading, 4.0)):
         root = np.copysign(np.sqrt(9.0 + 4.0 * a * (5.0 + more)), drawn)
         assert evaluate([found], {"p": a, "t": more})[0] == pytest.approx((root - 3.0) / (2.0 * a), rel=1e-14)
@@ -177,7 +177,7 @@ def test_a_quadratic_under_a_root_with_a_factor(drawn):
     """3 sqrt(w^2 + 4) = 7 + t: w^2 = (7 + t)^2 / 9 - 4."""
     g = Graph()
     t, w = (g.symbol(Symbol(n, "coordinate")) for n in "tw")
-    found = single(3.0 * (w * w + 4.0).sqrt() - (7.0 + t), w, Probe({"w": drawn * 1.2, "t": 0.0})).value
+    found = solve_single(3.0 * (w * w + 4.0).sqrt() - (7.0 + t), w, Probe({"w": drawn * 1.2, "t": 0.0})).value
     for more in (0.0, 2.0):
         wanted = np.copysign(np.sqrt((7.0 + more) ** 2 / 9.0 - 4.0), drawn)
         assert evaluate([found], {"t": more})[0] == pytest.approx(wanted, rel=1e-14)

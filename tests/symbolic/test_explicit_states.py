@@ -5,9 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import flyball as fb
-from flyball.graph.node import Graph
-from flyball.symbolic.explicit.definition import Definition
-from flyball.symbolic.explicit.newton import Implicit
+from flyball.expression_graph.graph import Graph
+from flyball.symbolic.explicit.definitions import Definition, ImplicitSolver
 from tests.analyses.linkages import four_bar_driven
 from tests.mechanisms import bricard, door, example, four_bar, planar_rod
 from tests.symbolic.explicit_made import cart_pole, differs, pendulum, states_of
@@ -41,7 +40,7 @@ def test_branch_ends():
     """w^2 + u^2 = 1: the branch below is followed up to u = 1, its end, and none is told beyond."""
     g = Graph()
     u, w = g.symbol("u"), g.symbol("w")
-    lower = Implicit(Definition((w,), (), (w * w + u * u - 1.0,)), {"u": 0.0, "w": -1.0})
+    lower = ImplicitSolver(Definition((w,), (), (w * w + u * u - 1.0,)), {"u": 0.0, "w": -1.0})
     for x in (0.5, -0.9, 0.999999):
         assert lower({"u": x})["w"] == pytest.approx(-np.sqrt(1 - x * x), rel=1e-12)
     with pytest.raises(fb.SingularityError, match=r"w cannot be followed to u = 1.1"):

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.graph.derivative import jacobian
-from flyball.graph.values import evaluate
+from flyball.expression_graph.evaluation import evaluate, jacobian
 from tests.symbolic.exported import close, example, given_at, rubbing, states
 
 

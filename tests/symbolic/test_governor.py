@@ -17,7 +17,7 @@ import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flyball.symbolic.linear.linear import linear_equations
+from flyball.symbolic.linear.linear_equations import linear_equations
 from tests.symbolic.small import watt
 
 NAMES = ("m", "I", "sleeve", "l", "alpha", "J", "k", "b", "W")

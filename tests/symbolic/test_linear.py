@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.graph.values import evaluate
-from flyball.symbolic.linear.linear import linear_equations
+from flyball.expression_graph.evaluation import evaluate
+from flyball.symbolic.linear.linear_equations import linear_equations
 from tests.analyses.classical import bicycle, column, stand
 from tests.analyses.made import G, chain, conical_pendulum, parallelogram, rod, watt
 from tests.symbolic.small import cart

@@ -7,9 +7,9 @@ import pytest
 import sympy
 
 import flyball as fb
-from flyball.graph.node import Graph
-from flyball.symbolic.linear.linear import linear_equations
-from flyball.symbolic.linear.ring import Ring
+from flyball.expression_graph.graph import Graph
+from flyball.symbolic.linear.linear_equations import linear_equations
+from flyball.symbolic.linear.polynomials import PolynomialRing
 from tests.analyses.made import chain
 from tests.symbolic.small import ball_on_beam, cart, quarter_car, two_masses, watt
 
@@ -138,14 +138,14 @@ def test_what_is_refused(monkeypatch):
     with pytest.raises(fb.ModelError, match="no parameter 'mass'"):
         L.transfer_function().at(mass=3.0)
     with monkeypatch.context() as fewer:
-        fewer.setattr("flyball.symbolic.linear.minors.ORDER", 5)
+        fewer.setattr("flyball.symbolic.linear.polynomials.MAX_ORDER", 5)
         with pytest.raises(fb.ModelError, match=r"are 6 with their constraints, .* up to 5: ask for numbers"):
             linear_equations(chain(6)).routh()
-    monkeypatch.setattr("flyball.symbolic.linear.ring.MOST", 10)
+    monkeypatch.setattr("flyball.symbolic.linear.polynomials.MAX_TERMS_OF_ENTRY", 10)
     with pytest.raises(fb.ModelError, match=r"have \d+ operations in their coefficients, .* up to 10: ask for numbers"):
         linear_equations(cart()).routh()
-    monkeypatch.setattr("flyball.symbolic.linear.ring.MOST", 4000)
-    monkeypatch.setattr("flyball.symbolic.linear.minors.TERMS", 2)
+    monkeypatch.setattr("flyball.symbolic.linear.polynomials.MAX_TERMS_OF_ENTRY", 4000)
+    monkeypatch.setattr("flyball.symbolic.linear.polynomials.MAX_TERMS", 2)
     with pytest.raises(fb.ModelError, match=r"minors of \d+ terms, .* up to 2: give numbers"):
         linear_equations(cart()).routh()
 
@@ -154,7 +154,7 @@ def test_what_a_parameter_that_is_zero_now_multiplies_stays():
     """A damping that is zero as told, with a long number before it: no rounding."""
     g = Graph()
     k, d = g.symbol("k", 100.0), g.symbol("d", 0.0)
-    ring = Ring([np.array([[0.5 * k + 0.0123456789123 * d]], object)], "it", [])
+    ring = PolynomialRing([np.array([[0.5 * k + 0.0123456789123 * d]], object)], "it", [])
     x = ring.matrices[0][0, 0]
     (told,) = ring.by_powers(x.numer.mul_ground(1 / x.denom.LC))
     assert len(told) == 2

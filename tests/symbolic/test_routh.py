@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import flyball as fb
-from flyball.symbolic.linear.linear import linear_equations
-from flyball.symbolic.linear.ring import Ring
-from flyball.symbolic.linear.routh import hurwitz, stability
+from flyball.symbolic.linear.linear_equations import linear_equations
+from flyball.symbolic.linear.polynomials import PolynomialRing
+from flyball.symbolic.linear.stability import is_hurwitz, stability_conditions
 from tests.analyses.classical import CAPSIZE, WEAVE, bicycle, column, stand
 from tests.symbolic.small import cart, quarter_car
 
@@ -20,13 +20,13 @@ UNSURE = 1e-6  # real parts that eigenvalues of a computer do not tell from zero
 
 def of_polynomial(n: int):
     """Conditions for a_0 s^n + ... + a_n, all coefficients symbols."""
-    from flyball.graph.node import Graph
+    from flyball.expression_graph.graph import Graph
 
     g = Graph()
     a = np.array([[g.symbol(f"a{k}", 1.0) for k in range(n + 1)]], object)
-    ring = Ring([a], "polynomial", [])
+    ring = PolynomialRing([a], "polynomial", [])
     p = sum((x.numer * ring.ring.gens[0] ** (n - k) for k, x in enumerate(ring.matrices[0][0])), ring.ring.zero)
-    return stability(ring, p, "polynomial", ({f"a{k}": 1.0 for k in range(n + 1)}, {}), ())
+    return stability_conditions(ring, p, "polynomial", ({f"a{k}": 1.0 for k in range(n + 1)}, {}), ())
 
 
 def test_third_and_fourth_order():
@@ -53,7 +53,7 @@ def test_conditions_hold_where_roots_are_stable(n):
         if np.abs(roots.real).min() < UNSURE:
             continue
         values = {f"a{k}": x for k, x in enumerate(a.tolist())}
-        assert all(x > 0.0 for x in found.left_sides(**values)) == stable == hurwitz(a)
+        assert all(x > 0.0 for x in found.left_sides(**values)) == stable == is_hurwitz(a)
         seen.add(stable)
     assert seen == {True, False}
 

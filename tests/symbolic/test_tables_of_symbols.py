@@ -7,11 +7,10 @@ import pytest
 
 import flyball as fb
 from flyball.errors import ModelError
-from flyball.graph.values import evaluated
-from flyball.tables.spanning import spanning
+from flyball.expression_graph.evaluation import evaluate_array
+from flyball.expression_graph.tracing import object_tables, trace_equations, trace_model
+from flyball.tables.coordinate_choice import spanning_joints
 from flyball.tables.values import values
-from flyball.tracing.model import expressed
-from flyball.tracing.trace import plain, traced
 from tests import mechanisms
 from tests.complex_steps import with_parameters
 from tests.contract import zoo
@@ -26,21 +25,21 @@ def agree(m):
     """With the numbers as they are, and with others: tables filled in anew."""
     m, _ = with_parameters(m)
     m = m.snapshot()
-    for tree in {(), tuple(spanning(m))}:
-        symbolic = expressed(m, tree)
+    for tree in {(), tuple(spanning_joints(m))}:
+        symbolic = trace_model(m, tree)
         named = [x for x in symbolic.graph if x.op == "symbol" and x.data.kind == "parameter"]
         for seed in range(2):
             rng = np.random.default_rng(seed)
             told = {x.data.name: x.value * (1.0 + 1e-3 * seed * rng.normal()) for x in named}
             try:
-                numeric = traced(symbolic.structure, plain(values(symbolic.structure, told).system))
+                numeric = trace_equations(symbolic.structure, object_tables(values(symbolic.structure, told).system))
             except ModelError:
                 continue  # right angles and the like allow no change
             state = {x.data.name: 0.4 * rng.normal() for x in (*numeric.q, *numeric.v, *numeric.lam, *numeric.loads)}
             state |= {x.data.name: 0.1 for x in numeric.z} | {"t": 0.3}
-            heavy = max(1.0, np.abs(evaluated(numeric.M, state).astype(float)).max(initial=0.0))
+            heavy = max(1.0, np.abs(evaluate_array(numeric.M, state).astype(float)).max(initial=0.0))
             for name in EQUATIONS:
-                a, b = (evaluated(getattr(x, name), state | told).astype(float) for x in (symbolic, numeric))
+                a, b = (evaluate_array(getattr(x, name), state | told).astype(float) for x in (symbolic, numeric))
                 size = max(heavy, np.abs(b[np.isfinite(b)]).max(initial=0.0))
                 np.testing.assert_allclose(a, b, rtol=1e-11, atol=1e-11 * size, err_msg=name)
 
@@ -71,4 +70,4 @@ def test_examples(name):
 def test_a_curve_through_symbols_is_refused():
     m, _ = with_parameters(zoo.joined("plane", "Cam"))
     with pytest.raises(ModelError, match="points of its profile follow parameters"):
-        expressed(m.snapshot())
+        trace_model(m.snapshot())

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from flyball.equations.records import load
+from flyball.engine.kinematics import load_record
 from flyball.errors import ModelError
-from flyball.graph.values import evaluate
+from flyball.expression_graph.evaluation import evaluate
 from tests import mechanisms
 from tests.contract import zoo
 from tests.symbolic.states import random_state
@@ -16,13 +16,13 @@ PARTS = (("", 3), ("e", 4), ("w", 3), ("v", 3), ("alpha", 3), ("a", 3))
 def engine(where, name):
     """The joint in absolute coordinates at a random state: values of both frames' symbols; g, G v, G vdot - gamma."""
     eq, _, values = random_state(zoo.joined(where, name), "absolute")
-    f, s = eq.formulated, eq.formulated.values.structure
+    f, s = eq.named_equations, eq.named_equations.values.structure
     given = {k: v for k, v in values.items() if k in eq.named}
     out, frames = {}, {}
     vdot = [values[n] for n in eq.vdot.rows]
     for role in "FM":
         at = s.frame_at["J", role, ""]
-        p, R, w, v, _, _ = (np.array(evaluate(list(x), given), float) for x in load(f.traced.work.FK, at))
+        p, R, w, v, _, _ = (np.array(evaluate(list(x), given), float) for x in load_record(f.traced.work.FK, at))
         frames[role] = p, R.reshape(3, 3), w, v
         end = {"F": s.model["J"].body_i, "M": s.model["J"].body_j}[role]
         body = {k: eq[f"{end}.{k}"].at(given | dict(zip(eq.vdot.rows, vdot, strict=True))) for k in MOTION}
@@ -52,7 +52,7 @@ def bryant(R):
 @pytest.mark.parametrize("orientation", ["quaternion", "bryant"])
 @pytest.mark.parametrize(("where", "name"), zoo.CASES)
 def test_rows_are_the_engines(where, name, orientation):
-    from flyball.rotations.checks import quaternion_of
+    from flyball.rotations.arrays import quaternion_of
 
     eq, values, frames, at, (g, rate, second) = engine(where, name)
     book = eq.joint("J", orientation=orientation)

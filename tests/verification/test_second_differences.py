@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.compiled import compiled
-from flyball.equations.tree import rates, retract
+from flyball.assembly.compiled_mechanism import compile_mechanism
+from flyball.engine.kinematics import coordinate_rates, retract
 from tests.mechanisms import bricard, example, four_bar, spatial_four_bar
 from tests.verification.test_linkages import hooke
 from tests.verification.test_moving_bases import gyroscope, shaken_pendulum, turntable
@@ -76,10 +76,10 @@ def carried_on(S, q, v, vdot, s, pieces=4):
     k = np.zeros((4, len(q)))
     for i in range(pieces):
         at = i * h
-        rates(S, q, v + at * vdot, k[0])
-        rates(S, q + h / 2 * k[0], v + (at + h / 2) * vdot, k[1])
-        rates(S, q + h / 2 * k[1], v + (at + h / 2) * vdot, k[2])
-        rates(S, q + h * k[2], v + (at + h) * vdot, k[3])
+        coordinate_rates(S, q, v + at * vdot, k[0])
+        coordinate_rates(S, q + h / 2 * k[0], v + (at + h / 2) * vdot, k[1])
+        coordinate_rates(S, q + h / 2 * k[1], v + (at + h / 2) * vdot, k[2])
+        coordinate_rates(S, q + h * k[2], v + (at + h) * vdot, k[3])
         q += h / 6 * (k[0] + 2 * k[1] + 2 * k[2] + k[3])
     return q, v + s * vdot
 
@@ -88,7 +88,7 @@ def carried_on(S, q, v, vdot, s, pieces=4):
 @pytest.mark.parametrize("seed", range(2))
 def test_derivatives_of_the_constraints(name, seed):
     make, tree = CASES[name]
-    c = compiled(make(), tree=tree)
+    c = compile_mechanism(make(), tree=tree)
     S, s, W = c.values.system, c.structure, c.work
     random = np.random.default_rng(seed)
     q, t, h = c.values.q.copy(), 0.3, 1e-4

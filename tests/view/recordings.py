@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flyball.view.recording import (
-    SHOW,
+    SHOW_OPTIONS,
     Channel,
     RecordedArrow,
     RecordedBody,
@@ -175,7 +175,7 @@ def loaded(flat: bool = False) -> Recording:
         ),
         (RecordedFrame("base", "joint", "b1", (0.2, 0, 0), (1, 0, 0, 0)),),
         (RecordedPath("tip", "b1", (0.5, 0.0, 0.0)),),
-        tuple(SHOW),
+        tuple(SHOW_OPTIONS),
         {"b0": ("Body", "1 kg"), "base": ("Revolute", "ground – b1")},
         (),
         tuple(-up),

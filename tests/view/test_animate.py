@@ -11,10 +11,10 @@ import flyball as fb
 from flyball.results.result import Result
 from flyball.tables.structure import structure
 from flyball.tables.values import values
-from flyball.view.animate import animation, kept, record
-from flyball.view.payload import check
-from flyball.view.plots import plot, standard_plots
+from flyball.view.animation import animation_html, record_motion, thinned_times
+from flyball.view.page import check_recording
 from flyball.view.recording import RecordedArrow, Recording, Shape
+from flyball.view.result_plots import plot_curves, write_standard_plots
 from tests.results.made_up import L, R, healthy, mechanism, slider_crank
 
 
@@ -46,8 +46,8 @@ def result() -> Result:
 
 @pytest.fixture(scope="module")
 def recording(result: Result) -> Recording:
-    made = record(result)
-    check(made)
+    made = record_motion(result)
+    check_recording(made)
     return made
 
 
@@ -134,14 +134,14 @@ def test_forces_between_two_bodies_are_equal_and_opposite() -> None:
     m = fb.Mechanism("m")
     m.add(fb.Body("a", mass=1, inertia=(1, 1, 1)), fb.Body("b", mass=1, inertia=(1, 1, 1), position=(3, 4, 0)))
     m.add(fb.SpringDamper("s", "a", "b", at=((0, 0, 0), (3, 4, 0)), stiffness=10, length=4))
-    recording = record(still(m))
+    recording = record_motion(still(m))
     one, other = arrow(recording, "s", body="a"), arrow(recording, "s", body="b")
     assert np.allclose(one.vector, [[6, 8, 0]] * 2)  # 10 N/m, stretched by 1 m, along (3, 4) / 5
     assert np.allclose(other.vector, -one.vector)
 
 
 def test_paths_asked_for(result: Result) -> None:
-    recording = record(result, paths=["slider", "eye", ("rod", (0.1, 0.2))])
+    recording = record_motion(result, paths=["slider", "eye", ("rod", (0.1, 0.2))])
     assert [(p.name, p.body) for p in recording.paths] == [
         ("slider", "slider"),
         ("eye", "rod"),
@@ -149,7 +149,7 @@ def test_paths_asked_for(result: Result) -> None:
     ]
     assert np.allclose(recording.paths[1].position, [0, 0.1, 0])
     assert np.allclose(recording.paths[2].position, [0.1, 0.2, 0])
-    check(recording)
+    check_recording(recording)
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_what_cannot_be_shown_is_refused(result: Result, options: dict, message:
 
 
 def test_frames_can_be_shown(result: Result) -> None:
-    frames = {f.name: f for f in record(result).frames}
+    frames = {f.name: f for f in record_motion(result).frames}
     assert frames["eye"].body == "rod"
     assert np.allclose(frames["eye"].position, [0, 0.1, 0])
     assert np.allclose(turned(np.array(frames["D"].quaternion), np.array([0, 0, 1.0])), [1, 0, 0])
@@ -220,14 +220,14 @@ def test_meshes_are_drawn_on_their_body_and_kept_small() -> None:
     for name, radius in (("b", 0.5), ("c", 2.0)):
         mesh = fb.Mesh(vertices=radius * vertices, faces=triangles)
         m.add(fb.Body(name, mass=1, inertia=(1, 1, 1), shape=mesh))
-    recording = record(still(m))
-    check(recording)
+    recording = record_motion(still(m))
+    check_recording(recording)
     (mesh,) = recording.bodies[0].shapes
     assert mesh.kind == "mesh"
     assert np.allclose(np.sqrt(((mesh.vertices - [0.5, 0, 0]) ** 2).sum(1)), 0.5, rtol=0.01)
     total = sum(len(b.shapes[0].triangles) for b in recording.bodies)
     assert 10_000 < total <= 24_000  # of 178 800
-    assert len(animation(still(m))) < 1_000_000
+    assert len(animation_html(still(m))) < 1_000_000
 
 
 def test_holes_are_drawn_as_holes() -> None:
@@ -235,7 +235,7 @@ def test_holes_are_drawn_as_holes() -> None:
     plate = fb.Box(edges=(1, 1, 0.1))
     bore = fb.Cylinder(radius=0.2, length=0.1, position=(0.2, 0, 0), hole=True)
     m.add(fb.Body("b", density=1, shape=[plate, bore]))
-    shapes = record(still(m)).bodies[0].shapes
+    shapes = record_motion(still(m)).bodies[0].shapes
     assert [(s.kind, s.hole) for s in shapes] == [("box", False), ("cylinder", True)]
 
 
@@ -244,7 +244,7 @@ def test_a_joint_that_nobody_can_draw_gets_a_mark(monkeypatch: pytest.MonkeyPatc
     m = fb.Mechanism("m")
     m.add(fb.Body("b", mass=1, inertia=(1, 1, 1)), fb.Spherical("J", "ground", "b", at=(1, 2, 3)))
     r = still(m)
-    (joint,) = record(r).joints
+    (joint,) = record_motion(r).joints
     assert (joint.kind, joint.position) == ("strange", (1, 2, 3))
     assert r.html()
 
@@ -261,7 +261,7 @@ def test_symbols_are_smaller_on_slender_parts() -> None:
         fb.Body("bare", mass=1, inertia=(1, 1, 1)),
         fb.Revolute("J bare", "ground", "bare", at=(1, 0, 0), axis=(0, 0, 1)),
     )
-    scale = {j.name: j.scale for j in record(still(m)).joints}
+    scale = {j.name: j.scale for j in record_motion(still(m)).joints}
     assert scale == {"J slender": 0.5, "J stout": 1.0, "J bare": 1.0}
 
 
@@ -271,15 +271,15 @@ def test_curves_and_notes(result: Result, recording: Recording) -> None:
     assert set(recording.shown) <= set(names)
     assert recording.shown[0] == "motor.effort"
     assert recording.notes["freedoms"] == "0"
-    assert "slider/crank" in animation(result)
+    assert "slider/crank" in animation_html(result)
 
 
 def test_given_shapes_are_kept() -> None:
     m = fb.Mechanism("m")
     cone = fb.Cone(radius=1, height=2, position=(0, 0, 1), orientation=("180 deg", 0, 0))
     m.add(fb.Body("b", density=1, position=(5, 0, 0), shape=[cone, fb.Box(edges=(1, 2, 3), position=(1, 0, 0))]))
-    recording = record(still(m))
-    check(recording)
+    recording = record_motion(still(m))
+    check_recording(recording)
     drawn, box = recording.bodies[0].shapes
     assert np.allclose(drawn.position, [0, 0, 0])  # the middle of a cone that hangs from z = 1
     assert box.size == (1.0, 2.0, 3.0)
@@ -297,8 +297,8 @@ def test_bodies_in_space_get_rods_and_solids() -> None:
     for k, x in enumerate((8, 9, 10)):
         m.add(fb.Spherical(f"P{k}", "ground", "three", at=(x, k % 2, 0)))
     m.add(fb.Distance("wire", "free", "top", at=((0, 0, 0), (0, 0, 1))))
-    recording = record(still(m))
-    check(recording)
+    recording = record_motion(still(m))
+    check_recording(recording)
     shapes = {b.name: b.shapes for b in recording.bodies}
     top = {s.kind: s for s in shapes["top"]}
     assert "capsule" in top
@@ -318,7 +318,7 @@ def test_a_lone_body_looks_like_its_inertia() -> None:
     m = fb.Mechanism("m")
     m.add(fb.Body("free", mass=12, inertia=(5, 10, 13)), fb.Body("ball", mass=1, inertia=(0.4, 0.4, 0.4)))
     m.add(fb.Body("disc", mass=1, inertia=(0.25, 0.25, 0.5)), fb.Body("point", mass=1, inertia=0))
-    box, ball, disc, point = (b.shapes[0] for b in record(still(m)).bodies)
+    box, ball, disc, point = (b.shapes[0] for b in record_motion(still(m)).bodies)
     assert box.kind == "box"
     assert np.allclose(sorted(box.size), [1, 2, 3])
     assert ball.kind == "sphere"
@@ -330,8 +330,8 @@ def test_a_lone_body_looks_like_its_inertia() -> None:
 
 
 def test_long_motions_are_thinned_and_big_mechanisms_show_a_selection() -> None:
-    assert (kept(2500) == np.arange(2500)).all()
-    few = kept(100_001)
+    assert (thinned_times(2500) == np.arange(2500)).all()
+    few = thinned_times(100_001)
     assert len(few) == 2000
     assert few[0] == 0
     assert few[-1] == 100_000
@@ -339,33 +339,33 @@ def test_long_motions_are_thinned_and_big_mechanisms_show_a_selection() -> None:
     for k in range(60):
         m.add(fb.Body(f"b{k}", mass=1, inertia=1 / 12, position=(k + 0.5, 0)))
         m.add(fb.Revolute(f"J{k}", f"b{k - 1}" if k else "ground", f"b{k}", at=(k, 0)))
-    recording = record(still(m))
-    check(recording)
+    recording = record_motion(still(m))
+    check_recording(recording)
     assert len(recording.channels) == 60
     assert recording.size == pytest.approx(1.0)
     assert np.allclose(sorted(ends(recording.bodies[-1].shapes[0]).tolist()), [[-0.5, 0, 0], [0.5, 0, 0]])
 
 
 def test_plots_are_written(result: Result, tmp_path: Path) -> None:
-    files = standard_plots(result, tmp_path)
+    files = write_standard_plots(result, tmp_path)
     assert [f.name for f in files] == ["energy.png", "coordinates.png", "paths.png", "reactions.png", "actuation.png"]
     assert all(f.stat().st_size > 5000 for f in files)
-    figure = plot(result, "slider.x", "rod.y", "motor")
+    figure = plot_curves(result, "slider.x", "rod.y", "motor")
     assert [ax.get_ylabel() for ax in figure.axes] == ["length [m]", "effort [N m]", "work [J]"]
     assert [line.get_label() for line in figure.axes[0].lines] == ["slider.x", "rod.y"]
     for suffix in ("svg", "pdf"):
-        assert plot(result, "A", path=tmp_path / f"a.{suffix}") is None
+        assert plot_curves(result, "A", path=tmp_path / f"a.{suffix}") is None
         assert (tmp_path / f"a.{suffix}").stat().st_size > 1000
 
 
 def test_wrong_plots_are_refused(result: Result, tmp_path: Path) -> None:
     with pytest.raises(fb.ModelError, match=r"has no curve 'q'; it has x, y"):
-        plot(result, "slider.q")
+        plot_curves(result, "slider.q")
     with pytest.raises(fb.ModelError, match=r"did you mean 'slider'"):
-        plot(result, "slidr")
+        plot_curves(result, "slidr")
     with pytest.raises(
         fb.ModelError, match=r"the ending '\.\w+' is not known here; it must be \.png or \.svg or \.pdf"
     ):
-        plot(result, path=tmp_path / "a.gif")
+        plot_curves(result, path=tmp_path / "a.gif")
     with pytest.raises(fb.ModelError, match=r"cannot write .*a\.png': there is no folder '.*no'; make it first"):
-        plot(result, path=tmp_path / "no" / "a.png")
+        plot_curves(result, path=tmp_path / "no" / "a.png")

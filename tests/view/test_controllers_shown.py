@@ -10,9 +10,9 @@ import pytest
 
 import flyball as fb
 from flyball.results.result import Result
-from flyball.view.animate import record
-from flyball.view.figures import figures
-from flyball.view.pictures import standard_pictures
+from flyball.view.animation import record_motion
+from flyball.view.figures import standard_figures
+from flyball.view.result_plots import standard_pictures
 from tests.control.slide import slide
 
 
@@ -24,7 +24,7 @@ def result() -> Result:
 
 
 def test_what_is_to_be_followed_stands_beside_what_follows(result: Result) -> None:
-    found = {f.name: f for f in figures(result)}["controllers"]
+    found = {f.name: f for f in standard_figures(result)}["controllers"]
     names = [[c.name for c in p.curves] for p in found.panels]
     assert ["pid.setpoint", "pid.measured"] in names
     outputs = [n for n in names if "pid.setpoint" not in n]
@@ -37,7 +37,7 @@ def test_what_is_to_be_followed_stands_beside_what_follows(result: Result) -> No
 
 
 def test_the_page_opens_with_them(result: Result) -> None:
-    shown = record(result).shown
+    shown = record_motion(result).shown
     assert shown[:4] == ("pid.setpoint", "pid.measured", "pid.output", "K.small")
     assert "A.displacement" not in shown  # which is pid.measured
     assert "energy.total" in shown
@@ -46,7 +46,7 @@ def test_the_page_opens_with_them(result: Result) -> None:
 def test_a_large_mechanism_offers_them() -> None:
     m = slide(fb.PID("pid", setpoint=1, measured="A.displacement", kp=1))
     m.add(*(fb.Body(f"b{k}", mass=1, inertia=1, position=(0.0, k + 1.0)) for k in range(60)))
-    names = [c.name for c in record(m.simulate(0.01, outputs=2)).channels]
+    names = [c.name for c in record_motion(m.simulate(0.01, outputs=2)).channels]
     assert {"pid.setpoint", "pid.measured", "pid.output"} <= set(names)
     assert "pid.error" not in names
 
@@ -75,7 +75,7 @@ def test_no_unit_no_brackets(result: Result, tmp_path: Path) -> None:
 def test_columns_of_the_report_end_together(result: Result) -> None:
     text = result.report()
     columns = [re.findall(r'<article id="plot-(\w+)"', part) for part in text.split('<div class="column">')[1:]]
-    chosen = figures(result)
+    chosen = standard_figures(result)
     assert len(columns) == 2
     assert sorted(k for column in columns for k in column) == sorted(f.name for f in chosen)
     assert columns[0][0] == "energy"

@@ -8,9 +8,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flyball.view.packing import NARROW, WIDE, orientations, positions, rooted
-from flyball.view.page import page
-from flyball.view.payload import payload
+from flyball.view.page import (
+    RANGE_16_BIT,
+    RANGE_32_BIT,
+    animation_page,
+    pack_forces,
+    pack_orientations,
+    pack_positions,
+    pack_recording,
+)
 from flyball.view.recording import RecordedBody, RecordedContacts, RecordedSet, Recording, Shape
 from tests.view.conftest import Opened
 
@@ -49,8 +55,8 @@ def summed(changes: np.ndarray, n: int, m: int, width: int) -> np.ndarray:
 def test_packed_positions_come_back_to_a_thousandth_of_a_body():
     p = rolling().sets[0].p.copy()
     p[40:, 7] = np.nan
-    changes, about = positions(p, RADIUS)
-    grid = summed(changes, *p.shape[:2], NARROW if about["type"] == "u2" else WIDE)
+    changes, about = pack_positions(p, RADIUS)
+    grid = summed(changes, *p.shape[:2], RANGE_16_BIT if about["type"] == "u2" else RANGE_32_BIT)
     back = np.array(about["low"]) + about["step"] * grid
     there = np.isfinite(p).all(axis=2)
     assert np.abs(back - p)[there].max() <= 0.5 * 1e-3 * RADIUS * (1 + 1e-9)
@@ -60,9 +66,9 @@ def test_packed_positions_come_back_to_a_thousandth_of_a_body():
 
 def test_far_apart_bodies_get_wider_numbers():
     p = np.array([[[0.0, 0, 0], [1e4, 0, 0]], [[0.0, 0, -5e3], [1e4, 3.0, 0]]])
-    changes, about = positions(p, RADIUS)
+    changes, about = pack_positions(p, RADIUS)
     assert about["type"] == "u4"
-    back = np.array(about["low"]) + about["step"] * summed(changes, 2, 2, WIDE)
+    back = np.array(about["low"]) + about["step"] * summed(changes, 2, 2, RANGE_32_BIT)
     np.testing.assert_allclose(back, p, atol=1e-3 * RADIUS)
 
 
@@ -71,8 +77,8 @@ def test_packed_orientations_come_back():
     q = rng.normal(size=(5, 400, 4))
     q /= np.sqrt((q * q).sum(axis=2, keepdims=True))
     q[0, 0], q[1, 0] = (1, 0, 0, 0), (0, 1, 0, 0)  # none, and half a turn
-    grid = summed(orientations(q), 5, 400, NARROW)
-    turn = np.where(grid >= NARROW // 2, grid - NARROW, grid) * (2 * np.pi / (NARROW - 1))
+    grid = summed(pack_orientations(q), 5, 400, RANGE_16_BIT)
+    turn = np.where(grid >= RANGE_16_BIT // 2, grid - RANGE_16_BIT, grid) * (2 * np.pi / (RANGE_16_BIT - 1))
     angle = np.sqrt((turn**2).sum(axis=2))
     back = np.concatenate([np.cos(angle / 2)[..., None], np.sinc(angle / 2 / np.pi)[..., None] * turn / 2], axis=2)
     assert (1 - np.abs((back * q).sum(axis=2))).max() < 1e-8  # 1 - cos(angle / 2) of 2e-4 rad
@@ -80,15 +86,15 @@ def test_packed_orientations_come_back():
 
 def test_packed_forces_keep_small_ones():
     f = np.array([[1000.0, 0, 0], [0, -1.0, 0], [0, 0, 0.01]])
-    packed, largest = rooted(f)
+    packed, largest = pack_forces(f)
     root = packed / 32767 - 1
     np.testing.assert_allclose(np.sign(root) * root**2 * largest, f, rtol=0.02, atol=1e-5)
 
 
 def test_a_thousand_balls_for_two_seconds_are_a_small_page():
-    assert len(page(rolling())) < 2.5e6
-    bare = len(payload(dataclasses.replace(rolling(), sets=())))
-    assert len(payload(rolling())) - bare < 18.1 * 60_000  # bytes a pose, before compression
+    assert len(animation_page(rolling())) < 2.5e6
+    bare = len(pack_recording(dataclasses.replace(rolling(), sets=())))
+    assert len(pack_recording(rolling())) - bare < 18.1 * 60_000  # bytes a pose, before compression
 
 
 @pytest.mark.parametrize("flat", [False, True])
@@ -98,7 +104,7 @@ def test_members_stand_where_the_recording_says(opened: Open, flat: bool) -> Non
     p[10:, 3] = np.nan
     other = dataclasses.replace(recording.sets[0], p=p, scale=np.linspace(0.5, 1.0, 30))
     recording = dataclasses.replace(recording, sets=(other,))
-    tab = opened(page(recording))
+    tab = opened(animation_page(recording))
     for k in (0, 13, 20):
         shown = np.array(tab.evaluate("(t) => (flyball.seek(t), flyball.poses('balls'))", float(recording.t[k])))
         there = np.isfinite(p[k]).all(axis=1)
@@ -115,7 +121,7 @@ def test_members_stand_where_the_recording_says(opened: Open, flat: bool) -> Non
 def test_a_thousand_take_as_many_commands_as_ten(opened: Open) -> None:
     calls = []
     for m in (10, 1000):
-        tab = opened(page(rolling(m)))
+        tab = opened(animation_page(rolling(m)))
         tab.evaluate("flyball.seek(1)")
         tab.settle()
         calls.append(tab.evaluate("flyball.drawn().calls"))
@@ -123,7 +129,7 @@ def test_a_thousand_take_as_many_commands_as_ten(opened: Open) -> None:
 
 
 def test_members_have_names_and_can_be_chosen(opened: Open) -> None:
-    tab = opened(page(rolling(16)))
+    tab = opened(animation_page(rolling(16)))
     x, y = tab.evaluate("flyball.pixel('balls[5]')")
     assert tab.evaluate("([x, y]) => flyball.pick(x, y)", [x, y]) == "balls[5]"
     tab.evaluate("flyball.select('balls[5]')")
@@ -150,7 +156,7 @@ def pressed(flat: bool = False) -> Recording:
 @pytest.mark.parametrize("flat", [False, True])
 def test_contact_forces_are_arrows_where_and_as_large_as_recorded(opened: Open, flat: bool) -> None:
     recording = pressed(flat)
-    tab = opened(page(recording), "t=0.5")
+    tab = opened(animation_page(recording), "t=0.5")
     shown = tab.evaluate("flyball.contacts()")
     assert [a["state"] for a in shown] == ["stick", "slip"]
     contacts = recording.contacts
@@ -169,10 +175,10 @@ def test_incomplete_sets_and_contacts_are_refused():
     s = r.sets[0]
     for wrong in ({"q": s.q[:, :3]}, {"p": s.p[:4]}, {"scale": np.zeros(4)}, {"shapes": ()}):
         with pytest.raises(ValueError, match="set 'balls'"):
-            payload(dataclasses.replace(r, sets=(dataclasses.replace(s, **wrong),)))
+            pack_recording(dataclasses.replace(r, sets=(dataclasses.replace(s, **wrong),)))
     c = pressed().contacts
     assert c is not None
     with pytest.raises(ValueError, match="contacts"):
-        payload(dataclasses.replace(pressed(), contacts=dataclasses.replace(c, begin=c.begin[1:])))
+        pack_recording(dataclasses.replace(pressed(), contacts=dataclasses.replace(c, begin=c.begin[1:])))
     with pytest.raises(ValueError, match="two bodies are named 'balls'"):
-        payload(dataclasses.replace(r, sets=(s, s)))
+        pack_recording(dataclasses.replace(r, sets=(s, s)))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.view.animate import record
-from flyball.view.payload import check
+from flyball.view.animation import record_motion
+from flyball.view.page import check_recording
 from flyball.view.recording import RecordedJoint, Recording
 from tests.view.test_animate import turned
 
@@ -20,8 +20,8 @@ def body(name: str, position: tuple[float, ...], **more: object) -> fb.Body:
 
 
 def moved(m: fb.Mechanism, t_end: float = 2.0) -> Recording:
-    recording = record(m.simulate(t_end, outputs=41))
-    check(recording)
+    recording = record_motion(m.simulate(t_end, outputs=41))
+    check_recording(recording)
     return recording
 
 
@@ -184,8 +184,8 @@ def test_a_rope_runs_over_its_points_and_knows_its_length() -> None:
     at = ((0, 1), (0.5, 0), (1, 1))
     m.add(fb.Rope("rope", bodies=("ground", "load", "ground"), at=at, stiffness=2000, damping=1, length=2.3))
     result = m.simulate(2.0, outputs=101)
-    r = record(result)
-    check(r)
+    r = record_motion(result)
+    check_recording(r)
     (line,) = r.lines
     assert line.kind == "rope"
     assert len(line.points) == 3
@@ -213,8 +213,8 @@ def test_springs_along_coordinates() -> None:
     m.add(body("arm", (2, 0)), fb.Revolute("B", "ground", "arm", at=(1, 0)))
     m.add(fb.TorsionalSpringDamper("coil", "B", stiffness=20), fb.Actuator("push", "A.displacement", force=3))
     result = m.simulate(1.0, outputs=41)
-    r = record(result)
-    check(r)
+    r = record_motion(result)
+    check_recording(r)
     lines = {line.name: line for line in r.lines}
     assert {k: line.kind for k, line in lines.items()} == {"s": "spring", "d": "damper"}
     foot, end = lines["s"].points
@@ -290,8 +290,8 @@ def test_every_joint_has_its_symbol(name: str) -> None:
     element, wanted = joints()[name]
     m = fb.Mechanism("m")
     m.add(fb.Body("b", mass=1, inertia=(1, 1, 1), position=(0.3, 0, 0)), element)
-    recording = record(still(m))
-    check(recording)
+    recording = record_motion(still(m))
+    check_recording(recording)
     assert {(j.kind, j.body) for j in recording.joints} == wanted
 
 
@@ -310,21 +310,21 @@ def test_couplers_are_not_drawn_and_slots_reach_as_far_as_their_pin() -> None:
 
 
 def test_sensors_are_shown_first_and_listed() -> None:
-    from flyball.view.figures import figures
-    from flyball.view.tables import tables
+    from flyball.view.figures import standard_figures
+    from flyball.view.report import report_tables
 
     m = fb.Mechanism("m", planar=True, gravity=(0, -10))
     m.add(body("b", (1, 0)), fb.Revolute("A", "ground", "b", at=(0, 0)), fb.Sensor("height", "b.y"), fb.IMU("imu", "b"))
     result = m.simulate(1.0, outputs=21)
-    recording = record(result)
-    check(recording)
+    recording = record_motion(result)
+    check_recording(recording)
     assert recording.shown[0] == "height.value"
     assert recording.facts["height"] == ("Sensor", "of b.y")
-    drawn = {f.name: f for f in figures(result)}["sensors"]
+    drawn = {f.name: f for f in standard_figures(result)}["sensors"]
     curves = {c.name: c.values for p in drawn.panels for c in p.curves}
     assert np.array_equal(curves["height"], result["b.y"])
     assert set(curves) == {"height", "imu.fx", "imu.fy", "imu.w"}
-    listed = {t.name: t for t in tables(result)}["sensors"].rows
+    listed = {t.name: t for t in report_tables(result)}["sensors"].rows
     assert listed[0] == ("height", "Sensor", "of b.y", "value", f"{result['b.y'].min():.4g}", "0", "m")
 
 
@@ -344,5 +344,5 @@ def test_what_acts_along_a_coordinate_is_an_arrow(kind):
     m.add(fb.Body("a", mass=1, inertia=0.1), fb.Body("b", mass=2, inertia=0.1, position=(1, 0), velocity=(1, 0)))
     m.add(fb.Revolute("R", "ground", "a", at=(0, 0)), fb.Translational("S", "ground", "b", at=(1, 0), axis=(1, 0)))
     m.add(ALONG[kind]())
-    found = [a for a in record(m.simulate(0.1, outputs=3)).arrows if a.name == "f"]
+    found = [a for a in record_motion(m.simulate(0.1, outputs=3)).arrows if a.name == "f"]
     assert [a.what for a in found] == ["moment" if "planar body" in kind else "force"]

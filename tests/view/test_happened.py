@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion.events.told import FREE_WORDS, HELD_WORDS, PLACE_WORDS, ROPE_WORDS
-from flyball.results.kinds import HAPPENED
-from flyball.view.animate import record
-from flyball.view.edged import edged
-from flyball.view.figures import figures
-from flyball.view.report import report
-from flyball.view.tables import tables
+from flyball.results.wording import EVENT_KINDS
+from flyball.simulation.events.event_messages import CLOSING_WORDS, CONTACT_WORDS, OPENING_WORDS, ROPE_WORDS
+from flyball.view.animation import record_motion
+from flyball.view.figures import standard_figures
+from flyball.view.motion_with_events import motion_with_event_states
+from flyball.view.report import report_html, report_tables
 from tests.program.test_cli import Said
 
 
@@ -28,7 +27,7 @@ def ball(bounce: float = 0.5) -> fb.Mechanism:
 
 
 def by_name(result: fb.Result) -> dict:
-    return {t.name: t for t in tables(result)}
+    return {t.name: t for t in report_tables(result)}
 
 
 def test_few_events_are_listed():
@@ -60,7 +59,7 @@ def test_many_events_are_counted_and_folded():
     assert len(listed.rows) == 201
     assert listed.rows[150][1] == "114 more"
     assert listed.rows[-1][0] == f"{r.events.t[-1]:.6g}"
-    page = report(r)
+    page = report_html(r)
     assert '<a href="#table-events">Events</a>' in page
     assert "#table-all-events" not in page.split("<nav")[1].split("</nav>")[0]
     assert "<details><summary>All 314 in the order of time</summary>" in page
@@ -89,7 +88,7 @@ def test_an_end_by_an_event_is_told_everywhere(tmp_path: Path, monkeypatch: pyte
     assert r.health.ended_early
     assert said in repr(r)
     assert dict(r.health.lines())["status"] == said
-    page = report(r)
+    page = report_html(r)
     assert f'<p class="verdict early" role="status">The run {said.replace(chr(39), "&#x27;")}.</p>' in page
     assert "reached its end" not in page
     r.save("r.nc")
@@ -131,7 +130,7 @@ def test_what_was_not_locked_is_not_released():
 def test_jumps_are_upright_and_forces_broken():
     """The ball hits at 0.5 s with 5 m/s: 25 J before, 6.25 J after, at one time; its weight's support is known later."""
     r = ball().simulate(2.4, outputs=25)
-    whole = edged(r)
+    whole = motion_with_event_states(r)
     at = np.flatnonzero(whole.t == r.events["floor"].t[0])
     assert whole.t[at] == pytest.approx([0.5, 0.5], abs=1e-12)
     assert whole["b.vy"][at] == pytest.approx([-5, 2.5], abs=1e-9)
@@ -155,7 +154,7 @@ def test_jumps_of_parameters_and_of_files(tmp_path: Path):
     r = m.simulate(1, outputs=11)
     r.save(tmp_path / "r.nc")
     for run in (r, fb.load_result(tmp_path / "r.nc")):
-        whole = edged(run)
+        whole = motion_with_event_states(run)
         assert whole.t[6:8] == pytest.approx([0.55, 0.55], abs=1e-12)
         assert whole["s.energy"][5:9] == pytest.approx([4, 4, 8, 8], abs=1e-12)
         assert np.abs(whole.energy.balance).max() < 1e-12
@@ -171,14 +170,14 @@ def test_names_of_marks_are_written_once():
 def test_jumps_on_the_page_are_upright():
     """The recording of a page has both sides of each impact: -5 and 2.5 m/s at 0.5 s, and its poses and times fit."""
     r = ball().simulate(2.4, outputs=25)
-    shown = record(r)
+    shown = record_motion(r)
     at = np.flatnonzero(shown.t == r.events["floor"].t[0])
     (vy,) = (c.values for c in shown.channels if c.name == "b.vy")
     assert vy[at] == pytest.approx([-5, 2.5], abs=1e-9)
     assert shown.bodies[0].p[at, 1] == pytest.approx([0, 0], abs=1e-12)
     assert len(shown.t) == len(r.t) + 2 * len(r.events["impact"])
     assert all(np.isfinite(a.vector).all() for a in shown.arrows)
-    page = report(r)
+    page = report_html(r)
     assert len(page) > 100_000
 
 
@@ -187,7 +186,7 @@ def test_jumps_beside_an_output_time():
     m = fb.Mechanism("m", planar=True, parameters={"lift": 8})
     m.add(fb.Body("b", mass=1, inertia=2), fb.Revolute("A", "ground", "b", at=(0, 0)))
     m.add(fb.Motor("motor", "A", torque="lift*step(t, 0, 1, 2, 1)"), fb.Event("off", "t > 2 s", do=fb.Set("lift", 0)))
-    whole = edged(m.simulate(4, outputs=101))
+    whole = motion_with_event_states(m.simulate(4, outputs=101))
     falls = np.flatnonzero(np.diff(whole["motor.torque"]) < -1.0)
     assert len(falls) == 1
     assert whole.t[falls + 1] - whole.t[falls] == pytest.approx([0.0], abs=1e-12)
@@ -199,7 +198,7 @@ def test_what_jumps_not_is_not_broken():
     m.add(fb.Event("half", "t - 0.25", do=[fb.Note("on the way")]))
     r = m.simulate(0.45, outputs=10)
     assert len(r.events) == 1
-    assert len(edged(r).t) == 10
+    assert len(motion_with_event_states(r).t) == 10
 
 
 def test_parameters_that_events_set():
@@ -233,14 +232,14 @@ def test_what_is_there_and_never_happened_is_an_empty_list():
 
 
 def test_kinds_of_what_happens():
-    spoken = [*HELD_WORDS.values(), *FREE_WORDS.values(), *ROPE_WORDS.values(), *PLACE_WORDS.values()]
-    assert {kind for kind, _ in spoken if kind} <= HAPPENED
+    spoken = [*CLOSING_WORDS.values(), *OPENING_WORDS.values(), *ROPE_WORDS.values(), *CONTACT_WORDS.values()]
+    assert {kind for kind, _ in spoken if kind} <= EVENT_KINDS
 
 
 def test_warnings_are_at_the_top():
     m = ball()
     m.add(fb.Event("down", "b.y < 3", do=fb.Stop()))
-    page = report(m.simulate(0.3))
+    page = report_html(m.simulate(0.3))
     assert '<p class="verdict early" role="status">The run reached its end; 1 warning.</p>' in page
     assert page.index("never happened") < page.index("<dl class='cards'>")
 
@@ -258,5 +257,5 @@ def test_couplings_are_told():
     rows = {row[0]: row for row in by_name(r)["joints"].rows}
     assert rows["winding"][6:8] == ("20", "10")
     assert rows["axle"][6] == "30"
-    drawn = {c.name for f in figures(r) if f.name == "actuation" for p in f.panels for c in p.curves}
+    drawn = {c.name for f in standard_figures(r) if f.name == "actuation" for p in f.panels for c in p.curves}
     assert {"winding.effort_1", "winding.effort_2"} <= drawn

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.results.events import Happening
-from flyball.view.animate import record
-from flyball.view.mark_names import LETTER, placed
-from flyball.view.marks import LINES, marks
+from flyball.results.events import EventRecord
+from flyball.view.animation import record_motion
+from flyball.view.event_marks import LETTER_WIDTH, MAX_MARK_LINES, event_marks, place_names
 
 
 @pytest.fixture(scope="module")
@@ -23,20 +22,20 @@ def run():
 
 
 def few():
-    return [Happening(0.2, "hit", "impact"), Happening(0.2, "open", "event"), Happening(0.6, "hit", "impact")]
+    return [EventRecord(0.2, "hit", "impact"), EventRecord(0.2, "open", "event"), EventRecord(0.6, "hit", "impact")]
 
 
 def test_what_is_close_together_is_one_mark(run):
-    run.events = [*few(), Happening(0.601, "hit", "impact")]
-    assert [(m.t, m.text, m.line) for m in marks(run)] == [(0.2, "open, hit", True), (0.6, "hit ×2", True)]
-    assert [m.label for m in marks(run)] == ["open, hit ×3", ""]  # each name once, with how often in all
+    run.events = [*few(), EventRecord(0.601, "hit", "impact")]
+    assert [(m.t, m.text, m.line) for m in event_marks(run)] == [(0.2, "open, hit", True), (0.6, "hit ×2", True)]
+    assert [m.label for m in event_marks(run)] == ["open, hit ×3", ""]  # each name once, with how often in all
     run.events = ()
-    assert marks(run) == ()
+    assert event_marks(run) == ()
 
 
 def test_of_very_many_only_seldom_ones_are_lines(run):
-    run.events = sorted([*few(), *(Happening(t, "tick", "event") for t in np.linspace(0, 1, 400))], key=lambda h: h.t)
-    every = marks(run)
+    run.events = sorted([*few(), *(EventRecord(t, "tick", "event") for t in np.linspace(0, 1, 400))], key=lambda h: h.t)
+    every = event_marks(run)
     assert len(every) < 260
     assert [m.text.split(",")[0] for m in every if m.line] == ["open", "hit"]
 
@@ -53,7 +52,7 @@ def test_plots_have_lines_and_names(run):
     first.figure.draw_without_rendering()
     assert written[0].get_window_extent().y0 > first.get_window_extent().y1  # above the curves
     assert not second.texts
-    run.events = [Happening(t, "tick", "event") for t in np.linspace(0, 1, LINES + 10)]
+    run.events = [EventRecord(t, "tick", "event") for t in np.linspace(0, 1, MAX_MARK_LINES + 10)]
     ax = run.plot("A.rate").axes[0]
     assert not ax.texts
     heights = [s[0][1] for c in ax.collections for s in c.get_segments()]
@@ -62,24 +61,24 @@ def test_plots_have_lines_and_names(run):
 
 def clock():
     """Names of two events that alternate, one that happens once between them, and stops that happen most often."""
-    ticks = [Happening(t, "tick" if k % 2 else "tock", "event") for k, t in enumerate(np.linspace(0.05, 0.95, 10))]
-    stops = [Happening(t, "stop", "impact") for t in np.linspace(0.02, 0.98, 17)]
-    return sorted([*ticks, *stops, Happening(0.31, "too fast", "event")], key=lambda h: h.t)
+    ticks = [EventRecord(t, "tick" if k % 2 else "tock", "event") for k, t in enumerate(np.linspace(0.05, 0.95, 10))]
+    stops = [EventRecord(t, "stop", "impact") for t in np.linspace(0.02, 0.98, 17)]
+    return sorted([*ticks, *stops, EventRecord(0.31, "too fast", "event")], key=lambda h: h.t)
 
 
 def test_every_name_is_written_where_there_is_room(run):
     run.events = clock()
-    found = [m for m in marks(run) if m.label]
+    found = [m for m in event_marks(run) if m.label]
     assert {m.label for m in found} == {"tick ×5", "tock ×5", "too fast", "stop ×17"}
     assert min(found, key=lambda m: m.rank).label == "too fast"  # the most seldom first
     width = 400.0
-    names = placed(found, [width * m.t for m in found], width)
+    names = place_names(found, [width * m.t for m in found], width)
     assert len(names) == 4
     for a, b in itertools.permutations(names, 2):  # no line goes up through a name, no two names overlap
-        ends = sorted((width * a.mark.t, width * a.mark.t + (1 if a.right else -1) * LETTER * len(a.mark.label)))
+        ends = sorted((width * a.mark.t, width * a.mark.t + (1 if a.right else -1) * LETTER_WIDTH * len(a.mark.label)))
         if b.lane >= a.lane:
             assert not ends[0] < width * b.mark.t < ends[1]
-    narrow = placed(found, [10.0 * m.t + 60.0 for m in found], 130.0)
+    narrow = place_names(found, [10.0 * m.t + 60.0 for m in found], 130.0)
     assert "too fast" in {n.mark.label for n in narrow}
 
 
@@ -87,7 +86,7 @@ def test_marks_on_the_page_s_plots(run, browser, tmp_path):
     """A mark on a gridline is seen, in a colour that is neither the grid's nor the cursor's, and named when pointed at."""
     from tests.view.conftest import Opened
 
-    run.events = [Happening(0.5, "half way", "event")]
+    run.events = [EventRecord(0.5, "half way", "event")]
     run.to_html(tmp_path / "page.html")
     page = Opened(browser, (tmp_path / "page.html").as_uri() + "#t=0&theme=light")
     area = page.tab.locator(".plot .u-over").first
@@ -122,7 +121,7 @@ def test_the_bar_of_the_page_tells_and_goes_there(run, browser, tmp_path):
     from tests.view.conftest import Opened
 
     run.events = few()
-    assert [m.t for m in record(run).marks] == [0.2, 0.6]
+    assert [m.t for m in record_motion(run).marks] == [0.2, 0.6]
     run.to_html(tmp_path / "page.html")
     page = Opened(browser, (tmp_path / "page.html").as_uri() + "#t=0")
     ticks = page.tab.locator(".bar .event")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.view.meshes import simplified
+from flyball.view.body_shapes import simplify_mesh
 
 
 def box(n: int, edges: tuple[float, float, float] = (2.0, 1.0, 0.5)) -> tuple[np.ndarray, np.ndarray]:
@@ -31,7 +31,7 @@ def volume(vertices: np.ndarray, triangles: np.ndarray) -> float:
 
 def test_a_small_mesh_keeps_its_form_and_loses_what_is_double() -> None:
     v, t = box(4)
-    points, triangles = simplified(v, t, 1000)
+    points, triangles = simplify_mesh(v, t, 1000)
     assert len(triangles) == len(t) == 192
     assert len(points) == 98  # corners, edges and faces of the grids, shared: 6 * 25 - 12 * 5 + 8
     assert volume(points, triangles) == pytest.approx(1.0)
@@ -39,7 +39,7 @@ def test_a_small_mesh_keeps_its_form_and_loses_what_is_double() -> None:
 
 def test_a_large_mesh_becomes_small_and_keeps_volume_edges_and_orientation() -> None:
     v, t = box(60)
-    points, triangles = simplified(v, t, 2000)
+    points, triangles = simplify_mesh(v, t, 2000)
     assert 200 < len(triangles) <= 2000
     assert volume(points, triangles) == pytest.approx(1.0, rel=0.01)
     # the planes of the faces draw points to edges and corners: no rounding off
@@ -51,7 +51,7 @@ def test_a_large_mesh_becomes_small_and_keeps_volume_edges_and_orientation() -> 
 
 def test_only_what_is_used_is_kept_and_empty_triangles_go() -> None:
     v = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5], [0, 0, 0]], float)
-    points, triangles = simplified(v, np.array([[0, 1, 2], [0, 4, 1], [2, 0, 1], [1, 2, 2]]), 10)
+    points, triangles = simplify_mesh(v, np.array([[0, 1, 2], [0, 4, 1], [2, 0, 1], [1, 2, 2]]), 10)
     assert len(points) == 3
     assert len(triangles) == 1
     assert np.allclose(np.cross(*(points[triangles[0, k]] - points[triangles[0, 0]] for k in (1, 2))), [0, 0, 1])

@@ -10,7 +10,7 @@ import pytest
 
 import flyball as fb
 from flyball.results.modes import Modes
-from flyball.view.modes import page
+from flyball.view.mode_animation import modes_page
 from tests.view.conftest import Opened
 
 Open = Callable[..., Opened]
@@ -46,7 +46,7 @@ def where(tab: Opened, part: float) -> np.ndarray:
 
 
 def test_bodies_swing_along_the_mode(opened: Open, two: Modes) -> None:
-    tab = opened(page(two, amplitude=0.05), "mode=1&play=0")
+    tab = opened(modes_page(two, amplitude=0.05), "mode=1&play=0")
     assert tab.evaluate("flyball.mode()") == "1"
     golden = (1 + math.sqrt(5)) / 2  # B moves as much as A times it, or A as much as B times it the other way
     for k, ratio in ((0, golden), (1, -1 / golden)):
@@ -62,7 +62,7 @@ def test_bodies_swing_along_the_mode(opened: Open, two: Modes) -> None:
 
 
 def test_frequencies_and_damping_are_listed(opened: Open, two: Modes) -> None:
-    tab = opened(page(two), "play=0")
+    tab = opened(modes_page(two), "play=0")
     rows = tab.locator(".modes > table:first-child tbody tr").all_inner_texts()
     said = [row.split() for row in rows]
     assert [float(row[1]) for row in said] == pytest.approx(two.frequency, rel=1e-3)
@@ -73,7 +73,7 @@ def test_frequencies_and_damping_are_listed(opened: Open, two: Modes) -> None:
 
 
 def test_amplitude_and_keys(opened: Open, two: Modes) -> None:
-    tab = opened(page(two), "play=0")
+    tab = opened(modes_page(two), "play=0")
     before = where(tab, 0.0) - [1.0, 2.0]
     tab.evaluate(
         "const a = document.querySelector('[name=amplitude]'); a.value = 3; a.dispatchEvent(new Event('input'))"
@@ -92,7 +92,7 @@ def test_amplitude_and_keys(opened: Open, two: Modes) -> None:
 def test_unstable_ones_are_flagged_and_rigid_ones_come_last(opened: Open) -> None:
     modes = upright().modes()
     assert sorted(modes.kinds) == ["decay", "decay", "rigid", "unstable", "unstable"]
-    tab = opened(page(modes, count=4), "play=0")
+    tab = opened(modes_page(modes, count=4), "play=0")
     kinds = tab.locator(".modes .kind").all_inner_texts()
     assert sorted(kinds) == ["decay", "decay", "unstable", "unstable"]
     assert tab.locator(".modes tr.unstable").count() == 2
@@ -113,11 +113,11 @@ def test_unstable_ones_are_flagged_and_rigid_ones_come_last(opened: Open) -> Non
 
 def test_what_cannot_be_shown_is_refused(two: Modes) -> None:
     with pytest.raises(fb.ModelError, match="amplitude and count must be greater than 0"):
-        page(two, amplitude=0.0)
+        modes_page(two, amplitude=0.0)
     held = carts()
     held.add(fb.Driver("a", "on A.displacement", "0"), fb.Driver("b", "on B.displacement", "0"))
     with pytest.raises(fb.ModelError, match="has no modes to show"):
-        page(held.modes())
+        modes_page(held.modes())
 
 
 def test_a_state_is_a_result_that_says_what_it_is(two: Modes) -> None:

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flyball.view.notebook import iframe
-from flyball.view.page import page
+from flyball.view.page import animation_page, notebook_iframe
 from flyball.view.recording import Recording
 from tests.view.conftest import Opened
 from tests.view.recordings import NASTY, loaded, nasty, planar, spatial
@@ -41,7 +40,7 @@ def between(recording: Recording, time: float) -> np.ndarray:
 @pytest.mark.parametrize("make", [planar, spatial, loaded])
 def test_objects_stand_where_the_recording_says(opened: Open, make: Callable[[], Recording]) -> None:
     recording = make()
-    tab = opened(page(recording))
+    tab = opened(animation_page(recording))
     t = recording.t
     for time in (t[0], t[7], t[20], t[-1], 0.3 * t[20] + 0.7 * t[21], 0.5 * (t[38] + t[39])):
         shown, wanted = tab.poses(time), between(recording, time)
@@ -54,7 +53,7 @@ def test_objects_stand_where_the_recording_says(opened: Open, make: Callable[[],
 
 
 def test_picture_is_not_empty_and_follows_the_time(opened: Open) -> None:
-    tab = opened(page(planar()))
+    tab = opened(animation_page(planar()))
     shots = []
     for time in (0.0, 0.8):
         tab.evaluate("(t) => flyball.seek(t)", time)
@@ -66,7 +65,7 @@ def test_picture_is_not_empty_and_follows_the_time(opened: Open) -> None:
 
 def test_plots_follow_the_time_and_lead_it(opened: Open) -> None:
     recording = planar()
-    tab = opened(page(recording), "t=1")
+    tab = opened(animation_page(recording), "t=1")
     assert tab.locator(".plot").count() == 2
     assert tab.locator(".plot .value").first.inner_text() == f"{np.sin(2.0):.4g}"
     before = tab.locator(".plot .cursor").first.bounding_box()["x"]
@@ -77,7 +76,7 @@ def test_plots_follow_the_time_and_lead_it(opened: Open) -> None:
 
 
 def test_channels_are_found_by_search(opened: Open) -> None:
-    tab = opened(page(spatial()))
+    tab = opened(animation_page(spatial()))
     tab.click(".pick")
     tab.fill("input[type=search]", "signal 117")
     tab.check(".choice input")
@@ -88,7 +87,7 @@ def test_channels_are_found_by_search(opened: Open) -> None:
 
 
 def test_playing_moves_the_time(opened: Open) -> None:
-    tab = opened(page(planar()), "t=0.5")
+    tab = opened(animation_page(planar()), "t=0.5")
     assert not tab.evaluate("flyball.playing()")
     tab.keyboard.press("Space")
     tab.wait_until(lambda: tab.time > 0.7)
@@ -102,7 +101,7 @@ def test_playing_moves_the_time(opened: Open) -> None:
 
 
 def test_a_body_can_be_hidden_and_traced(opened: Open) -> None:
-    tab = opened(page(planar()))
+    tab = opened(animation_page(planar()))
     before = tab.locator(".stage").screenshot()
     tab.locator(".legend li").nth(1).hover()
     eye = tab.get_by_role("button", name="Show block", exact=True)
@@ -117,7 +116,7 @@ def test_a_body_can_be_hidden_and_traced(opened: Open) -> None:
 
 
 def test_address_gives_time_and_theme(opened: Open) -> None:
-    tab = opened(page(spatial()), "t=1.25&theme=dark&view=top")
+    tab = opened(animation_page(spatial()), "t=1.25&theme=dark&view=top")
     assert tab.time == 1.25
     assert tab.evaluate("document.documentElement.dataset.theme") == "dark"
     tab.click(".theme")
@@ -125,7 +124,7 @@ def test_address_gives_time_and_theme(opened: Open) -> None:
 
 
 def test_names_of_the_user_stay_text(opened: Open) -> None:
-    tab = opened(page(nasty()))
+    tab = opened(animation_page(nasty()))
     assert tab.evaluate("window.hacked") is None
     assert tab.title() == NASTY
     assert tab.locator("h1").inner_text() == NASTY
@@ -138,7 +137,7 @@ def test_names_of_the_user_stay_text(opened: Open) -> None:
 
 def test_without_webgl_the_rest_works(opened: Open) -> None:
     recording = planar()
-    tab = opened(page(recording), "t=1", NO_WEBGL)
+    tab = opened(animation_page(recording), "t=1", NO_WEBGL)
     assert "WebGL" in tab.locator(".message").inner_text()
     np.testing.assert_allclose(tab.poses(recording.t[30])[:, :3], [body.p[30] for body in recording.bodies], atol=1e-5)
     area = tab.locator(".plot .u-over").first.bounding_box()
@@ -149,7 +148,7 @@ def test_without_webgl_the_rest_works(opened: Open) -> None:
 
 def test_a_notebook_frame_runs_the_page(browser: Any, tmp_path: Path) -> None:
     path = tmp_path / "notebook.html"
-    path.write_text(f"<!doctype html><body>{iframe(page(planar()), 500)}</body>", encoding="utf-8")
+    path.write_text(f"<!doctype html><body>{notebook_iframe(animation_page(planar()), 500)}</body>", encoding="utf-8")
     tab = browser.new_page(offline=True)
     tab.goto(path.as_uri())
     frame = tab.frame_locator("iframe")

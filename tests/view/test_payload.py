@@ -11,15 +11,14 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from flyball.view.page import MODULES, page
-from flyball.view.payload import payload
+from flyball.view.page import PLAYER_MODULES, animation_page, pack_recording
 from flyball.view.recording import RecordedArrow, RecordedJoint, RecordedPath, Shape
 from tests.view.recordings import loaded, planar, spatial
 
 
 def test_numbers_come_back_from_the_block() -> None:
     recording = spatial()
-    data = payload(recording)
+    data = pack_recording(recording)
     (length,) = struct.unpack_from("<I", data)
     header = json.loads(data[4 : 4 + length])
     start = -(-(4 + length) // 8) * 8
@@ -33,21 +32,23 @@ def test_numbers_come_back_from_the_block() -> None:
 def test_equal_arrays_are_stored_once() -> None:
     recording = planar()
     twins = tuple(replace(recording.channels[0], name=f"twin {k}") for k in range(50))
-    more = len(payload(replace(recording, channels=(*recording.channels, *twins)))) - len(payload(recording))
+    more = len(pack_recording(replace(recording, channels=(*recording.channels, *twins)))) - len(
+        pack_recording(recording)
+    )
     assert more < 50 * 120  # names and references, not 81 numbers each
 
 
 def test_the_page_is_compact_and_the_same_each_time() -> None:
-    document = page(planar())
+    document = animation_page(planar())
     assert len(document) < 450_000
-    assert document == page(planar())
+    assert document == animation_page(planar())
     assert "three.js authors" in document and "Leon Sorokin" in document  # the licences travel with the libraries
 
 
 def test_a_single_sample_is_a_picture() -> None:
     recording = planar()
     bodies = tuple(replace(body, p=body.p[:1], q=body.q[:1]) for body in recording.bodies)
-    assert page(replace(recording, t=recording.t[:1], bodies=bodies, lines=(), channels=()))
+    assert animation_page(replace(recording, t=recording.t[:1], bodies=bodies, lines=(), channels=()))
 
 
 def _mesh(triangles: list[list[int]]) -> Shape:
@@ -56,7 +57,7 @@ def _mesh(triangles: list[list[int]]) -> Shape:
 
 @pytest.mark.parametrize("flat", [False, True])
 def test_every_kind_of_symbol_is_packed_even_an_unknown_one(flat: bool) -> None:
-    assert len(page(loaded(flat))) < 450_000
+    assert len(animation_page(loaded(flat))) < 450_000
 
 
 @pytest.mark.parametrize(
@@ -88,12 +89,12 @@ def test_every_kind_of_symbol_is_packed_even_an_unknown_one(flat: bool) -> None:
 def test_what_cannot_be_shown_is_refused(change: object, message: str) -> None:
     recording = planar()
     with pytest.raises(ValueError, match=message):
-        page(replace(recording, **change(recording)))
+        animation_page(replace(recording, **change(recording)))
 
 
 def test_the_bundle_holds_all_that_the_player_takes() -> None:
     static = files("flyball.view").joinpath("static")
     bundle = static.joinpath("libraries.min.js").read_text(encoding="utf-8")
-    for name in MODULES:
+    for name in PLAYER_MODULES:
         for taken in re.findall(r"\bTHREE\.(\w+)", static.joinpath("player", f"{name}.js").read_text(encoding="utf-8")):
             assert f"{taken}:()=>" in bundle, f"{name}.js takes {taken}: add it to view-src/libraries.mjs and rebuild"

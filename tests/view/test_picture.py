@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.view.page import page
-from flyball.view.recording import SHOW, Recording
+from flyball.view.page import animation_page
+from flyball.view.recording import SHOW_OPTIONS, Recording
 from tests.view.recordings import SYMBOLS, loaded, planar
 from tests.view.test_page import Open
 
@@ -22,7 +22,7 @@ def turned(recording: Recording, body: str, point: tuple[float, float, float], i
 @pytest.mark.parametrize("flat", [False, True])
 def test_arrows_stand_where_forces_act_and_are_those_forces(opened: Open, flat: bool) -> None:
     recording = loaded(flat)
-    tab = opened(page(recording), "t=0&show=loads,reactions,elements,moments")
+    tab = opened(animation_page(recording), "t=0&show=loads,reactions,elements,moments")
     for i in (3, 17, 40):
         tab.evaluate("(t) => flyball.seek(t)", float(recording.t[i]))
         shown = {(a["name"], a["what"]): a for a in tab.evaluate("flyball.arrows()")}
@@ -42,7 +42,7 @@ def test_arrows_are_painted_from_the_point_towards_where_the_force_points(opened
     """In the picture itself: the pixels that an arrow changes begin at its point and lie along its direction."""
     recording = loaded(flat=True)
     i = 12
-    tab = opened(page(recording), f"t={float(recording.t[i])!r}&show=")
+    tab = opened(animation_page(recording), f"t={float(recording.t[i])!r}&show=")
     bare = tab.picture()
     tab.evaluate("flyball.show('loads')")
     changed = np.argwhere(np.abs(tab.picture() - bare).max(axis=2) > 40)[:, ::-1].astype(float)
@@ -60,10 +60,10 @@ def test_arrows_are_painted_from_the_point_towards_where_the_force_points(opened
 
 
 def test_switches_show_and_hide(opened: Open) -> None:
-    tab = opened(page(loaded()), "t=0.5&show=")
+    tab = opened(animation_page(loaded()), "t=0.5&show=")
     assert tab.evaluate("[flyball.shown(), flyball.arrows(), flyball.axes()]") == [[], [], []]
     bare = tab.picture()
-    for name in SHOW:
+    for name in SHOW_OPTIONS:
         if name == "contacts":  # nothing touches: no such switch
             continue
         tab.evaluate("(name) => flyball.show(name)", name)
@@ -77,7 +77,7 @@ def test_switches_show_and_hide(opened: Open) -> None:
 
 
 def test_moments_are_shown_with_forces_only(opened: Open) -> None:
-    tab = opened(page(loaded()), "t=0.5&show=reactions")
+    tab = opened(animation_page(loaded()), "t=0.5&show=reactions")
     kinds = "flyball.arrows().map(({ what }) => what)"
     assert tab.evaluate(kinds) == ["force"]
     tab.evaluate("flyball.show('moments')")
@@ -86,7 +86,7 @@ def test_moments_are_shown_with_forces_only(opened: Open) -> None:
 
 def test_the_legend_of_forces_says_how_large_they_get(opened: Open) -> None:
     recording = loaded()
-    tab = opened(page(recording), "t=0.5&show=loads,reactions,elements,moments")
+    tab = opened(animation_page(recording), "t=0.5&show=loads,reactions,elements,moments")
     largest = np.linalg.norm(recording.arrows[0].vector, axis=1).max()
     text = tab.locator(".forces").inner_text()
     assert f"Given loads\nup to {largest:.4g} N" in text
@@ -97,7 +97,7 @@ def test_the_legend_of_forces_says_how_large_they_get(opened: Open) -> None:
 
 
 def test_arrows_grow_with_their_size(opened: Open) -> None:
-    tab = opened(page(loaded()), "t=0.5&show=loads")
+    tab = opened(animation_page(loaded()), "t=0.5&show=loads")
     length = "flyball.arrows()[0].length"
     before = tab.evaluate(length)
     tab.keyboard.press("]")
@@ -110,7 +110,7 @@ def test_arrows_grow_with_their_size(opened: Open) -> None:
 
 def test_axes_stand_on_their_bodies(opened: Open) -> None:
     recording = loaded()
-    tab = opened(page(recording), "t=0&show=world,bodies,frames")
+    tab = opened(animation_page(recording), "t=0&show=world,bodies,frames")
     i = 25
     tab.evaluate("(t) => flyball.seek(t)", float(recording.t[i]))
     shown = {a["name"]: a["at"] for a in tab.evaluate("flyball.axes()")}
@@ -122,7 +122,7 @@ def test_axes_stand_on_their_bodies(opened: Open) -> None:
 
 def test_paths_are_those_of_the_points(opened: Open) -> None:
     recording = loaded()
-    tab = opened(page(recording))
+    tab = opened(animation_page(recording))
     (path,) = tab.evaluate("flyball.paths()")
     assert path["name"] == "tip"
     wanted = [turned(recording, "b1", (0.5, 0, 0), i) for i in range(len(recording.t))]
@@ -131,7 +131,7 @@ def test_paths_are_those_of_the_points(opened: Open) -> None:
 
 def test_a_rope_is_slack_when_it_is_longer_than_its_way(opened: Open) -> None:
     recording = loaded()
-    tab = opened(page(recording))
+    tab = opened(animation_page(recording))
     assert tab.evaluate("(flyball.seek(0.1), flyball.slack())") == []
     assert tab.evaluate("(flyball.seek(1.9), flyball.slack())") == ["slack"]
 
@@ -139,7 +139,7 @@ def test_a_rope_is_slack_when_it_is_longer_than_its_way(opened: Open) -> None:
 @pytest.mark.parametrize("flat", [False, True])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_everything_is_drawn_in_light_and_dark(opened: Open, flat: bool, scheme: str) -> None:
-    tab = opened(page(loaded(flat)), f"t=1&show={','.join(SHOW)}", color_scheme=scheme)
+    tab = opened(animation_page(loaded(flat)), f"t=1&show={','.join(SHOW_OPTIONS)}", color_scheme=scheme)
     assert tab.evaluate("document.documentElement.dataset.theme") == scheme
     picture = tab.picture()
     assert (picture.mean() > 128) == (scheme == "light")
@@ -152,7 +152,7 @@ def test_everything_is_drawn_in_light_and_dark(opened: Open, flat: bool, scheme:
 
 def test_a_click_selects_a_part_and_its_card_follows_the_time(opened: Open) -> None:
     recording = loaded()
-    tab = opened(page(recording), "t=0&show=")
+    tab = opened(animation_page(recording), "t=0&show=")
     x, y = tab.evaluate("flyball.pixel('b0', [0.08, 0.08, 0.05])")
     box = tab.locator(".stage").bounding_box()
     tab.mouse.click(box["x"] + x, box["y"] + y)
@@ -171,7 +171,7 @@ def test_a_click_selects_a_part_and_its_card_follows_the_time(opened: Open) -> N
 
 def test_the_camera_follows_a_body(opened: Open) -> None:
     recording = planar()
-    tab = opened(page(recording), "t=0&select=block")
+    tab = opened(animation_page(recording), "t=0&select=block")
     where = "flyball.pixel('block')"
     tab.keyboard.press("f")
     before = tab.evaluate(where)
@@ -189,7 +189,7 @@ def test_the_camera_follows_a_body(opened: Open) -> None:
 @pytest.mark.parametrize(("view", "axis"), [("front", 1), ("side", 0), ("top", 2)])
 def test_views_look_along_an_axis_and_hold_the_motion(opened: Open, view: str, axis: int) -> None:
     recording = loaded()
-    tab = opened(page(recording), f"t=0&view={view}&show=")
+    tab = opened(animation_page(recording), f"t=0&view={view}&show=")
     camera = tab.evaluate("flyball.camera()")
     sight = np.subtract(camera["target"], camera["position"])
     assert abs(sight[axis]) / np.linalg.norm(sight) > 0.999
@@ -201,7 +201,7 @@ def test_views_look_along_an_axis_and_hold_the_motion(opened: Open, view: str, a
 
 
 def test_keys_and_their_help(opened: Open) -> None:
-    tab = opened(page(loaded()), "t=0&show=")
+    tab = opened(animation_page(loaded()), "t=0&show=")
     for key, name in {
         "r": "reactions",
         "e": "elements",
@@ -236,7 +236,7 @@ def test_keys_and_their_help(opened: Open) -> None:
 
 
 def test_the_menu_holds_what_there_is_to_show(opened: Open) -> None:
-    tab = opened(page(planar()), "t=0")
+    tab = opened(animation_page(planar()), "t=0")
     tab.click(".show")
     names = tab.locator(".menu input[type=checkbox]").evaluate_all("boxes => boxes.map(({ name }) => name)")
     assert names == ["world", "bodies", "frames", "names", "grid"]  # nothing of forces where none are recorded
@@ -254,7 +254,7 @@ def test_curves_that_coincide_are_dashed_and_those_of_another_size_apart(opened:
     r = planar()
     wave = np.sin(r.t)
     channels = (Channel("a", "m", wave), Channel("b", "m", wave + 1e-4), Channel("tiny", "m", 1e-3 * wave))
-    tab = opened(page(replace(r, channels=channels, shown=("a", "b", "tiny"))))
+    tab = opened(animation_page(replace(r, channels=channels, shown=("a", "b", "tiny"))))
     assert tab.locator(".plot").count() == 2
     assert tab.locator(".plot").first.locator(".name").all_inner_texts() == ["a", "b"]
     marks = tab.locator(".plot").first.locator(".swatch").evaluate_all("marks => marks.map((m) => m.style.background)")

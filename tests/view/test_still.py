@@ -13,11 +13,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.view.animate import record
-from flyball.view.described import drawn
-from flyball.view.outlines import hull
+from flyball.view.animation import record_motion
 from flyball.view.recording import Recording
-from flyball.view.still import COLORS, still
+from flyball.view.still_picture import BODY_COLORS, convex_polygon, reference_result, still_svg
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))
 SVG = "{http://www.w3.org/2000/svg}"
@@ -117,22 +115,22 @@ def test_a_picture_compiles_nothing_and_needs_no_heavy_package():
 def test_hulls():
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
     inside = np.random.default_rng(0).uniform(0.01, 0.99, (50, 2))
-    np.testing.assert_allclose(np.sort(hull(np.vstack([inside, square])), axis=0), np.sort(square, axis=0))
-    assert len(hull(np.zeros((3, 2)))) == 1
+    np.testing.assert_allclose(np.sort(convex_polygon(np.vstack([inside, square])), axis=0), np.sort(square, axis=0))
+    assert len(convex_polygon(np.zeros((3, 2)))) == 1
 
 
 def test_colours_are_those_of_the_page():
     theme = Path(fb.__file__).parent / "view" / "static" / "player" / "theme.js"
     listed = re.findall(r'"(#[0-9a-f]{6})"', theme.read_text(encoding="utf-8"))
-    assert tuple(listed[: len(COLORS)]) == COLORS
+    assert tuple(listed[: len(BODY_COLORS)]) == BODY_COLORS
 
 
 def test_an_empty_recording_is_no_picture():
-    assert still(Recording("nothing", True, np.zeros(1), ())) == ""
+    assert still_svg(Recording("nothing", True, np.zeros(1), ())) == ""
 
 
 def test_the_drawn_result_is_the_description():
-    r = drawn(fb.load(next(p for p in EXAMPLES if p.stem == "slider_crank")))
+    r = reference_result(fb.load(next(p for p in EXAMPLES if p.stem == "slider_crank")))
     assert r["slider.x"][0] == pytest.approx(0.7)
     assert r["crank.angle"][0] == 0.0
-    assert record(r, curves=False, told=False).notes == {}
+    assert record_motion(r, curves=False, with_notes=False).notes == {}

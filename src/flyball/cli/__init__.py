@@ -1,4 +1,10 @@
-"""The ``flyball`` command: one file a subcommand. Whatever takes long to import is imported where it is needed."""
+"""The ``flyball`` command: entry point and registration of all subcommands.
+
+``cli/application.py`` holds the typer application, exit codes and printing of errors; ``cli/subcommand.py`` makes
+a subcommand from a method of `Mechanism`; ``cli/options.py`` turns its arguments into command-line options. The
+other modules hold the subcommands of one subject each. A new subcommand is a function with the decorator
+`command`; its module is imported here. Whatever takes long to import is imported inside functions.
+"""
 
 from __future__ import annotations
 
@@ -7,26 +13,13 @@ from typing import Annotated
 
 import typer
 
-from . import (  # noqa: F401  (each adds its subcommand)
-    check,
-    compare,
-    compile,
-    equations,
-    equilibrium,
-    export,
-    inverse_dynamics,
-    kinematics,
-    linearize,
-    mobility,
-    modes,
-    optimize,
-    run,
-    sensitivity,
-    singularities,
-    study,
-    view,
-)
-from .common import app
+from . import equations as equations
+from . import equilibrium as equilibrium
+from . import mobility as mobility
+from . import run as run
+from . import study as study
+from . import view as view
+from .application import app
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -34,8 +27,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     app(args=None if argv is None else list(argv), prog_name="flyball")
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(requested: bool) -> None:
+    if requested:
         from .. import __version__
 
         typer.echo(f"flyball {__version__}")

@@ -1,18 +1,42 @@
-"""``flyball equations``: the equations of motion as formulas, on a page and in LaTeX."""
+"""Subcommands for symbolic equations: ``equations`` (page, LaTeX) and ``export`` (code)."""
 
 from __future__ import annotations
 
-from ..methods.symbols import Symbols
-from .asking import Asked, command
-from .common import Out
-from .flags import Flag
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..mechanism_methods import SymbolicMethods
+from .application import OutputFolder
+from .options import OptionOverride
+from .subcommand import Request, command
 
 
-@command(Symbols.symbolic, name="equations", own={"inputs": Flag(names=("--input",))})
-def equations(asked: Asked, *, out: Out = None) -> None:
+@command(SymbolicMethods.symbolic, name="equations", overrides={"inputs": OptionOverride(names=("--input",))})
+def equations(request: Request, *, out: OutputFolder = None) -> None:
     """Write equations.html, which opens offline, and equations.tex; print sizes and names."""
-    found = asked.answer()
-    folder = asked.folder(out, "equations")
-    asked.write(folder / "equations.html", found.to_html)
-    asked.write(folder / "equations.tex", found.to_latex)
-    asked.say(found)
+    found = request.run_analysis()
+    folder = request.folder(out, "equations")
+    request.write(folder / "equations.html", found.to_html)
+    request.write(folder / "equations.tex", found.to_latex)
+    request.print_result(found)
+
+
+EXPORT_OPTIONS = {
+    "functions": OptionOverride(names=("--function",)),
+    "outputs": OptionOverride(names=("--output",)),
+    "inputs": OptionOverride(names=("--input",)),
+}
+
+
+@command(SymbolicMethods.export, overrides=EXPORT_OPTIONS, without=("folder",))
+def export(
+    request: Request,
+    *,
+    out: Annotated[Path | None, typer.Option(help="Folder for the files; named after the model if not given.")] = None,
+) -> None:
+    """Print the functions with their arguments and how long they are, and the files written."""
+    code = request.run_analysis(folder=request.folder(out, "code"))
+    request.files += [str(f) for f in code.files]
+    request.print_result(code)

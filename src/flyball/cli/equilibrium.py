@@ -1,23 +1,77 @@
-"""``flyball equilibrium``, ``flyball equilibria``: where a mechanism rests, and whether it is stable there."""
+"""Subcommands about rest and small motions: equilibrium, equilibria, linearize, root-locus and modes."""
 
 from __future__ import annotations
 
-from ..methods.statics import Statics
-from .asking import Asked, command
-from .common import Page, Plot
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import ModelError
+from ..mechanism_methods import StaticsMethods
+from .application import AboutEquilibrium, PageFile, PlotFile, SteadyTurning
+from .options import OptionOverride
+from .subcommand import Request, command
 
 
-@command(Statics.equilibrium, without=("start",))
-def equilibrium(asked: Asked, *, out: Page = None) -> None:
+@command(StaticsMethods.equilibrium, without=("start",))
+def equilibrium(request: Request, *, out: PageFile = None) -> None:
     """Print where it is; --out shows it."""
-    found = asked.answer()
-    asked.write(out, found.result.to_html)
-    asked.say(found)
+    found = request.run_analysis()
+    request.write(out, found.result.to_html)
+    request.print_result(found)
 
 
-@command(Statics.equilibria, without=("start",))
-def equilibria(asked: Asked, *, plot: Plot = None) -> None:
+@command(StaticsMethods.equilibria, without=("start",))
+def equilibria(request: Request, *, plot: PlotFile = None) -> None:
     """Print the series and where it jumps."""
-    found = asked.answer()
-    asked.write(plot, lambda path: found.plot(path=path))
-    asked.say(found)
+    found = request.run_analysis()
+    request.write(plot, lambda path: found.plot(path=path))
+    request.print_result(found)
+
+
+LINEARIZE_OPTIONS = {"inputs": OptionOverride(names=("--input",)), "outputs": OptionOverride(names=("--output",))}
+
+
+@command(StaticsMethods.linearize, overrides=LINEARIZE_OPTIONS)
+def linearize(
+    request: Request,
+    *,
+    equilibrium: AboutEquilibrium = False,
+    turning: SteadyTurning = None,
+    bode: Annotated[
+        Path | None, typer.Option(help="Write the Bode plot of all outputs by the only input: PNG, SVG or PDF.")
+    ] = None,
+) -> None:
+    """Print states and matrices."""
+    if bode is not None and (len(request.given.get("inputs", ())) != 1 or not request.given.get("outputs")):
+        raise ModelError("--bode draws outputs over one input: give one --input, and one --output or more")
+    request.rest(equilibrium, turning)
+    linear = request.run_analysis()
+    request.write(bode, lambda path: linear.bode(path=path))
+    request.print_result(linear)
+
+
+@command(StaticsMethods.root_locus)
+def root_locus(request: Request, *, plot: PlotFile = None) -> None:
+    """Print the eigenvalues at every value, and the values where one crosses the imaginary axis."""
+    found = request.run_analysis()
+    request.write(plot, found.plot)
+    request.print_result(found)
+
+
+@command(StaticsMethods.modes)
+def modes(
+    request: Request,
+    *,
+    equilibrium: AboutEquilibrium = False,
+    turning: SteadyTurning = None,
+    out: PageFile = None,
+    plot: PlotFile = None,
+) -> None:
+    """Print a table; --out shows how they move, --plot draws the eigenvalues."""
+    request.rest(equilibrium, turning)
+    found = request.run_analysis()
+    request.write(out, found.to_html)
+    request.write(plot, found.plot)
+    request.print_result(found, {"name": request.mechanism.name} | found.as_dict())

@@ -1,4 +1,4 @@
-"""``flyball run``: simulate, and write the motion."""
+"""Subcommands that compute motions: ``run``, ``compare``, ``kinematics`` and ``inverse-dynamics``."""
 
 from __future__ import annotations
 
@@ -8,23 +8,37 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from ..errors import Interrupted, SimulationError
-from ..methods.motion import Motions
-from .asking import Asked, command
-from .common import FAILED, INTERRUPTED, Out, fail, make_folder, print_json, table
-from .flags import Flag
+from ..errors import Interrupted, SimulationError, SingularityError
+from ..mechanism_methods import MotionMethods
+from .application import (
+    FAILED,
+    INTERRUPTED,
+    OutputFolder,
+    PlotFile,
+    exit_with_error,
+    make_folder,
+    print_json,
+    print_table,
+)
+from .options import OptionOverride, read_assignments, read_values
+from .subcommand import Request, command
 
 if TYPE_CHECKING:
     from ..results.result import Result
 
-CSV_NUMBERS = 5_000_000  # above, the table is left out: such a file is of no use
+
+MAX_CSV_NUMBERS = 5_000_000  # above, the table is left out: such a file is of no use
 
 
-@command(Motions.simulate, name="run", own={"t_end": Flag(default="10"), "checkpoint": Flag(type=Path)})
+@command(
+    MotionMethods.simulate,
+    name="run",
+    overrides={"t_end": OptionOverride(default="10"), "checkpoint": OptionOverride(type=Path)},
+)
 def run(
-    asked: Asked,
+    request: Request,
     *,
-    out: Out = None,
+    out: OutputFolder = None,
     plots: Annotated[
         bool | None, typer.Option(help="Write pictures (PNG); by default if there is no report, which has all curves.")
     ] = None,
@@ -35,9 +49,9 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
     """Write report.html, animation.html, result.csv and result.nc; pictures into plots/ where they are wanted."""
-    talk, error = not (asked.as_json or quiet), None
+    talk, error = not (request.as_json or quiet), None
     try:
-        result = asked.answer(progress=talk)
+        result = request.run_analysis(progress=talk)
     except SimulationError as stopped:
         if stopped.result is None:
             raise
@@ -46,13 +60,13 @@ def run(
         result = ended.result
     reported = not no_animation if report is None else report
     pages = {"report.html": reported, "animation.html": not no_animation}
-    folder = out if out is not None else Path(f"{asked.source.stem}-result")
+    folder = out if out is not None else Path(f"{request.source.stem}-result")
     wanted = [name for name, asked_for in pages.items() if asked_for]
-    files, notes = _write(result, folder, not reported if plots is None else plots, wanted)
-    _conclude(result, error, files, notes, asked.as_json, talk)
+    files, notes = _write_run_files(result, folder, not reported if plots is None else plots, wanted)
+    _print_summary(result, error, files, notes, request.as_json, talk)
 
 
-def _conclude(
+def _print_summary(
     result: Result, error: SimulationError | None, files: list[Path], notes: list[str], as_json: bool, talk: bool
 ) -> None:
     """Say what was done, and end with the right code."""
@@ -74,16 +88,16 @@ def _conclude(
         page = [("open this", str(f)) for f in files if f.name == "report.html"]
         if len(result.events):
             typer.echo(f"{result.events!r}\n")
-        table([*lines, *(("written", str(f)) for f in files), *(("note", n) for n in notes), *page])
+        print_table([*lines, *(("written", str(f)) for f in files), *(("note", n) for n in notes), *page])
     if error is not None:
-        fail(str(error), type(error).__name__, FAILED, as_json, summary)
+        exit_with_error(str(error), type(error).__name__, FAILED, as_json, summary)
     if as_json:
         print_json(summary)
     if not result.health.success:
         raise typer.Exit(INTERRUPTED)
 
 
-def _write(result: Result, folder: Path, plots: bool, pages: Sequence[str]) -> tuple[list[Path], list[str]]:
+def _write_run_files(result: Result, folder: Path, plots: bool, pages: Sequence[str]) -> tuple[list[Path], list[str]]:
     """Write all files of a result; returns them, and remarks on what was left out."""
     files, notes = [], []
     make_folder(folder)
@@ -94,7 +108,7 @@ def _write(result: Result, folder: Path, plots: bool, pages: Sequence[str]) -> t
 
     keep("result.nc", result.save)
     curves = 8 * len(result.model.bodies) + 5 * len(result.model.joints)
-    if curves * len(result.t) <= CSV_NUMBERS:
+    if curves * len(result.t) <= MAX_CSV_NUMBERS:
         keep("result.csv", result.to_csv)
     else:
         notes.append(f"result.csv is left out: some {curves} curves at {len(result.t)} times; read result.nc instead")
@@ -102,10 +116,80 @@ def _write(result: Result, folder: Path, plots: bool, pages: Sequence[str]) -> t
         notes.append("no output time was reached: there is nothing to draw")
         return files, notes
     if plots:
-        from ..view.plots import standard_plots
+        from ..view.result_plots import write_standard_plots
 
         make_folder(folder / "plots")
-        files += standard_plots(result, folder / "plots")
+        files += write_standard_plots(result, folder / "plots")
     for name in pages:
         keep(name, result.to_report if name == "report.html" else result.to_html)
     return files, notes
+
+
+COMPARE_OPTIONS = {"t_end": OptionOverride(default="10"), "formulations": OptionOverride(names=("--only",))}
+
+
+@command(MotionMethods.compare, overrides=COMPARE_OPTIONS)
+def compare(request: Request, *, plot: PlotFile = None) -> None:
+    """Print a table; --plot draws curves and bars."""
+    result = request.run_analysis()
+    request.write(plot, result.plot)
+    request.print_result(result)
+
+
+DEFAULT_END = "1"  # s, the end of the motion if nothing says when
+TIME_OPTIONS = {"times": OptionOverride(names=("--outputs", "--times")), "t_end": OptionOverride(shown=DEFAULT_END)}
+
+
+@command(MotionMethods.kinematics, overrides=TIME_OPTIONS)
+def kinematics(
+    request: Request,
+    *,
+    point: Annotated[
+        list[str] | None, typer.Option(help='Body, frame, or "body:x,y" whose path is drawn; may be repeated.')
+    ] = None,
+    out: OutputFolder = None,
+) -> None:
+    """Write result.csv, result.nc and paths.png."""
+    set_default_end(request)
+    try:
+        result = request.run_analysis()
+    except SingularityError as error:
+        more = {"t": error.where, "elements": list(error.elements)}
+        exit_with_error(str(error), type(error).__name__, FAILED, request.as_json, more)
+    folder = request.folder(out, "kinematics")
+    request.write(folder / "result.csv", result.to_csv)
+    request.write(folder / "result.nc", result.save)
+    request.write(folder / "paths.png", lambda path: result.plot_path(*map(read_point, point or []), path=path))
+    request.print_result(result.health, {"name": request.mechanism.name, "times": len(result.t), "t": result.t[[0, -1]].tolist(),
+                              "health": result.health.as_dict()})  # fmt: skip
+
+
+def set_default_end(request: Request) -> None:
+    """A number of times without an end goes on for a second."""
+    if not isinstance(request.given.get("times"), list):
+        request.given.setdefault("t_end", DEFAULT_END)
+
+
+def read_point(text: str) -> str | tuple[str, list[float]]:
+    """A point from the command line: a name, or ``body:x,y``."""
+    name, colon, rest = text.partition(":")
+    return (name, read_values(rest, "m", "--point")) if colon else text
+
+
+MOTION_OPTION = OptionOverride(
+    type=list[str],
+    read=read_assignments,
+    help='How a coordinate moves: --motion "A.angle=0.3*sin(2*t)"; may be repeated.',
+)
+
+
+@command(MotionMethods.inverse_dynamics, overrides={**TIME_OPTIONS, "motion": MOTION_OPTION})
+def inverse_dynamics(request: Request, *, out: OutputFolder = None) -> None:
+    """Write inverse_dynamics.csv, inverse_dynamics.png and result.nc."""
+    set_default_end(request)
+    found = request.run_analysis()
+    folder = request.folder(out, "inverse-dynamics")
+    request.write(folder / "inverse_dynamics.csv", found.to_csv)
+    request.write(folder / "inverse_dynamics.png", found.plot)
+    request.write(folder / "result.nc", found.result.save)
+    request.print_result(found)

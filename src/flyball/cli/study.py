@@ -1,4 +1,4 @@
-"""``flyball study``: many runs at different values of parameters."""
+"""Subcommands that vary parameters: ``study``, ``optimize`` and ``sensitivity``."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import Interrupted, ModelError
-from ..methods.design import Design
-from .asking import Asked, command
-from .common import FAILED, INTERRUPTED, Plot, table
-from .flags import MANY, Flag, once, values
+from ..mechanism_methods import DesignMethods
+from .application import FAILED, INTERRUPTED, PlotFile, print_table
+from .options import RANGE_SEPARATOR, OptionOverride, read_quantity, read_values, refuse_duplicate
+from .subcommand import Request, command
 
 
-def _varied(texts: list[str], unit: str, flag: str) -> dict[str, Any]:
+def _read_variations(texts: list[str], unit: str, flag: str) -> dict[str, Any]:
     """name=values (0,1,2 or first:last:how many), name=low:high or name=distribution."""
     out: dict[str, Any] = {}
     for text in texts:
@@ -24,57 +24,117 @@ def _varied(texts: list[str], unit: str, flag: str) -> dict[str, Any]:
                 f"{flag} {text!r}: write name=values, for instance {flag} k=1e3:1e5:20; for samples name=low:high or "
                 f"name=normal(mean, sd)"
             )
-        once(out, name, flag, text)
+        refuse_duplicate(out, name, flag, text)
         if "(" in told:
             out[name] = told
-        elif told.count(MANY) == 1:
-            out[name] = tuple(x.strip() for x in told.split(MANY))
+        elif told.count(RANGE_SEPARATOR) == 1:
+            out[name] = tuple(x.strip() for x in told.split(RANGE_SEPARATOR))
         else:
-            out[name] = values(told, "", flag) if MANY in told else [x.strip() for x in told.split(",")]
+            out[name] = read_values(told, "", flag) if RANGE_SEPARATOR in told else [x.strip() for x in told.split(",")]
     return out
 
 
-OWN = {
-    "vary": Flag(
+STUDY_OPTIONS = {
+    "vary": OptionOverride(
         type=list[str],
-        read=_varied,
+        read=_read_variations,
         help="A parameter and its values, --vary k=1e3:1e5:20 or k=1,2,5; of samples --vary k=1e3:1e5 or "
         "'k=normal(2e3, 100)'. May be repeated.",
     ),
-    "analysis": Flag(
+    "analysis": OptionOverride(
         type=str, help="What each run is: motion (if not given), kinematics, instant, equilibrium, modes or linearize."
     ),
-    "of": Flag(
+    "of": OptionOverride(
         type=list[str],
         help="A curve, or a number of one: --of 'max(slider.x)', end, min, mean, rms; of modes 'frequency[0]'; of "
         "linearize 'gain(slider.x, push)'. May be repeated.",
     ),
-    "file": Flag(type=Path, names=("--file", "-o")),
+    "file": OptionOverride(type=Path, names=("--file", "-o")),
 }
 
 
-@command(Design.study, own=OWN, without=("executor",))
+@command(DesignMethods.study, overrides=STUDY_OPTIONS, without=("executor",))
 def study(
-    asked: Asked,
+    request: Request,
     *,
     csv: Annotated[Path | None, typer.Option("--csv", help="Write a table with a row for each run.")] = None,
-    plot: Plot = None,
+    plot: PlotFile = None,
     histogram: Annotated[Path | None, typer.Option(help="Write how often values occur to a picture.")] = None,
 ) -> None:
     """Print how the quantities spread; with --file the study can be interrupted, and the same command goes on."""
     try:
-        found = asked.answer()
+        found = request.run_analysis()
     except Interrupted as ended:
         found = ended.result
-    if "file" in asked.given:
-        asked.files.append(str(asked.given["file"]))
-    asked.write(csv, found.to_csv)
-    asked.write(plot, lambda path: found.plot(path=path))
-    asked.write(histogram, lambda path: found.histogram(path=path))
-    if found.design == "saltelli" and not asked.as_json:
-        table(found.indices().lines())
-    asked.say(found)
+    if "file" in request.given:
+        request.files.append(str(request.given["file"]))
+    request.write(csv, found.to_csv)
+    request.write(plot, lambda path: found.plot(path=path))
+    request.write(histogram, lambda path: found.histogram(path=path))
+    if found.design == "saltelli" and not request.as_json:
+        print_table(found.indices().lines())
+    request.print_result(found)
     if not found.complete:
         raise typer.Exit(INTERRUPTED)
     if not found.done.any():
         raise typer.Exit(FAILED)
+
+
+def _read_bounds(texts: list[str], unit: str, flag: str) -> dict[str, tuple[str | None, str | None]]:
+    """name, or name=low:high with either left out."""
+    out: dict[str, tuple[str | None, str | None]] = {}
+    for text in texts:
+        name, equals, bounds = text.partition("=")
+        low, colon, high = bounds.partition(":")
+        if equals and not colon:
+            raise ModelError(f"{flag} {text!r}: write name=low:high, for instance {flag} crank=0.1:0.3")
+        refuse_duplicate(out, name.strip(), flag, text)
+        out[name.strip()] = (low.strip() or None, high.strip() or None)
+    return out
+
+
+OPTIMIZE_OPTIONS = {
+    "to": OptionOverride(
+        type=list[str], read=_read_bounds, help="A parameter, with bounds if wanted: --to crank=0.1:0.3."
+    ),
+    "target": OptionOverride(
+        type=list[str],
+        help="What each quantity should be, in SI units or with a unit; or a CSV file with a column for each.",
+    ),
+    "weights": OptionOverride(type=str, read=read_values, help="A weight for each quantity, as 1,0.5."),
+}
+
+
+@command(DesignMethods.optimize, overrides=OPTIMIZE_OPTIONS, without=("minimize",))
+def optimize(request: Request) -> None:
+    """Print the best parameters."""
+    goal = _read_target(request.given.pop("target", []), len(request.given["of"]))
+    if request.given.get("analysis") == "motion":
+        request.given.setdefault("outputs", len(goal))
+    request.print_result(request.run_analysis(target=goal))
+
+
+def _read_target(texts: list[str], count: int) -> Any:
+    """Numbers, or the columns of a file, (times, quantities)."""
+    import numpy as np
+
+    if len(texts) == 1 and Path(texts[0]).suffix.lower() == ".csv":
+        try:
+            found = np.genfromtxt(texts[0], delimiter=",", ndmin=2)
+        except (OSError, ValueError) as error:
+            raise ModelError(f"cannot read {texts[0]!r}: {error}") from None
+        found = found[~np.isnan(found).all(axis=1)]  # a line of names
+        if found.shape[1] != count or not len(found) or np.isnan(found).any():
+            raise ModelError(f"{texts[0]!r} needs a column of numbers for each of the {count} quantities")
+        return found
+    if len(texts) != count:
+        raise ModelError(f"{count} quantities need as many targets, got {len(texts)}")
+    return np.array([[read_quantity(x, "", "--target") for x in texts]])
+
+
+@command(DesignMethods.sensitivity)
+def sensitivity(request: Request, *, plot: PlotFile = None) -> None:
+    """Print the derivatives."""
+    found = request.run_analysis()
+    request.write(plot, found.plot)
+    request.print_result(found)

@@ -1,25 +1,26 @@
-"""``flyball view``: a result in the web browser."""
+"""Subcommands without an analysis: ``view`` shows a result in the web browser, ``compile`` compiles all kernels."""
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ..errors import ModelError
-from .common import Json, app, print_json, reported
+from .application import AsJson, app, print_json, report_errors
 
 
 @app.command()
 def view(
     file: Annotated[Path, typer.Argument(help="A result (.nc) or an animation page (.html).")],
     no_open: Annotated[bool, typer.Option("--no-open", help="Only write the page and print where it is.")] = False,
-    as_json: Json = False,
+    as_json: AsJson = False,
 ) -> None:
     """Show a result in the web browser."""
-    with reported(as_json):
-        page = _page(file)
+    with report_errors(as_json):
+        page = _page_file(file)
         if as_json:
             print_json({"page": str(page)})
         else:
@@ -30,23 +31,43 @@ def view(
             webbrowser.open(page.resolve().as_uri())
 
 
-def _page(file: Path) -> Path:
+def _page_file(file: Path) -> Path:
     """The animation page of a file: itself, or written beside the result (in a temporary folder if need be)."""
     if file.suffix.lower() in (".html", ".htm"):
         if not file.is_file():
             raise ModelError(f"there is no file {str(file)!r}")
         return file
-    from ..files import load_result
+    from ..mechanism import load_result
 
     text = load_result(file).html()
     page = file.with_suffix(".html")
-    from ..model.writing import write
+    from ..model.output_files import write_file
 
     try:
-        write(page, text)
+        write_file(page, text)
     except ModelError:
         import tempfile
 
         page = Path(tempfile.mkdtemp(prefix="flyball-")) / page.name
-        write(page, text)
+        write_file(page, text)
     return page
+
+
+@app.command(name="compile")
+def compile_kernels() -> None:
+    """Compile everything that would be compiled on first use, on all cores, and keep it for this user."""
+    with report_errors(False):
+        from ..compiler.ahead_of_time import compile_all
+        from ..compiler.object_code import cache_folder
+
+        began = time.monotonic()
+
+        def progress(name: str, done: int, total: int) -> None:
+            rest = (time.monotonic() - began) / done * (total - done)
+            typer.echo(f"{done} of {total}: {name.removeprefix('flyball.')}, about {rest:.0f} s left", err=True)
+
+        count = compile_all(progress=progress)
+        what = (
+            f"{count} kernels compiled in {time.monotonic() - began:.0f} s" if count else "nothing was to be compiled"
+        )
+        typer.echo(f"{what}; they are in {cache_folder()}")

@@ -1,14 +1,26 @@
-"""Formulas: plain Python code that compiled code may call.
+"""Formulas: plain Python code that compiled code may call, and the sources that compiled code is made of.
 
-``@formula`` marks it. The function itself stays plain Python, so the same source runs on floats, complex numbers,
-arrays over time and symbols. What compiled code makes of a function is registered when something is compiled
-(`emit`), and never before: describing and checking a mechanism does not pay for a compiler.
+``@formula`` marks a formula. The function itself stays plain Python, so the same source runs on floats, complex
+numbers, arrays over time and symbols. It is registered with the compiler when something is compiled
+(`object_code`), and never before: describing and checking a mechanism does not pay for a compiler.
+
+The hash of a kernel's sources covers its file and all that this imports, as far as it holds formulas or constants
+of theirs; an edit of what a kernel does not import leaves its code valid.
 """
 
 from __future__ import annotations
 
+import hashlib
+import linecache
+import math
+import re
+import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar
 from weakref import WeakValueDictionary
 
@@ -20,34 +32,34 @@ KERNELS: list[Any] = []  # every `kernels.Kernel`
 FIRST_ADDRESS = 1 << 16
 """No code table stands at a smaller address; the numbers of the kinds of built-in elements are smaller."""
 CODE_TABLES: WeakValueDictionary[int, Any] = WeakValueDictionary()
-"""The `by_address.CodeTable` at an address, as long as it exists."""
+"""The `kernels.CodeTable` at an address, as long as it exists."""
 _formulas: list[Callable[..., Any]] = []
 _callbacks: list[Callable[[], None]] = []
-_overload: list[Any] = []  # `target.overload`, once something is compiled
+_numba_overload: list[Any] = []  # `numba_target.overload`, once something is compiled
 
 
 def formula(function: F) -> F:
     """Let compiled code call ``function``; the function itself stays plain Python and can be run on any numbers."""
     _formulas.append(function)
-    _register()
+    _register_waiting()
     return function
 
 
 def when_compiling(callback: Callable[[], None]) -> Callable[[], None]:
     """Run ``callback`` once before anything is compiled (at once if something was)."""
     _callbacks.append(callback)
-    _register()
+    _register_waiting()
     return callback
 
 
 def register_all(overload: Any) -> None:
     """Tell the compiler of every formula, those of the future included, by ``target.overload``."""
-    _overload[:] = [overload]
-    _register()
+    _numba_overload[:] = [overload]
+    _register_waiting()
 
 
-def _register() -> None:
-    if _overload:
+def _register_waiting() -> None:
+    if _numba_overload:
         with LOCK:
             while _formulas:
                 _make_callable(_formulas.pop(0))
@@ -56,7 +68,7 @@ def _register() -> None:
 
 
 def _make_callable(function: Callable[..., Any]) -> None:
-    _overload[0](function, strict=False)(lambda *args, **more: function)
+    _numba_overload[0](function, strict=False)(lambda *args, **more: function)
 
 
 def by_address(fields):  # type: ignore[no-untyped-def]
@@ -82,7 +94,7 @@ def formula_at(table, k, arguments, like):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     table : int
-        Address of a `by_address.CodeTable`; of any other number the result is ``like``.
+        Address of a `kernels.CodeTable`; of any other number the result is ``like``.
     k : int
     arguments : tuple
     like : number or tuple
@@ -96,3 +108,236 @@ def has_formula(table, k):  # type: ignore[no-untyped-def]
     """Whether there is a code table at an address, and formula k in it."""
     found = CODE_TABLES.get(int(table))
     return found is not None and found.functions[k] is not None
+
+
+PACKAGE = Path(__file__).parent.parent
+COMPILED = (
+    "collision",
+    "constraints",
+    "engine",
+    "forces",
+    "laws",
+    "math",
+    "numerics",
+    "simulation/impulse_stepping",
+    "tables/table_definitions.py",
+)
+"""Files and folders that hold formulas and kernels, and all constants that these take from elsewhere."""
+COMPILER = ("formulas.py", "kernels.py", "numba_target.py", "object_code.py", "struct_layout.py")
+"""Files of the compiler that decide what code is made."""
+GENERATED_SOURCES: dict[str, str] = {}
+"""Sources of formulas that were put together at import (`generated_formula`): module and name -> text."""
+
+_IMPORT = re.compile(r"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|[\w ,*]+)", re.MULTILINE)
+_FOLDER_SEARCH = re.compile(r"^import pkgutil$", re.MULTILINE)
+
+
+def compiled_files() -> set[Path]:
+    """The source files of `COMPILED`."""
+    files: set[Path] = set()
+    for name in COMPILED:
+        path = PACKAGE / name
+        files |= set(path.rglob("*.py")) if path.is_dir() else {path}
+    return files
+
+
+def sources_of(file: Path) -> list[Path]:
+    """The source files that a kernel which stands in ``file`` is made of: all, where it is not one of ours."""
+    known, seen, todo = compiled_files(), set[Path](), [file, *(Path(__file__).parent / name for name in COMPILER)]
+    if not file.is_relative_to(PACKAGE):
+        todo += known
+    while todo:
+        path = todo.pop()
+        if path not in seen:
+            seen.add(path)
+            todo += [p for p in _imported_files(path) if p in known]
+    return sorted(seen)
+
+
+@cache
+def _imported_files(path: Path) -> frozenset[Path]:
+    """Files that a file imports; where it looks for the files of its folder by itself, all of these."""
+    text = path.read_text(encoding="utf-8")
+    out = set(path.parent.glob("*.py")) if _FOLDER_SEARCH.search(text) else set()
+    for dots, module, names in _IMPORT.findall(text):
+        base = path.parents[len(dots) - 1].joinpath(*module.split("."))
+        if base.is_dir():  # what is named may be files of it, or folders
+            named = [base / n for n in re.findall(r"\w+", names)]
+            out |= {base / "__init__.py", *(n.with_suffix(".py") for n in named), *(n / "__init__.py" for n in named)}
+            out |= set(base.glob("*.py")) if "*" in names else set()
+        else:
+            out.add(base.with_suffix(".py"))
+    return frozenset(p for p in out if p.is_file())
+
+
+def source_hash(function: Callable[..., Any]) -> str:
+    """Hash of every source that a kernel is made of."""
+    return _sources_hash(Path(function.__code__.co_filename))
+
+
+def content_hash(function: Callable[..., Any]) -> str:
+    """Hash of a function that is not flyball's: its code, and all that this takes from outside.
+
+    Numbers that it finds outside, such as global constants, are part of its code and of the hash; so are other
+    functions. Those of flyball count by their sources.
+    """
+    digest = hashlib.sha256(f"{sys.implementation.cache_tag} {_sources_hash(Path(__file__))}".encode())
+    for part in _content_parts(function, []):
+        digest.update(f"{part}\n".encode())
+    return digest.hexdigest()
+
+
+def fresh_copy(function: FunctionType, copies: dict[FunctionType, FunctionType]) -> FunctionType:
+    """The same function as another object, with what it takes from outside as that is now.
+
+    Numba keeps what it has made of a function, with the numbers that it took from outside then. Functions that are not
+    flyball's and that it calls are replaced in the same way, and compiled code may call them.
+
+    Parameters
+    ----------
+    function : function
+    copies : dict
+        Twins that were made already.
+    """
+    names = _used_names(function.__code__)
+
+    def known(value: Any) -> Any:
+        if isinstance(value, ModuleType):
+            inner = {name: vars(value)[name] for name in names & set(vars(value))}
+            new = {name: known(x) for name, x in inner.items() if not isinstance(x, ModuleType)}
+            if all(x is inner[name] for name, x in new.items()):
+                return value
+            module = ModuleType(value.__name__)
+            vars(module).update(vars(value) | new)
+            return module
+        if not isinstance(value, FunctionType) or Path(value.__code__.co_filename).is_relative_to(PACKAGE):
+            return value
+        return fresh_copy(value, copies)
+
+    if function in copies:
+        return copies[function]
+    scope: dict[str, Any] = {"__builtins__": __builtins__, "__name__": function.__module__}
+    cells = tuple(CellType() for _ in function.__closure__ or ())
+    new = FunctionType(function.__code__, scope, function.__name__, function.__defaults__, cells or None)
+    new.__kwdefaults__ = function.__kwdefaults__
+    new.__module__, new.__qualname__ = function.__module__, function.__qualname__
+    copies[function] = formula(new)
+    for name in names & set(function.__globals__):
+        scope[name] = known(function.__globals__[name])
+    for cell, given in zip(cells, function.__closure__ or (), strict=True):
+        with suppress(ValueError):  # not filled yet
+            cell.cell_contents = known(given.cell_contents)
+    return new
+
+
+def _content_parts(x: Any, visited: list[Any]) -> Iterator[str]:
+    """Texts that say what compiled code is made of where it uses a value."""
+    x = getattr(x, "py_func", x)  # the Python under decorators of Numba
+    if isinstance(x, CodeType):
+        yield f"{x.co_code.hex()} {x.co_names} {x.co_varnames} {x.co_argcount} {x.co_kwonlyargcount} {x.co_flags}"
+        for constant in x.co_consts:
+            yield from _content_parts(constant, visited)
+    elif isinstance(x, tuple):
+        yield f"{type(x).__name__} {len(x)}"
+        for part in x:
+            yield from _content_parts(part, visited)
+    elif isinstance(x, float):
+        yield f"{type(x).__name__} {float(x).hex()}"
+    elif hasattr(x, "tobytes"):
+        yield f"{x.dtype} {x.shape} {x.tobytes().hex()}"
+    elif not isinstance(x, FunctionType):
+        yield (
+            repr(x)
+            if isinstance(x, bool | int | complex | str | None)
+            else f"{getattr(x, '__module__', '')}.{getattr(x, '__qualname__', type(x).__qualname__)}"
+        )
+    elif any(x is f for f in visited):
+        yield f"function {next(k for k, f in enumerate(visited) if x is f)}"
+    elif (file := Path(x.__code__.co_filename)).is_relative_to(PACKAGE):
+        yield f"{x.__module__}.{x.__qualname__} {_sources_hash(file)}"
+    else:
+        visited.append(x)
+        yield from _content_parts(x.__code__, visited)
+        yield from _content_parts((x.__defaults__, *(x.__kwdefaults__ or {}).items()), visited)
+        for name, value in _external_values(x):
+            yield name
+            yield from _content_parts(value, visited)
+
+
+def _external_values(function: FunctionType) -> Iterator[tuple[str, Any]]:
+    """Names and values that a function finds outside of itself."""
+    names = _used_names(function.__code__)
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        with suppress(ValueError):  # not filled yet
+            yield name, cell.cell_contents
+    for name in sorted(names & set(function.__globals__)):
+        value = function.__globals__[name]
+        yield name, value
+        if isinstance(value, ModuleType):
+            for attribute in sorted(names & set(vars(value))):
+                inner = vars(value)[attribute]
+                if not isinstance(inner, ModuleType | type):
+                    yield f"{name}.{attribute}", inner
+
+
+def _used_names(code: CodeType) -> set[str]:
+    """Global names and attributes that code uses, functions inside it included."""
+    return set(code.co_names).union(*(_used_names(c) for c in code.co_consts if isinstance(c, CodeType)))
+
+
+@cache
+def _sources_hash(file: Path) -> str:
+    digest = hashlib.sha256()
+    files = sources_of(file)
+    for path in files:
+        digest.update(str(path.relative_to(PACKAGE)).encode() if path.is_relative_to(PACKAGE) else path.name.encode())
+        digest.update(path.read_bytes())
+    own = {".".join(("flyball", *p.relative_to(PACKAGE).with_suffix("").parts)) for p in files if PACKAGE in p.parents}
+    for name, text in sorted(GENERATED_SOURCES.items()):
+        if name.rpartition(".")[0] in own:
+            digest.update(text.encode())
+    return digest.hexdigest()
+
+
+def generated_formula(home: str, name: str, arguments: str, lines: Sequence[str], names: Mapping[str, Any]) -> Any:
+    """A formula with these lines.
+
+    Parameters
+    ----------
+    home : str
+        The module that it belongs to: ``__name__``.
+    name, arguments : str
+        As in ``def name(arguments)``.
+    lines : sequence of str
+        The body, without indentation of its own.
+    names : mapping
+        What the body calls.
+    """
+    text = "".join([f"def {name}({arguments}):\n", *(f"    {line}\n" for line in lines)])
+    file = f"<{home}.{name}>"
+    made = dict(names)
+    exec(compile(text, file, "exec"), made)
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+    GENERATED_SOURCES[f"{home}.{name}"] = text
+    return formula(made[name])
+
+
+def dispatch_by_kind(
+    home: str, name: str, arguments: str, cases: Mapping[int, Callable], otherwise: str, form: int | None = None
+) -> Any:
+    """A formula ``name(kind, arguments)`` that hands on to the one of that kind.
+
+    ``otherwise`` is what an unknown kind answers: nan, so that no element is ever answered by another one's formula.
+    Where there is a ``form``, ``kind`` may also be the address of a code table, whose formula of that number is called.
+    """
+    names: dict[str, Any] = {f"{_formula_name(f)}_{kind}": f for kind, f in sorted(cases.items())}
+    lines = []
+    for called, kind in zip(names, sorted(cases), strict=True):
+        lines += [f"if kind == {kind}:", f"    return {called}({arguments})"]
+    last = otherwise if form is None else f"formula_at(kind, {form}, ({arguments},), {otherwise})"
+    names |= {"nan": math.nan, "formula_at": formula_at}
+    return generated_formula(home, name, f"kind, {arguments}", [*lines, f"return {last}"], names)
+
+
+def _formula_name(f: Callable) -> str:
+    return f"{f.__module__.rpartition('.')[2]}_{f.__name__}"

@@ -1,23 +1,510 @@
-"""Kernels: entry points of compiled code, called by Python or, by their addresses, by other kernels.
+"""Kernels: entry points of compiled code, layouts and buffers of their arguments, code tables of formulas.
 
-The parameters of a kernel are structures of arrays, arrays and numbers (`layout`). It is compiled as a whole with all
-formulas that it calls, and its code is kept in a file (`store`). Numba is imported only where something is compiled.
+A kernel is called by Python or, by its address, by other kernels. Its parameters are structures of arrays, arrays
+and numbers, declared by annotations: a named tuple whose fields are annotated with the names below (``mass:
+Float1``, ``pattern: Pattern``) is a structure of arrays. An array is described by seven words and two for each
+dimension, as Numba describes it: two that own memory (0 here), its length, the bytes of an entry, the address of
+its numbers, its shape, its strides. A structure is its arrays one after the other. `StructBuffer` describes the
+arrays of a named tuple, which stay where they are; `StructPool` makes named tuples whose arrays stand in one
+block of memory.
+
+Built-in elements are compiled into the kernels. The formulas of a user's own class are compiled alone, and a
+kernel calls them through the addresses in the class's `CodeTable`, so that no kernel has to be compiled again
+when a user's source changes. Numba is imported only where something must be compiled.
 """
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
-from functools import cached_property
-from typing import Any
+import inspect
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from copy import copy
+from functools import cached_property, update_wrapper
+from types import FunctionType
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from .buffers import StructBuffer, described
-from .by_address import CompiledCode
-from .formulas import KERNELS
-from .layout import Array, Struct, parameters
-from .sources import source_hash
+from ..errors import ModelError
+from .formulas import CODE_TABLES, KERNELS, LOCK, content_hash, fresh_copy, source_hash
+from .struct_layout import (
+    DATA,
+    DIMENSION,
+    HEAD,
+    Array,
+    CodeTables,
+    RecordLayout,
+    Struct,
+    parameter_layouts,
+    struct_layout,
+)
+
+_code_tables: WeakKeyDictionary[type, CodeTable] = WeakKeyDictionary()
+
+
+class Signature(NamedTuple):
+    """Arguments and result of a formula that kernels call by address.
+
+    Attributes
+    ----------
+    name : str
+        The attribute of the class that is the formula.
+    arguments : str
+        Names of its arguments.
+    lengths : tuple
+        Lengths of the arguments, which are numbers (0) or tuples of numbers, nested as these are.
+    result : int or tuple
+        Lengths of the result, likewise.
+    returns : str
+        The result in words, for messages.
+    """
+
+    name: str
+    arguments: str
+    lengths: tuple[Any, ...]
+    result: Any
+    returns: str
+
+    def __str__(self) -> str:
+        return f"{self.name}({self.arguments})"
+
+
+class CompiledCode:
+    """The machine code of a function, loaded from a file or compiled when its address is first read.
+
+    Parameters
+    ----------
+    function : function
+    first_order : bool
+        Whether its numbers are complex, with derivatives as imaginary parts; else floats.
+    signature : Signature
+        Of a formula that kernels call by address; None of a kernel.
+    """
+
+    parameters: Any
+    content: Any
+
+    def __init__(
+        self, function: Callable[..., Any], first_order: bool = False, signature: Signature | None = None
+    ) -> None:
+        self.function, self.first_order, self.signature = function, first_order, signature
+        self._loaded: Any = None
+        update_wrapper(self, function)
+
+    @property
+    def name(self) -> str:
+        """Module and name of the function."""
+        return f"{self.function.__module__}.{self.function.__qualname__}"
+
+    @property
+    def used(self) -> bool:
+        """Whether the code is in the memory of this process."""
+        return self._loaded is not None
+
+    @property
+    def origin(self) -> str:
+        """Where the code is from: "shipped", "cache" or "compiled"; empty as long as its address was not read."""
+        return self._loaded.origin if self._loaded is not None else ""
+
+    @property
+    def address(self) -> int:
+        """Address of the code in memory."""
+        if self._loaded is None:
+            with LOCK:
+                if self._loaded is None:
+                    from .object_code import code_of
+
+                    self._loaded = code_of(self)
+        return int(self._loaded.address)
+
+
+class FormulaCode(CompiledCode):
+    """The machine code of one formula of a user's own, for floats or for complex numbers."""
+
+    signature: Signature
+
+    def __init__(self, function: FunctionType, first_order: bool, signature: Signature) -> None:
+        super().__init__(fresh_copy(function, {}), first_order, signature)
+        self._original = function
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:  # type: ignore[override]
+        """Lengths of its arguments."""
+        return self.signature.lengths
+
+    @property
+    def content(self) -> str:  # type: ignore[override]
+        """Hash of the formula, of its signature, and of the functions and numbers that it uses."""
+        return f"{self.signature} {self.signature.result} {content_hash(self._original)}"
+
+
+class CodeTable:
+    """Addresses of the formulas of one class: for each signature the code for floats and that for complex numbers.
+
+    Parameters
+    ----------
+    owner : type
+        The class.
+    signatures : sequence of Signature
+        Of the formulas that kernels may call.
+
+    Attributes
+    ----------
+    functions : tuple
+        The formulas in Python; None where the class does not have one.
+    address : int
+        Of the table in memory; valid as long as this object exists.
+
+    Raises
+    ------
+    ModelError
+        If a formula is no static method, or has other arguments than its signature.
+    """
+
+    def __init__(self, owner: type, signatures: Sequence[Signature]) -> None:
+        self.owner, self.signatures = owner, tuple(signatures)
+        self.functions = tuple(_static_method(owner, x) for x in signatures)
+        self.content = self._content()
+        self._words = np.zeros((len(signatures), 2), np.int64)
+        self._code: list[FormulaCode] = []
+        self._lock = threading.RLock()
+        self.address = int(self._words.ctypes.data)
+        CODE_TABLES[self.address] = self
+
+    @property
+    def stale(self) -> bool:
+        """Whether a formula, or a function or number that it uses, has changed since the table was made."""
+        now = tuple(_static_method(self.owner, x) for x in self.signatures)
+        return self.functions != now or self.content != self._content()
+
+    def make_ready(self, first_order: bool) -> None:
+        """Load or compile the code of every formula.
+
+        Parameters
+        ----------
+        first_order : bool
+            For complex numbers; else for floats.
+
+        Raises
+        ------
+        ModelError
+            If a formula cannot be compiled.
+        """
+        for signature, function, words in zip(self.signatures, self.functions, self._words, strict=True):
+            if function is None or words[int(first_order)]:
+                continue
+            with self._lock:
+                code = FormulaCode(function, first_order, signature)
+                try:
+                    words[int(first_order)] = code.address
+                except (ImportError, MemoryError):
+                    raise
+                except Exception as error:  # Numba's, of many kinds
+                    raise ModelError(_cannot_compile(self.owner, signature, first_order, error)) from error
+                self._code.append(code)
+
+    def _content(self) -> str:
+        return " ".join(content_hash(f) for f in self.functions if f is not None)
+
+    def __reduce__(self) -> Any:
+        return code_table, (self.owner, self.signatures)
+
+
+def code_table(owner: type, signatures: Sequence[Signature], required: Sequence[Signature] = ()) -> CodeTable:
+    """The code table of a class; a new one where a formula has changed.
+
+    Raises
+    ------
+    ModelError
+        If the class lacks a required formula, or one is not as its signature says.
+    """
+    for x in required:
+        if not hasattr(owner, x.name):
+            raise ModelError(
+                f"{owner.__name__} has no formula {x}; define it as a static method. It returns {x.returns}"
+            )
+    with LOCK:
+        found = _code_tables.get(owner)
+        if found is None or found.stale:
+            found = _code_tables[owner] = CodeTable(owner, signatures)
+        return found
+
+
+def table_addresses(tables: Sequence[CodeTable | None]) -> np.ndarray:
+    """Addresses of code tables; 0 of None."""
+    return np.array([0 if x is None else x.address for x in tables], np.int64)
+
+
+def make_ready(addresses: np.ndarray, first_order: bool) -> None:
+    """Load or compile the code of the tables at some addresses; 0 stands for no table.
+
+    Raises
+    ------
+    ModelError
+        If a formula cannot be compiled.
+    """
+    for address in set(addresses.tolist()) - {0}:
+        CODE_TABLES[address].make_ready(first_order)
+
+
+def short_reason(error: Exception) -> str:
+    """The line of an error of Numba that says what is wrong."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    lines = [line for line in lines if not line.startswith(("Failed in", "During:"))] or [type(error).__name__]
+    return lines[0][:200]
+
+
+def _static_method(owner: type, signature: Signature) -> Callable[..., Any] | None:
+    static = inspect.getattr_static(owner, signature.name, None)
+    if static is None:
+        return None
+    function = getattr(owner, signature.name)
+    code = getattr(function, "__code__", None)
+    if not isinstance(static, staticmethod) or code is None:
+        raise ModelError(
+            f"{owner.__name__}.{signature.name} must be a static method, a plain function {signature}: write "
+            f"{signature.name}: ClassVar = staticmethod({signature.name}), or @staticmethod above it"
+        )
+    if code.co_argcount != len(signature.lengths):
+        raise ModelError(
+            f"{owner.__name__}.{signature.name} takes {', '.join(code.co_varnames[: code.co_argcount])}; it must take "
+            f"{signature.arguments}"
+        )
+    return function  # type: ignore[no-any-return]
+
+
+def _cannot_compile(owner: type, signature: Signature, first_order: bool, error: Exception) -> str:
+    numbers = "complex numbers, which derivatives are computed with" if first_order else "floats"
+    return (
+        f"{owner.__name__}.{signature.name} cannot be compiled for {numbers}: {short_reason(error)}. It must return "
+        f"{signature.returns}; a formula uses numbers, tuples of these, and functions of flyball.math and of your own "
+        f"that do the same"
+    )
+
+
+ALIGNMENT = 64  # bytes at whose multiples arrays begin in a block
+_ORDER = 0x1 | 0x100  # flags of an array: C order, aligned
+_WRITEABLE = 0x400
+_byte, _address = ctypes.c_char.from_buffer, ctypes.addressof
+
+
+def address_of(x: np.ndarray) -> int:
+    """Where an array's first number stands; by its buffer, where it has one, in a fifth of the time."""
+    return _address(_byte(x)) if x.size and x.flags.writeable and x.flags.c_contiguous else x.ctypes.data
+
+
+def tuple_layout(fields: Any) -> Struct:
+    """Layout of a named tuple: the ``Complex`` twin if an array that has one is complex."""
+    return struct_layout(type(fields), _is_complex(fields, struct_layout(type(fields))))
+
+
+def _is_complex(fields: Any, real_layout: Struct) -> bool:
+    twin = struct_layout(real_layout.of, True)
+    for x, (_, a), (_, b) in zip(fields, real_layout.fields, twin.fields, strict=True):
+        if a != b:
+            return _is_complex(x, a) if isinstance(a, Struct) else x.dtype.kind == "c"
+    return False
+
+
+class StructBuffer:
+    """A named tuple of arrays as kernels read it. The arrays may be written to, not replaced.
+
+    Parameters
+    ----------
+    fields : tuple
+    known : StructBuffer
+        Of tuples among the fields, whose descriptions are copied.
+
+    Attributes
+    ----------
+    layout : Struct
+    address : int
+
+    Raises
+    ------
+    TypeError
+        If an array is not as the annotations of the tuple declare it.
+    """
+
+    def __init__(self, fields: Any, *known: StructBuffer) -> None:
+        self.fields = fields
+        self.layout = tuple_layout(fields)
+        words: list[int] = []
+        _add_descriptions(fields, self.layout, {id(x.fields): x for x in known}, words)
+        self.words = np.array(words, np.int64)
+        self.address = address_of(self.words)
+
+    def of(self, fields: Any) -> StructBuffer:
+        """That of another tuple of this kind, most of whose arrays are the same."""
+        if tuple_layout(fields) != self.layout:
+            return StructBuffer(fields)
+        other = copy(self)
+        other.fields, other.words = fields, self.words.copy()
+        other.address = address_of(other.words)
+        _update_descriptions(self.fields, fields, self.layout, other.words, 0)
+        return other
+
+
+def _add_descriptions(fields: Any, layout: Struct, known: dict[int, StructBuffer], words: list[int]) -> None:
+    for x, (name, of) in zip(fields, layout.fields, strict=True):
+        if not isinstance(x, tuple):
+            words += _field_description(x, of, name, layout)
+        elif (there := known.get(id(x))) is not None:
+            words += there.words.tolist()
+        else:
+            _add_descriptions(x, of, known, words)
+
+
+def _field_description(x: np.ndarray, of: Any, name: str, layout: Struct) -> tuple[int, ...]:
+    """The words that describe an array of a structure; code that it has the addresses of is made ready."""
+    words = array_description(x, of, f"{layout.of.__name__}.{name}")
+    if isinstance(of, CodeTables) and x.any():
+        make_ready(x, layout.complex)
+    return words
+
+
+def _update_descriptions(old: Any, new: Any, layout: Struct, words: np.ndarray, at: int) -> None:
+    """Write anew the words, from ``at`` on, of the arrays that are not those of ``old``."""
+    for before, x, (name, of) in zip(old, new, layout.fields, strict=True):
+        if x is not before and isinstance(x, tuple):
+            _update_descriptions(before, x, of, words, at)
+        elif x is not before:
+            words[at : at + of.size // 8] = _field_description(x, of, name, layout)
+        at += of.size // 8
+
+
+def array_description(x: np.ndarray, of: Array | RecordLayout, name: str) -> tuple[int, ...]:
+    """The words that describe an array.
+
+    Raises
+    ------
+    TypeError
+        If it is not of that type.
+    """
+    of = of.array if isinstance(of, RecordLayout) else of
+    if x.ndim != of.ndim or x.dtype != of.dtype or x.flags.num & _ORDER != _ORDER:
+        raise TypeError(
+            f"{name}: an array of {np.dtype(of.dtype)} with {of.ndim} dimensions and without gaps is needed, got "
+            f"{x.dtype} with {x.ndim}{'' if x.flags.c_contiguous else ', with gaps'}"
+        )
+    place = _address(_byte(x)) if x.size and x.flags.num & _WRITEABLE else x.__array_interface__["data"][0]
+    return 0, 0, x.size, x.itemsize, place, *x.shape, *x.strides
+
+
+class JoinedBuffer(StructBuffer):
+    """A named tuple of tuples that have buffers."""
+
+    def __init__(self, make: type, *parts: StructBuffer) -> None:
+        self._make, self._parts = make, parts
+        self.words = np.concatenate([x.words for x in parts])
+        names = make._fields  # type: ignore[attr-defined]
+        self.layout = Struct(make, False, tuple((n, x.layout) for n, x in zip(names, parts, strict=True)))
+        self.address = address_of(self.words)
+
+    @cached_property
+    def fields(self) -> Any:  # type: ignore[override]
+        """The tuple of tuples."""
+        return self._make(*(x.fields for x in self._parts))
+
+
+class PooledBuffer(StructBuffer):
+    """What a `StructPool` makes: arrays in one block of memory; in Python they are made when first used."""
+
+    def __init__(self, pool: StructPool) -> None:
+        self._pool, self._block = pool, pool.block.copy()
+        self.words = pool.words.copy()
+        self.words[pool.places] += address_of(self._block)
+        self.layout = pool.layout
+        self.address = address_of(self.words)
+
+    @cached_property
+    def fields(self) -> Any:  # type: ignore[override]
+        """The tuple of arrays."""
+        return self._pool.fill(self._block)
+
+    def array(self, name: str) -> Any:
+        """One of its arrays, without the others; of a tuple in it ``"inner.name"``."""
+        return self._pool.named(name, self._block)
+
+
+class StructPool:
+    """Makes named tuples of arrays of which each run has its own.
+
+    Parameters
+    ----------
+    fields : tuple
+        As they are new.
+    constant : sequence of ndarray
+        Those of them that all runs share, since nothing writes to them.
+    """
+
+    def __init__(self, fields: Any, constant: Sequence[np.ndarray] = ()) -> None:
+        self._new, self._shared = fields, {id(x) for x in constant}
+        self._size, places = 0, list[int]()
+        self._placements: list[tuple[tuple[int, ...], Any, int, type[np.ndarray]]] = []
+        self._named: dict[str, int] = {}
+        self._place_arrays(fields, 0, places)
+        self.places = np.array(places, np.int64)
+        self.block = np.zeros(max(self._size, 1), np.uint8)
+        filled = self.fill(self.block)
+        for mine, new in zip(_arrays_of(filled), _arrays_of(fields), strict=True):
+            if mine is not new:
+                mine[...] = new
+        buffer = StructBuffer(filled)
+        self.words, self.layout = buffer.words, buffer.layout
+        self.words[self.places] = [begin for _, _, begin, _ in self._placements]
+
+    def new(self) -> PooledBuffer:
+        """A tuple of one's own."""
+        return PooledBuffer(self)
+
+    def fill(self, block: np.ndarray) -> Any:
+        """The tuple, its arrays in a block."""
+        return self._filled(self._new, block, iter(self._placements))
+
+    def named(self, name: str, block: np.ndarray) -> np.ndarray:
+        """One of the tuple's own arrays in a block: see `PooledBuffer.array`."""
+        shape, dtype, begin, of = self._placements[self._named[name]]
+        return np.ndarray(shape, dtype, block, begin).view(of)
+
+    def _place_arrays(self, fields: Any, at: int, places: list[int], of: str = "") -> int:
+        """Decide where arrays begin in the block, and which words hold their addresses."""
+        for name, x in zip(fields._fields, fields, strict=True):
+            if isinstance(x, tuple):
+                at = self._place_arrays(x, at, places, f"{of}{name}.")
+                continue
+            if id(x) not in self._shared:
+                self._named[of + name] = len(places)
+                places.append(at + DATA // 8)
+                self._placements.append((x.shape, x.dtype, self._size, type(x)))
+                self._size += -(-x.nbytes // ALIGNMENT) * ALIGNMENT
+            at += (HEAD + DIMENSION * x.ndim) // 8
+        return at
+
+    def _filled(
+        self, fields: Any, block: np.ndarray, laid: Iterator[tuple[tuple[int, ...], Any, int, type[np.ndarray]]]
+    ) -> Any:
+        made: list[Any] = []
+        for x in fields:
+            if isinstance(x, tuple):
+                made.append(self._filled(x, block, laid))
+            elif id(x) in self._shared:
+                made.append(x)
+            else:
+                shape, dtype, begin, of = next(laid)
+                made.append(np.ndarray(shape, dtype, block, begin).view(of))
+        return type(fields)(*made)
+
+
+def _arrays_of(fields: Any) -> Iterator[np.ndarray]:
+    """The arrays of a tuple, of tuples in it too."""
+    for x in fields:
+        if isinstance(x, tuple):
+            yield from _arrays_of(x)
+        else:
+            yield x
 
 
 def kernel(function: Callable[..., Any]) -> Kernel:
@@ -45,7 +532,7 @@ class Kernel(CompiledCode):
 
     @cached_property
     def _signature(self) -> tuple[tuple[Any, ...], type | None]:
-        return parameters(self.function)
+        return parameter_layouts(self.function)
 
     @property
     def parameters(self) -> tuple[Any, ...]:
@@ -77,7 +564,7 @@ class Kernel(CompiledCode):
         TypeError
             If an argument is not of the kind that the kernel takes.
         """
-        kept = [_buffer(x, of, self) for x, of in zip(args, self.parameters, strict=True)]
+        kept = [_argument_buffer(x, of, self) for x, of in zip(args, self.parameters, strict=True)]
         return self.call(*(getattr(x, "address", x) for x in kept))
 
 
@@ -95,11 +582,11 @@ class ArrayBuffer:
 
     def __init__(self, x: np.ndarray, of: Array, name: str) -> None:
         self.array = x
-        self.words = np.array(described(x, of, name), np.int64)
+        self.words = np.array(array_description(x, of, name), np.int64)
         self.address = self.words.ctypes.data
 
 
-def _buffer(x: Any, of: Any, kernel: Kernel) -> Any:
+def _argument_buffer(x: Any, of: Any, kernel: Kernel) -> Any:
     if of is int:
         return int(x)
     if of is float:
@@ -107,11 +594,11 @@ def _buffer(x: Any, of: Any, kernel: Kernel) -> Any:
     if isinstance(of, Array):
         return x if isinstance(x, ArrayBuffer) else ArrayBuffer(x, of, kernel.name)
     made = x if isinstance(x, StructBuffer) else StructBuffer(x)
-    check(kernel, of, made)
+    check_layout(kernel, of, made)
     return made
 
 
-def check(kernel: Kernel, of: Struct, buffer: StructBuffer) -> None:
+def check_layout(kernel: Kernel, of: Struct, buffer: StructBuffer) -> None:
     """Refuse a structure of another layout than the kernel's.
 
     Raises
@@ -140,7 +627,7 @@ class BoundKernel:
     def __init__(self, kernel: Kernel, *buffers: StructBuffer) -> None:
         self.buffers, self.kernel = buffers, kernel
         for of, x in zip(kernel.parameters, buffers, strict=False):
-            check(kernel, of, x)
+            check_layout(kernel, of, x)
         self.address = kernel.address
         self._addresses = [x.address for x in buffers]
         self.words = np.array([self.address, *self._addresses], np.int64)  # for `formulas.call_bound`

@@ -10,7 +10,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from . import alignment, along, angle, blade, coincident, curve, distance, perpendicular, rolling, skew, spin
+from . import (
+    alignment,
+    angle,
+    coincident,
+    curve,
+    displacement,
+    distance,
+    knife_edge,
+    perpendicular,
+    relative_spin,
+    rolling,
+    skew_lines,
+)
 from .registry import BY_ADDRESS, KINDS, Kind
 
 _UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -109,7 +121,7 @@ PARALLEL_AXES = (
 )
 """BB2: the z axes of F and M are parallel, and point the same way."""
 
-STRAIGHT_LINE = (_row(along.KIND, "x"), _row(along.KIND, "y"))
+STRAIGHT_LINE = (_row(displacement.KIND, "x"), _row(displacement.KIND, "y"))
 """BB3: the origin of M stays on the z axis of F."""
 
 SAME_AXES = (
@@ -128,7 +140,7 @@ CONSTANT_DISTANCE = (Row(distance.KIND, (0.0,) * 7 + (1.0,)),)
 ANGLE = Row(angle.KIND, (0.0,) * 7 + (1.0,), measure="rad")
 """Coordinate: angle of M's x axis about F's z axis."""
 
-SLIDE = _row(along.KIND, "z")
+SLIDE = _row(displacement.KIND, "z")
 """Coordinate: displacement of M along F's z axis."""
 
 
@@ -139,11 +151,11 @@ def point_coordinate(axis: str) -> Row:
 
 SKEW_LINES = (
     *CROSSED_AXES,
-    *(Row(skew.KIND, (*_UNIT[a], 0.0, 0.0, 0.0, 0.0, 1.0), a, world=True) for a in "xyz"),
+    *(Row(skew_lines.KIND, (*_UNIT[a], 0.0, 0.0, 0.0, 0.0, 1.0), a, world=True) for a in "xyz"),
 )
 """The z axes of F and M keep their position to one another, each of them free to slide round a massless link."""
 
-IN_PLANE = _row(along.KIND, "z")
+IN_PLANE = _row(displacement.KIND, "z")
 """The origin of M stays in F's x-y plane (or at a height above it)."""
 
 CURVE = Row(curve.KIND, (0.0,) * 7 + (1.0,), "xy")
@@ -152,7 +164,7 @@ CURVE = Row(curve.KIND, (0.0,) * 7 + (1.0,), "xy")
 
 def shift(axis: str) -> Row:
     """Coordinate: displacement of M along an axis of F."""
-    return _row(along.KIND, axis)
+    return _row(displacement.KIND, axis)
 
 
 def no_slip(axis: str) -> Row:
@@ -166,12 +178,12 @@ ON_PLANE = Row(rolling.KIND, (*_UNIT["z"], 0.0, 0.0, 1.0, 0.0, 1.0), "z")
 
 def no_sideways(axis: str) -> Row:
     """The origin of M has no velocity, seen from F, along an axis of M."""
-    return Row(blade.KIND, (*_UNIT[axis], 0.0, 0.0, 0.0, 0.0, 1.0), axis, holonomic=False)
+    return Row(knife_edge.KIND, (*_UNIT[axis], 0.0, 0.0, 0.0, 0.0, 1.0), axis, holonomic=False)
 
 
 def turning(axis: str) -> Row:
     """Measured: angular velocity of M relative to F about an axis of M."""
-    return Row(spin.KIND, (*_UNIT[axis], 0.0, 0.0, 0.0, 0.0, 1.0), axis, measure="rad", holonomic=False)
+    return Row(relative_spin.KIND, (*_UNIT[axis], 0.0, 0.0, 0.0, 0.0, 1.0), axis, measure="rad", holonomic=False)
 
 
 DISTANCE = Row(distance.KIND, (0.0,) * 7 + (1.0,))

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
 
-from ..compiler.by_address import Signature
+from ..compiler.kernels import Signature
 
 FRAME = (3, 9, 3, 3, 3, 3)
 """Lengths of a kinematic record: position, rotation, angular velocity, velocity, angular acceleration, acceleration."""

@@ -5,7 +5,7 @@ import pkgutil
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ..compiler.by_address import Signature
+from ..compiler.kernels import Signature
 from ..constraints.registry import FRAME
 from ..model.force import Force
 

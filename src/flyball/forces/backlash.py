@@ -6,13 +6,12 @@ from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from ..constraints.modes import ELASTIC, STOP
+from ..constraints.switch_kinds import ELASTIC, STOP
 from ..errors import ModelError
+from ..model.contact import check_restitution
 from ..model.element import Number, Numbers, Ratio, Unit, element, positive
-from ..model.limit import Unilateral, check_elastic
-from ..model.material import check_restitution
-from ..model.switch import Switch
-from .limit import KIND, effort, energy, sides, switched
+from ..model.force import Switch, Unilateral, check_elastic
+from .limit import KIND, effort, energy, stop_parameters, stop_switch_numbers
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -111,7 +110,7 @@ class Backlash(Unilateral):
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""
-        return sides(n, -0.5 * n.gap, 0.5 * n.gap)
+        return stop_parameters(n, -0.5 * n.gap, 0.5 * n.gap)
 
     def switches(self) -> tuple[Switch, ...]:
         """One along the sum, counted from the middle, so its own where it has one coordinate too."""
@@ -120,4 +119,4 @@ class Backlash(Unilateral):
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """Half the gap to either side."""
-        return switched(n, -0.5 * n.gap, 0.5 * n.gap)
+        return stop_switch_numbers(n, -0.5 * n.gap, 0.5 * n.gap)

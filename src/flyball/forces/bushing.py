@@ -22,13 +22,13 @@ KIND = 5
 
 
 @formula
-def times(par, k, a):
+def scaled_components(par, k, a):
     """Three neighbouring parameters, each times its component of a."""
     return (par[k] * a[0], par[k + 1] * a[1], par[k + 2] * a[2])
 
 
 @formula
-def turned(par, F, M):
+def relative_rotation(par, F, M):
     """Rotation from F to M; none where nothing is asked to turn back."""
     R = mm(transpose(F[1]), M[1])
     k = par[6] + par[7] + par[8]
@@ -43,7 +43,7 @@ def turned(par, F, M):
 @formula
 def deflection(par, F, M):
     """Displacement and rotation vector of M seen from F, along F's axes."""
-    return mtv(F[1], sub(M[0], F[0])), rotation_vector(turned(par, F, M))
+    return mtv(F[1], sub(M[0], F[0])), rotation_vector(relative_rotation(par, F, M))
 
 
 @formula
@@ -52,7 +52,7 @@ def branch(par, F, M):
 
     Two of these within half a turn of each other have a positive product, unless half a turn lies between them.
     """
-    R = turned(par, F, M)
+    R = relative_rotation(par, F, M)
     k = par[6] + par[7] + par[8]
     speed = choose(k, norm(sub(M[2], F[2])), 0.0 * k)
     return 1.0 + R[0] + R[4] + R[8], R[7] - R[5], R[2] - R[6], R[3] - R[1], speed
@@ -73,8 +73,10 @@ def wrench(par, F, M, laws, values):
     """
     d, theta = deflection(par, F, M)
     u = sub(sub(M[3], F[3]), cross(F[2], sub(M[0], F[0])))
-    force = add(times(par, 0, d), times(par, 3, mtv(F[1], u)))
-    torque = add(log_gradient(theta, times(par, 6, theta)), times(par, 9, mtv(F[1], sub(M[2], F[2]))))
+    force = add(scaled_components(par, 0, d), scaled_components(par, 3, mtv(F[1], u)))
+    torque = add(
+        log_gradient(theta, scaled_components(par, 6, theta)), scaled_components(par, 9, mtv(F[1], sub(M[2], F[2])))
+    )
     return neg(mv(F[1], force)), neg(mv(F[1], torque))
 
 
@@ -82,13 +84,13 @@ def wrench(par, F, M, laws, values):
 def energy(par, F, M):
     """Potential energy d . K d / 2 + theta . K_r theta / 2 [J]."""
     d, theta = deflection(par, F, M)
-    a = times(par, 0, d)
-    b = times(par, 6, theta)
+    a = scaled_components(par, 0, d)
+    b = scaled_components(par, 6, theta)
     s = 0.5 * (d[0] * a[0] + d[1] * a[1] + d[2] * a[2])
     return s + 0.5 * (theta[0] * b[0] + theta[1] * b[1] + theta[2] * b[2])
 
 
-Triple = Number | Numbers
+PerAxis = Number | Numbers
 
 
 @element
@@ -116,10 +118,10 @@ class Bushing(TwoFrameForce):
 
     orientation: Orientation | None = None
     angle: Annotated[Number, Unit("rad")] = 0.0
-    stiffness: Annotated[Triple, Unit("N/m")] = 0.0
-    damping: Annotated[Triple, Unit("N*s/m")] = 0.0
-    torsional_stiffness: Annotated[Triple, Unit("N*m/rad")] = 0.0
-    torsional_damping: Annotated[Triple, Unit("N*m*s/rad")] = 0.0
+    stiffness: Annotated[PerAxis, Unit("N/m")] = 0.0
+    damping: Annotated[PerAxis, Unit("N*s/m")] = 0.0
+    torsional_stiffness: Annotated[PerAxis, Unit("N*m/rad")] = 0.0
+    torsional_damping: Annotated[PerAxis, Unit("N*m*s/rad")] = 0.0
 
     kind: ClassVar[int] = KIND
     inputs: ClassVar = staticmethod(inputs)
@@ -164,10 +166,10 @@ class Bushing(TwoFrameForce):
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""
         return (
-            *_three(n.stiffness),
-            *_three(n.damping),
-            *_three(n.torsional_stiffness, turning=True),
-            *_three(n.torsional_damping, turning=True),
+            *_three_components(n.stiffness),
+            *_three_components(n.damping),
+            *_three_components(n.torsional_stiffness, turning=True),
+            *_three_components(n.torsional_damping, turning=True),
         )
 
     def conservative(self) -> bool:
@@ -175,7 +177,7 @@ class Bushing(TwoFrameForce):
         return not np.any(np.array(self.damping) != 0.0) and not np.any(np.array(self.torsional_damping) != 0.0)
 
 
-def _three(value: Any, turning: bool = False) -> tuple[float, ...]:
+def _three_components(value: Any, turning: bool = False) -> tuple[float, ...]:
     """One for each axis; in the plane two along it, or the one about the normal."""
     if not isinstance(value, tuple):
         return (value, value, value)

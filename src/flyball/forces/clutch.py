@@ -9,12 +9,11 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from ..compiler.formulas import formula
-from ..constraints.modes import FRICTION
+from ..constraints.switch_kinds import FRICTION
 from ..errors import ModelError
 from ..math.scalar import choose
 from ..model.element import Law, LawOf, Ratio, element
-from ..model.force import CoordinateForce
-from ..model.switch import Switch
+from ..model.force import CoordinateForce, Switch
 from .joint_friction import SLIDING
 
 if TYPE_CHECKING:
@@ -31,7 +30,7 @@ def effort(par, x, rate, laws, load):
     return -par[0] * capacity * choose(laws[2] - SLIDING, par[1] + o, laws[2] + o)
 
 
-class ByCapacity:
+class CapacityFriction:
     """What clutches and brakes share: a capacity by law, and how much more than that holds at rest."""
 
     title: str
@@ -67,7 +66,7 @@ class ByCapacity:
 
 
 @element
-class Brake(ByCapacity, CoordinateForce):
+class Brake(CapacityFriction, CoordinateForce):
     """A brake along a coordinate: it holds it, or slips where more than its capacity pulls.
 
     What it carries while it slips is its capacity, against the motion; what it holds at rest is ``static`` times that.
@@ -103,7 +102,7 @@ class Brake(ByCapacity, CoordinateForce):
 
 
 @element
-class Clutch(ByCapacity, CoordinateForce):
+class Clutch(CapacityFriction, CoordinateForce):
     """A clutch between two coordinates, such as the angles of two shafts: it locks them together, slips, or is open.
 
     Slip is the second coordinate less the first one. While it slips it carries its capacity, against the slip, as a

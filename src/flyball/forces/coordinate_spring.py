@@ -64,7 +64,7 @@ class CoordinateSpring(CoordinateForce):
     def check(self, n: SimpleNamespace) -> None:
         """Stiffness and damping must not be negative."""
         nonnegative(self, n, "stiffness", "damping")
-        refuse_idle(self, "rest", 0.0)
+        refuse_without_stiffness(self, "rest", 0.0)
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""
@@ -79,7 +79,7 @@ class CoordinateSpring(CoordinateForce):
         return self.force is None and self.damping == 0.0
 
 
-def measuring(name: str, coordinate: str) -> CoordinateSpring:
+def measuring_spring(name: str, coordinate: str) -> CoordinateSpring:
     """A spring of no stiffness: all that comes of it is that its coordinate is measured."""
     return CoordinateSpring(name, coordinate)
 
@@ -113,12 +113,12 @@ class Actuator(CoordinateForce):
         return (self.force,)
 
 
-def pushing(name: str, coordinate: str, force: str) -> Actuator:
+def law_actuator(name: str, coordinate: str, force: str) -> Actuator:
     """A force along a coordinate by a law."""
     return Actuator(name, coordinate, force=force)
 
 
-def refuse_idle(e: Any, name: str, usual: float | None) -> None:
+def refuse_without_stiffness(e: Any, name: str, usual: float | None) -> None:
     """Refuse where a spring carries nothing if it has no stiffness.
 
     Raises

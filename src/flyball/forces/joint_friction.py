@@ -8,14 +8,13 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from ..compiler.formulas import formula
-from ..constraints.modes import FRICTION
+from ..constraints.switch_kinds import FRICTION
 from ..errors import ModelError
 from ..math.scalar import absolute, choose, exp, sqrt, tanh
 from ..math.vec import add, col, cross, dot, norm, scale, sub
 from ..model.element import Length, Number, Unit, element, nonnegative, positive
-from ..model.force import CoordinateForce
+from ..model.force import CoordinateForce, Switch
 from ..model.joint import Joint
-from ..model.switch import Switch
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -239,7 +238,7 @@ class JointFriction(CoordinateForce):
         if self._coordinate().startswith("angle") and n.radius is None:
             raise ModelError(f"{self.title}: friction about an angle needs the radius of the bearing; give radius=")
 
-    def counted(self, components: Iterable[str]) -> tuple[str, ...]:
+    def loading_components(self, components: Iterable[str]) -> tuple[str, ...]:
         """Those of a reaction's components (``"force x"``, ``"torque y"``, ...) that the load counts."""
         moments = self.bending_length is not None or self.twist_length is not None
         return tuple(k for k in components if moments or k.startswith("force"))

@@ -9,13 +9,12 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from ..compiler.formulas import formula
-from ..constraints.modes import ELASTIC, FROZEN, STOP
+from ..constraints.switch_kinds import ELASTIC, FROZEN, STOP
 from ..errors import ModelError
 from ..math.scalar import choose, maximum
+from ..model.contact import check_restitution
 from ..model.element import Number, Ratio, Unit, element
-from ..model.limit import Unilateral, check_elastic
-from ..model.material import check_restitution
-from ..model.switch import Switch
+from ..model.force import Switch, Unilateral, check_elastic
 
 KIND = 8
 
@@ -43,7 +42,7 @@ def energy(par, x):
     return 0.5 * (par[0] * below * below + par[2] * above * above)
 
 
-def sides(n: SimpleNamespace, lower: float | None, upper: float | None) -> tuple[float, ...]:
+def stop_parameters(n: SimpleNamespace, lower: float | None, upper: float | None) -> tuple[float, ...]:
     """Numbers that the formulas see: stiffness and damping of either side, and where they begin."""
     out: list[float] = []
     for side in (lower, upper):
@@ -51,7 +50,7 @@ def sides(n: SimpleNamespace, lower: float | None, upper: float | None) -> tuple
     return (*out, 0.0 if lower is None else lower, 0.0 if upper is None else upper)
 
 
-def switched(n: SimpleNamespace, lower: float | None, upper: float | None) -> tuple[float, ...]:
+def stop_switch_numbers(n: SimpleNamespace, lower: float | None, upper: float | None) -> tuple[float, ...]:
     """Numbers of its switch: least and greatest value, restitution, stiffness, damping."""
     bounds = -np.inf if lower is None else lower, np.inf if upper is None else upper
     elastic = (0.0, 0.0) if n.stiffness is None else (n.stiffness, n.damping)
@@ -109,7 +108,7 @@ class Limit(Unilateral):
         if self.lower is None and self.upper is None:
             raise ModelError(f"{self.title}: it stops nothing; give lower=..., upper=... or both")
 
-    def check_sides(self, n: SimpleNamespace, unit: str) -> None:
+    def check_range(self, n: SimpleNamespace, unit: str) -> None:
         """The lower one is below the upper."""
         if n.lower is not None and n.upper is not None and not n.lower.real < n.upper.real:
             raise ModelError(
@@ -118,7 +117,7 @@ class Limit(Unilateral):
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""
-        return sides(n, n.lower, n.upper)
+        return stop_parameters(n, n.lower, n.upper)
 
     def switches(self) -> tuple[Switch, ...]:
         """One along the coordinate."""
@@ -126,4 +125,4 @@ class Limit(Unilateral):
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """Where it stops, and how."""
-        return switched(n, n.lower, n.upper)
+        return stop_switch_numbers(n, n.lower, n.upper)

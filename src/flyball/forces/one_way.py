@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from ..constraints.modes import ONE_WAY, RATCHET
+from ..constraints.switch_kinds import ONE_WAY, RATCHET
 from ..errors import ModelError
+from ..model.contact import check_restitution
 from ..model.element import Number, Ratio, Unit, element, nonnegative, positive
-from ..model.limit import Latch, check_direction
-from ..model.material import check_restitution
-from ..model.switch import Switch
+from ..model.force import Latch, Switch, check_direction
 
 if TYPE_CHECKING:
     from ..model.model import Model

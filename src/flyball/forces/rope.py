@@ -12,17 +12,15 @@ from pydantic import BeforeValidator
 
 from ..compiler.formulas import formula
 from ..constraints.blocks import DISTANCE, Row
-from ..constraints.modes import ELASTIC, FROZEN, STOP
+from ..constraints.switch_kinds import ELASTIC, FROZEN, STOP
 from ..errors import ModelError
 from ..math.scalar import choose, maximum
+from ..model.contact import check_restitution
 from ..model.element import Damping, Length, Numbers, Ratio, Stiffness, Unit, element, nonnegative
-from ..model.force import CoordinateForce
+from ..model.force import CoordinateForce, Switch, check_elastic
 from ..model.geometry import vector
 from ..model.joint import WorldFrame
-from ..model.limit import check_elastic
-from ..model.material import check_restitution
-from ..model.switch import Switch
-from .limit import switched
+from .limit import stop_switch_numbers
 
 KIND = 2
 
@@ -149,7 +147,7 @@ class Rope(CoordinateForce):
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """It ends at its length."""
-        return switched(n, None, self._free(n, separation))
+        return stop_switch_numbers(n, None, self._free(n, separation))
 
     def conservative(self) -> bool:
         """Whether its energy is all that it ever takes or gives."""

@@ -11,7 +11,7 @@ from ..math.scalar import absolute, choose, divide, unless_zero
 from ..math.vec import add, dot, neg, norm, scale, sub
 from ..model.element import Damping, Law, LawOf, Length, Stiffness, element, nonnegative
 from ..model.force import TwoPointForce
-from .coordinate_spring import refuse_idle
+from .coordinate_spring import refuse_without_stiffness
 
 KIND = 0
 
@@ -92,7 +92,7 @@ class SpringDamper(TwoPointForce):
     def check(self, n: SimpleNamespace) -> None:
         """Stiffness, damping and free length must not be negative."""
         nonnegative(self, n, "stiffness", "damping", "length")
-        refuse_idle(self, "length", None)
+        refuse_without_stiffness(self, "length", None)
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""

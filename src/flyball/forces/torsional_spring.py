@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 from ..model.element import Angle, Law, LawOf, Number, Unit, element, nonnegative
 from ..model.force import JointForce
-from .coordinate_spring import KIND, effort, energy, refuse_idle
+from .coordinate_spring import KIND, effort, energy, refuse_without_stiffness
 
 
 @element
@@ -43,7 +43,7 @@ class TorsionalSpringDamper(JointForce):
     def check(self, n: SimpleNamespace) -> None:
         """Stiffness and damping must not be negative."""
         nonnegative(self, n, "stiffness", "damping")
-        refuse_idle(self, "angle", 0.0)
+        refuse_without_stiffness(self, "angle", 0.0)
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""

@@ -12,15 +12,17 @@ from pydantic import BeforeValidator
 from ..constraints import curve
 from ..constraints.blocks import CURVE, Row
 from ..errors import ModelError
-from ..math.products import product
 from ..math.scalar import absolute
-from ..math.spline import GRACE, complex_cubic, packed
+from ..math.spline import GRACE, complex_cubic, pack_spline
+from ..math.vec import matrix_product
 from ..model.element import Flag, Length, Numbers, Point, Unit, element, nonnegative
 from ..model.geometry import vector
 from ..model.joint import Joint, WorldFrame
 from ..model.table import Table
 
-NEAR = 1e-3  # part of the profile's length within which a motion that cannot go on is taken to have come to its end
+END_TOLERANCE = (
+    1e-3  # part of the profile's length within which a motion that cannot go on is taken to have come to its end
+)
 REMEDY = "give it more points, a Limit that stops the follower, beyond='line', or closed=True"
 
 
@@ -141,7 +143,7 @@ class Cam(Joint):
     def end_message(self, n: SimpleNamespace, at: float) -> str:
         """What to say where the follower has come to an end of the profile, near this parameter; else nothing."""
         first, last = (x.real for x in self.extent(n))
-        if not last > first or not self.ended(at, first, last, -NEAR):
+        if not last > first or not self.ended(at, first, last, -END_TOLERANCE):
             return ""
         k = 0 if at < 0.5 * (first + last) else -1
         return (
@@ -155,7 +157,7 @@ class Cam(Joint):
         par = (0.0, 0.0, float(len(self.curves(n)[0])), 1.0, 0.0, 0.0, 0.0, 1.0)
         s = np.linspace(0.0, _chords(n.points, self.closed)[-1].real, 20 * len(n.points) + 1)
         x, _, _, y, _, _ = curve.point(par, s, data)
-        p = product(F[1].T, M[0] - F[0])
+        p = matrix_product(F[1].T, M[0] - F[0])
         guess = float(s[np.argmin((x - p[0]).real ** 2 + (y - p[1]).real ** 2)])
         zero = np.zeros(3)
         i, j = ((tuple(f[0]), tuple(f[1].ravel()), *(tuple(zero),) * 4) for f in (F, M))
@@ -203,7 +205,7 @@ def _splines(points: tuple, closed: bool) -> tuple[list[float], list[float]]:
     if np.iscomplexobj(s):
         real = _splines(tuple(tuple(x.real for x in p) for p in points), closed)
         at, columns = np.array(s), _closing(points, closed).T
-        steps = (packed(at, c, complex_cubic(at, c, closed), beyond).imag for c in columns)
+        steps = (pack_spline(at, c, complex_cubic(at, c, closed), beyond).imag for c in columns)
         return tuple((np.array(r) + 1j * d).tolist() for r, d in zip(real, steps, strict=True))  # type: ignore[return-value]
     x, y = (tuple(c) for c in _closing(points, closed).T.tolist())
     return tuple(Table(k, x=s, y=c, beyond=beyond).data() for k, c in (("px", x), ("py", y)))  # type: ignore[return-value]

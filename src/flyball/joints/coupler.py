@@ -8,8 +8,8 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from ..errors import ModelError
-from ..model.coupling import Coupling
 from ..model.element import Number, Numbers, Unit, element
+from ..model.joint import Coupling
 
 if TYPE_CHECKING:
     from ..model.model import Model

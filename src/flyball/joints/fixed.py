@@ -29,6 +29,6 @@ class Fixed(Joint):
     omission: ClassVar[float] = 1.5
 
 
-def welded(name: str, body: str, at: Any) -> Fixed:
+def weld_to_ground(name: str, body: str, at: Any) -> Fixed:
     """A joint that holds a body where it is drawn."""
     return Fixed(name, "ground", body, at=at)

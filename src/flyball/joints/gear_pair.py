@@ -8,9 +8,9 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from ..errors import ModelError
-from ..math.products import inner
-from ..model.coupling import Coupling, sense, shared_body
+from ..math.vec import inner_product
 from ..model.element import Flag, Numbers, Unit, element
+from ..model.joint import Coupling, sense, shared_body
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -56,7 +56,7 @@ class GearPair(Coupling):
         """1 and the ratio, signed for external or internal, for the axes' senses and for what turns on what."""
         carrier = self._carrier(model)
         s1, s2 = (sense(model, self, j, carrier) for j in (self.joint_1, self.joint_2))
-        same = -1.0 if inner(axes(self.joint_1), axes(self.joint_2)).real < -1e-9 else 1.0
+        same = -1.0 if inner_product(axes(self.joint_1), axes(self.joint_2)).real < -1e-9 else 1.0
         return 1.0, (-1.0 if self.internal else 1.0) * same * s1 * s2 * n.teeth[1] / n.teeth[0]
 
     def _carrier(self, model: Model) -> str:

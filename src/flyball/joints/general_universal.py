@@ -7,12 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..constraints import skew
+from ..constraints import skew_lines
 from ..constraints.blocks import ANGLE, SKEW_LINES, Row
 from ..errors import ModelError
-from ..math.products import inner
-from ..math.turns import reciprocal
-from ..math.vec import dot
+from ..math.rotation import reciprocal_rows
+from ..math.vec import dot, inner_product
 from ..model.element import Angle, Directions, PointPair, element
 from ..model.geometry import triad, vector
 from ..model.joint import Z_TO_X, Coordinate, Joint, WorldFrame
@@ -69,15 +68,15 @@ class GeneralUniversal(Joint):
             raise ModelError(
                 f"{self.title}: its axes are parallel; a link with parallel hinges is a Planar joint and a Distance"
             )
-        if row.kind != skew.KIND:
-            return (*row.par[:6], inner(f, m))
+        if row.kind != skew_lines.KIND:
+            return (*row.par[:6], inner_product(f, m))
         way = M[0] - F[0]
-        return (*row.par[:3], *(dot(way, r) for r in reciprocal((f, m, across))), 0.0)
+        return (*row.par[:3], *(dot(way, r) for r in reciprocal_rows((f, m, across))), 0.0)
 
 
 def _with_x(z: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Axes with the given z and x towards ``other``."""
-    x = other - inner(other, z) * z
+    x = other - inner_product(other, z) * z
     size = np.sqrt((x * x).sum())
     if not size.real > PARALLEL:
         return triad(z)

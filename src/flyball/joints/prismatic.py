@@ -37,6 +37,6 @@ class Prismatic(Joint):
     replaceable: ClassVar[bool] = True
 
 
-def slide(name: str, body: str, at: Any, planar: bool) -> Prismatic:
+def slide_from_ground(name: str, body: str, at: Any, planar: bool) -> Prismatic:
     """A slide along x, from ground to a body."""
     return Prismatic(name, "ground", body, at=at, axis=(1, 0) if planar else (1, 0, 0))

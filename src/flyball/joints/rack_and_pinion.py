@@ -8,8 +8,8 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..errors import ModelError
-from ..model.coupling import Coupling
 from ..model.element import Length, element
+from ..model.joint import Coupling
 
 if TYPE_CHECKING:
     from ..model.model import Model

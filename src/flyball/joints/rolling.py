@@ -9,7 +9,7 @@ import numpy as np
 
 from ..constraints.blocks import ON_PLANE, Row, no_slip
 from ..errors import ModelError
-from ..math.products import inner
+from ..math.vec import inner_product
 from ..model.element import Direction, Length, element, nonnegative, positive
 from ..model.geometry import triad, vector
 from ..model.joint import Joint, WorldFrame
@@ -62,7 +62,7 @@ class RollingDisk(Joint):
         centre = vector(n.at, planar, f"'at' of {self.title}")
         up = vector(n.normal, planar, f"normal of {self.title}", direction=True)
         M = self.orientation(n.axis, planar)
-        c = inner(up, M[:, 2])
+        c = inner_product(up, M[:, 2])
         s = np.sqrt((1.0 - c) * (1.0 + c))
         if not s.real > FLAT:
             raise ModelError(

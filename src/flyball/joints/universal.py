@@ -9,7 +9,7 @@ import numpy as np
 
 from ..constraints.blocks import ANGLE, COMMON_POINT, CROSSED_AXES
 from ..errors import ModelError
-from ..math.products import inner
+from ..math.vec import inner_product
 from ..model.element import Angle, Directions, element
 from ..model.geometry import vector
 from ..model.joint import Z_TO_X, Coordinate, Joint, Primitive, WorldFrame
@@ -56,12 +56,12 @@ class Universal(Joint):
             raise ModelError(f"{self.title}: give its two axes, for instance axes=((1, 0, 0), (0, 1, 0))")
         p = vector(n.at, planar, f"'at' of {self.title}")
         a, b = (vector(x, planar, f"axes of {self.title}", direction=True) for x in n.axes)
-        cosine = inner(a, b)
+        cosine = inner_product(a, b)
         if abs(cosine) > 1e-6:
             degrees = np.degrees(np.arccos(np.clip(cosine.real, -1, 1)))
             raise ModelError(f"{self.title}: its axes must be at right angles, these are at {degrees:.4g} deg")
         b = b - cosine * a
-        b = b / np.sqrt(inner(b, b))
+        b = b / np.sqrt(inner_product(b, b))
         F = np.column_stack([b, np.cross(a, b), a])
         M = np.column_stack([a, np.cross(b, a), b])
         return (p, F), (p, M)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from ..constraints.blocks import ANGLE, SLIDE, STRAIGHT_LINE, Row
 from ..errors import ModelError
-from ..math.products import inner, product
+from ..math.vec import inner_product, matrix_product
 from ..model.element import Angle, Length, Point, element
 from ..model.geometry import vector
 from ..model.joint import Z_TO_X, Coordinate, Joint, WorldFrame
@@ -55,7 +55,7 @@ class WheelOnLine(Joint):
         R = self.orientation(n.axis, planar)
         at = vector(n.at, planar, f"'at' of {self.title}")
         centre = vector(n.centre, planar, f"centre of {self.title}")
-        d = product(R.T, centre - at)
+        d = matrix_product(R.T, centre - at)
         if not abs(d[0].real) > 0.0:
             raise ModelError(f"{self.title}: its centre lies on the line; the wheel has no radius")
         if abs(d[2].real) > 1e-9 * abs(d[0].real):
@@ -79,4 +79,4 @@ class WheelOnLine(Joint):
 
 
 def _height(F: WorldFrame, M: WorldFrame) -> float:
-    return inner(F[1][:, 0], M[0] - F[0])
+    return inner_product(F[1][:, 0], M[0] - F[0])

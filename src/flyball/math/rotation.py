@@ -1,12 +1,19 @@
-"""Rotation vectors on tuples of numbers, for formulas that are compiled."""
+"""Rotations on plain tuples: rotation vectors, Cayley steps, and sequences of rotations about coordinate axes.
+
+A Cayley step is the rotation axis times 2 tan(angle / 2).
+
+Axes are numbered 0, 1, 2. A sequence (i, j, k) rotates by a about axis i, by b about the new axis j, by c about the
+newer axis k: R = R_i(a) R_j(b) R_k(c). An angular velocity is the sum of its three rates, each along the axis of
+its rotation, so these axes are the columns of the kinematic matrix H in w = H (adot, bdot, cdot).
+"""
 
 from __future__ import annotations
 
 from ..compiler.formulas import formula
-from .scalar import atan2, choose, cos, sin, sqrt
-from .vec import add, cross, dot, scale
+from .scalar import atan2, choose, cos, divide, sin, sqrt
+from .vec import add, cross, dot, mtv, mv, quaternion_product, scale
 
-SMALL = 1e-4  # square of the angle [rad^2] below which series are exact to rounding
+SMALL_ANGLE_SQUARE = 1e-4  # square of the angle [rad^2] below which series are exact to rounding
 HALF_TURN = 3.1406  # above this angle [rad] the axis is about to flip and is not told any more
 NOT_A_NUMBER = float("nan")
 
@@ -17,7 +24,7 @@ def rotation_vector(R):
     e = (0.5 * (R[7] - R[5]), 0.5 * (R[2] - R[6]), 0.5 * (R[3] - R[1]))  # sin(angle) times the axis
     c = 0.5 * (R[0] + R[4] + R[8] - 1.0)
     s2 = dot(e, e)
-    far = choose(c, s2 - SMALL, s2 + 1.0)  # greater than zero where the series do not do
+    far = choose(c, s2 - SMALL_ANGLE_SQUARE, s2 + 1.0)  # greater than zero where the series do not do
     s = sqrt(choose(far, s2, 1.0 + s2))
     angle = atan2(s, c)
     series = 1.0 + s2 * (1.0 / 6.0 + s2 * (3.0 / 40.0 + s2 * (15.0 / 336.0 + s2 * 105.0 / 3456.0)))  # asin(s) / s
@@ -35,9 +42,114 @@ def log_gradient(theta, a):
     k = 1/t^2 - (1 + cos t) / (2 t sin t) (Bullo and Murray, 1995).
     """
     t2 = dot(theta, theta)
-    far = t2 - SMALL
+    far = t2 - SMALL_ANGLE_SQUARE
     half = 0.5 * sqrt(choose(far, t2, 1.0 + t2))
     series = 1.0 / 12.0 + t2 * (1.0 / 720.0 + t2 / 30240.0)
     k = choose(far, (1.0 - half * cos(half) / sin(half)) / (4.0 * half * half), series)
     across = cross(theta, a)
     return add(a, add(scale(0.5, across), scale(k, cross(theta, across))))
+
+
+LEAST_SCALAR_PART = 1e-150  # scalar part of a quaternion that half a turn is told by
+
+
+@formula
+def cayley_quaternion(d):
+    """The unit quaternion of a step, for any d."""
+    x = scale(0.5, d)
+    r = divide(1.0, sqrt(1.0 + dot(x, x)))
+    return (r, r * x[0], r * x[1], r * x[2])
+
+
+@formula
+def cayley_step(q):
+    """The step of a quaternion; of half a turn a very large one."""
+    by = 2.0 / (q[0] if abs(q[0]) > LEAST_SCALAR_PART else LEAST_SCALAR_PART)
+    return (by * q[1], by * q[2], by * q[3])
+
+
+@formula
+def rotation_change(d, a):
+    """R(d)^T a - a, where R(d)^T a are the components of a along axes that are turned by d."""
+    y = scale(-0.5, d)
+    bend = cross(y, a)
+    return scale(2.0 / (1.0 + dot(y, y)), add(bend, cross(y, bend)))
+
+
+@formula
+def cayley_rate(d, w):
+    """Rate of the step whose axes turn at w: w + d x w / 2 + d (d . w) / 4."""
+    return add(w, add(scale(0.5, cross(d, w)), scale(0.25 * dot(d, w), d)))
+
+
+@formula
+def coordinate_axis(axis, o):
+    """Coordinate axis in numbers of the type of o, which is zero."""
+    if axis == 0:
+        return (o + 1, o, o)
+    if axis == 1:
+        return (o, o + 1, o)
+    return (o, o, o + 1)
+
+
+@formula
+def axis_rotation(axis, angle):
+    """Rotation matrix, row by row, of a turn about a coordinate axis by an angle [rad]."""
+    c, s, o = cos(angle), sin(angle), 0.0 * angle
+    if axis == 0:
+        return (o + 1, o, o, o, c, -s, o, s, c)
+    if axis == 1:
+        return (c, o, s, o, o + 1, o, -s, o, c)
+    return (c, -s, o, s, c, o, o, o, o + 1)
+
+
+@formula
+def axis_quaternion(axis, angle):
+    """Unit quaternion of a turn about a coordinate axis by an angle [rad]."""
+    half = angle / 2
+    e = scale(sin(half), coordinate_axis(axis, 0.0 * angle))
+    return (cos(half), e[0], e[1], e[2])
+
+
+@formula
+def sequence_quaternion(i, j, k, a, b, c):
+    """Unit quaternion of three turns, each about an axis of the frame that the turns before have left."""
+    return quaternion_product(quaternion_product(axis_quaternion(i, a), axis_quaternion(j, b)), axis_quaternion(k, c))
+
+
+@formula
+def axes_in_base(i, j, k, a, b):
+    """Axes of the three turns along the frame that stays: e_i, R_i(a) e_j, R_i(a) R_j(b) e_k."""
+    o, A = 0.0 * (a + b), axis_rotation(i, a)
+    return coordinate_axis(i, o), mv(A, coordinate_axis(j, o)), mv(A, mv(axis_rotation(j, b), coordinate_axis(k, o)))
+
+
+@formula
+def axes_in_body(i, j, k, b, c):
+    """Axes of the three turns along the frame that they lead to."""
+    o, C = 0.0 * (b + c), axis_rotation(k, c)
+    return mtv(C, mtv(axis_rotation(j, b), coordinate_axis(i, o))), mtv(C, coordinate_axis(j, o)), coordinate_axis(k, o)
+
+
+@formula
+def axes_in_base_rate(h, rates):
+    """Rates of the axes h as seen from the frame that stays: each is carried along by the turns before it."""
+    o = 0.0 * rates[0]
+    first = scale(rates[0], h[0])
+    return (o, o, o), cross(first, h[1]), cross(add(first, scale(rates[1], h[1])), h[2])
+
+
+@formula
+def axes_in_body_rate(h, rates):
+    """Rates of the axes h as seen from the turned frame: each is left behind by the turns after it."""
+    o = 0.0 * rates[0]
+    last = scale(rates[2], h[2])
+    return cross(h[0], add(last, scale(rates[1], h[1]))), cross(h[1], last), (o, o, o)
+
+
+@formula
+def reciprocal_rows(h):
+    """Rows of the inverse of the matrix with the columns h; not finite where these lie in a plane."""
+    n = cross(h[1], h[2])
+    f = divide(1, dot(h[0], n))
+    return scale(f, n), scale(f, cross(h[2], h[0])), scale(f, cross(h[0], h[1]))

@@ -275,7 +275,7 @@ def _register() -> None:
     """Tell the compiler what these functions are for real and complex numbers."""
     from numba import types
 
-    from ..compiler.target import overload
+    from ..compiler.numba_target import overload
 
     def analytic(function: Function, name: str) -> None:
         real, complex_ = getattr(math, name), getattr(cmath, name)

@@ -37,22 +37,22 @@ def spline(data, at, x):
         return x.tabulated(data, at)
     if isinstance(x, np.ndarray) and x.dtype == object:
         return np.frompyfunc(lambda e: spline(data, at, e), 1, 3)(x)
-    return on_pieces(data, at, x)
+    return evaluate_piece(data, at, x)
 
 
 @formula
-def on_pieces(data, at, x):
+def evaluate_piece(data, at, x):
     """`spline` where x is a number: it chooses the piece."""
-    start, origin = piece(data, at, x)
+    start, origin = find_piece(data, at, x)
     s = x - origin
     c0, c1, c2, c3 = data[start], data[start + 1], data[start + 2], data[start + 3]
     return c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + 3.0 * c3 * s), 2.0 * c2 + 6.0 * c3 * s
 
 
-def piece(data, at, x):
+def find_piece(data, at, x):
     """Place of the coefficients that hold at x, and the x that they count from."""
     if isinstance(x, float | int | complex):
-        return found(data, at, x)
+        return find_piece_of_number(data, at, x)
     count = int(data[at + 1].real)
     all_breaks = data[at + BREAKS : at + BREAKS + count]
     breaks = all_breaks.real
@@ -64,7 +64,7 @@ def piece(data, at, x):
     return at + BREAKS + count + PIECE * k, all_breaks[np.maximum(k - 1, 0)] + data[at] * turns
 
 
-def found(data, at, x):
+def find_piece_of_number(data, at, x):
     """The same for one number, by bisection; this is what compiled code does."""
     x = x.real
     count = int(data[at + 1].real)
@@ -113,15 +113,15 @@ def complex_cubic(x: np.ndarray, y: np.ndarray, periodic: bool) -> np.ndarray:
     return np.column_stack([y[:-1], left, (3.0 * d - 2.0 * left - right) / h, (left + right - 2.0 * d) / h**2])
 
 
-def packed(x: np.ndarray, y: np.ndarray, pieces: np.ndarray, beyond: str) -> np.ndarray:
+def pack_spline(x: np.ndarray, y: np.ndarray, pieces: np.ndarray, beyond: str) -> np.ndarray:
     """The flat list of numbers: ``pieces`` between the points, and behind the ends what ``beyond`` says.
 
     "hold", "line" (straight on), "repeat", or "refuse": nan.
     """
-    behind = [y[-1], *_moved(pieces[-1], x[-1] - x[-2])[1:]]
+    behind = [y[-1], *_shifted_cubic(pieces[-1], x[-1] - x[-2])[1:]]
     if beyond == "refuse":
         more = max(GRACE * (x[-1] - x[0]), 4.0 * np.spacing(np.abs(x).max()))
-        first = _moved(pieces[0], -more)
+        first = _shifted_cubic(pieces[0], -more)
         x = np.r_[x[0] - more, x, x[-1] + more]
         pieces = np.vstack([first, pieces, behind])
         before = behind = [np.nan] * PIECE
@@ -132,13 +132,13 @@ def packed(x: np.ndarray, y: np.ndarray, pieces: np.ndarray, beyond: str) -> np.
     return np.r_[period, len(x), x, np.vstack([before, pieces, behind]).ravel()]
 
 
-def _moved(piece: np.ndarray, by: float) -> list[float]:
+def _shifted_cubic(piece: np.ndarray, by: float) -> list[float]:
     """A cubic counted from another place."""
     c0, c1, c2, c3 = piece
     return [c0 + by * (c1 + by * (c2 + by * c3)), c1 + by * (2.0 * c2 + 3.0 * by * c3), c2 + 3.0 * by * c3, c3]
 
 
-def symbolic(data: Any, at: int, x: Any) -> Any:
+def spline_expression(data: Any, at: int, x: Any) -> Any:
     """The spline's value as a SymPy expression of the symbol (or expression) ``x``."""
     import sympy
 
@@ -160,12 +160,12 @@ def symbolic(data: Any, at: int, x: Any) -> Any:
 @when_compiling
 def _register() -> None:
     """In compiled code x is one number."""
-    from ..compiler.target import overload
+    from ..compiler.numba_target import overload
 
-    @overload(piece)
+    @overload(find_piece)
     def choose(data, at, x):
-        return found
+        return find_piece_of_number
 
     @overload(spline)
     def choose_spline(data, at, x):
-        return lambda data, at, x: on_pieces(data, at, x)
+        return lambda data, at, x: evaluate_piece(data, at, x)

@@ -1,10 +1,17 @@
-"""Three-vectors, 3 x 3 matrices (row by row) and quaternions (scalar first) as plain tuples.
+"""Three-vectors, 3 x 3 matrices (row by row) and quaternions (scalar first) as plain tuples; small products.
 
 Tuples of numbers, not small arrays: the compiler keeps them in registers, and the same source runs on complex
 numbers, on arrays over time and on symbols.
+
+Products of small NumPy matrices add their terms in order: the same bits for every kind of number, on every machine.
+NumPy's own go through BLAS, which rounds some products and sums at once, others not, depending on the processor.
 """
 
 from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
 
 from ..compiler.formulas import formula
 from .scalar import sqrt
@@ -147,7 +154,7 @@ def load9(A, k, o):
 
 
 @formula
-def put3(A, k, o, a):
+def store3(A, k, o, a):
     """Write a three-vector into row k of a table, from column o."""
     A[k, o] = a[0]
     A[k, o + 1] = a[1]
@@ -155,7 +162,7 @@ def put3(A, k, o, a):
 
 
 @formula
-def put9(A, k, o, a):
+def store9(A, k, o, a):
     """Write a matrix into row k of a table, from column o."""
     for i in range(9):
         A[k, o + i] = a[i]
@@ -186,3 +193,26 @@ def quaternion_product(a, b):
         a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
         a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
     )
+
+
+def matrix_product(A: Any, B: Any) -> np.ndarray:
+    """A B of matrices (..., 3, 3) and a vector (3,) or matrices (..., 3, k)."""
+    if A.ndim == 2 and B.ndim == 1:
+        return np.array(mv(A.ravel().tolist(), B.tolist()))
+    if A.shape == B.shape == (3, 3):  # tuples take a tenth of the time of arrays
+        return np.array(mm(A.ravel().tolist(), B.ravel().tolist())).reshape(3, 3)
+    if "c" not in (A.dtype.kind, B.dtype.kind):
+        return _product_terms(A, B)
+    real = _product_terms(A.real, B.real) - (_product_terms(A.imag, B.imag) + 0.0)  # no zero changes its sign
+    out = np.empty(real.shape, complex)  # NumPy multiplies complex arrays by their places in memory
+    out.real, out.imag = real, _product_terms(A.real, B.imag) + _product_terms(A.imag, B.real) + 0.0
+    return out
+
+
+def _product_terms(A: Any, B: Any) -> Any:
+    return A[..., 0:1] * B[..., 0:1, :] + A[..., 1:2] * B[..., 1:2, :] + A[..., 2:] * B[..., 2:, :]
+
+
+def inner_product(a: Any, b: Any) -> Any:
+    """The inner product of two vectors (3,)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

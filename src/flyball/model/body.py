@@ -1,8 +1,13 @@
-"""Bodies and frames."""
+"""Bodies, frames, ground shapes, drivers and initial conditions; many equal bodies as arrays."""
 
 from __future__ import annotations
 
-from dataclasses import field
+import difflib
+import os
+import re
+from dataclasses import field, fields
+from functools import cached_property
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
@@ -10,8 +15,10 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from ..errors import ModelError
-from .color import check_color
+from ..math.vec import quaternion_matrix
+from ..rotations.arrays import unit_quaternions
 from .element import (
+    LARGEST_NUMBER,
     Angle,
     AngularVelocity,
     Density,
@@ -25,11 +32,44 @@ from .element import (
     Unit,
     Velocity,
     element,
-    plain,
+    python_data,
 )
-from .geometry import orientation_matrix, rotation_about
-from .orientation import Orientation
+from .geometry import Orientation, orientation_matrix, rotation_about
+from .inertia import MassProperties, mass_properties
 from .shapes import Solid
+from .shapes.mesh import current_folder
+
+_NAMES = """
+    aliceblue antiquewhite aqua aquamarine azure beige bisque black blanchedalmond blue blueviolet brown burlywood
+    cadetblue chartreuse chocolate coral cornflowerblue cornsilk crimson cyan darkblue darkcyan darkgoldenrod
+    darkgray darkgreen darkgrey darkkhaki darkmagenta darkolivegreen darkorange darkorchid darkred darksalmon
+    darkseagreen darkslateblue darkslategray darkslategrey darkturquoise darkviolet deeppink deepskyblue dimgray
+    dimgrey dodgerblue firebrick floralwhite forestgreen fuchsia gainsboro ghostwhite gold goldenrod gray green
+    greenyellow grey honeydew hotpink indianred indigo ivory khaki lavender lavenderblush lawngreen lemonchiffon
+    lightblue lightcoral lightcyan lightgoldenrodyellow lightgray lightgreen lightgrey lightpink lightsalmon
+    lightseagreen lightskyblue lightslategray lightslategrey lightsteelblue lightyellow lime limegreen linen magenta
+    maroon mediumaquamarine mediumblue mediumorchid mediumpurple mediumseagreen mediumslateblue mediumspringgreen
+    mediumturquoise mediumvioletred midnightblue mintcream mistyrose moccasin navajowhite navy oldlace olive
+    olivedrab orange orangered orchid palegoldenrod palegreen paleturquoise palevioletred papayawhip peachpuff peru
+    pink plum powderblue purple rebeccapurple red rosybrown royalblue saddlebrown salmon sandybrown seagreen
+    seashell sienna silver skyblue slateblue slategray slategrey snow springgreen steelblue tan teal thistle tomato
+    turquoise violet wheat white whitesmoke yellow yellowgreen
+"""
+NAMES = frozenset(_NAMES.split())
+"""The named colours of CSS Color Module Level 4, section 6.1 (W3C)."""
+_HEX = re.compile(r"#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
+
+
+def check_color(text: str, who: str) -> None:
+    """Refuse what is neither the name of a colour nor #rgb or #rrggbb."""
+    if _HEX.fullmatch(text) or text.lower() in NAMES:
+        return
+    close = difflib.get_close_matches(text.lower(), sorted(NAMES), 1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    raise ModelError(
+        f"{who}: color {text!r} is no colour{hint}; write a name of CSS such as 'steelblue', or #rgb or #rrggbb"
+    )
+
 
 GROUND = "ground"
 
@@ -52,13 +92,13 @@ def _solids(value: Any) -> Any:
 
 Inertia = Annotated[
     float | str | tuple[float | str, ...] | tuple[tuple[float | str, ...], ...],
-    BeforeValidator(plain),
+    BeforeValidator(python_data),
     Unit("kg*m^2"),
 ]
 Shapes = Annotated[Solid | tuple[Solid, ...] | None, BeforeValidator(_solids)]
 
 
-def listed(shape: Solid | tuple[Solid, ...] | None) -> tuple[Solid, ...]:
+def shape_tuple(shape: Solid | tuple[Solid, ...] | None) -> tuple[Solid, ...]:
     """Shapes as a tuple, however many were given."""
     if shape is None:
         return ()
@@ -156,7 +196,7 @@ class Body(Element):
 
     def shapes(self) -> tuple[Solid, ...]:
         """Its shapes, as a tuple."""
-        return listed(self.shape)
+        return shape_tuple(self.shape)
 
     def solids(self) -> tuple[Solid, ...]:
         """Its shapes that are seen: all but holes."""
@@ -239,3 +279,291 @@ class Initial(Element):
         """Something to meet."""
         if self.value is None and self.rate is None:
             raise ModelError(f"{self.title}: it says nothing; give value=..., rate=... or both")
+
+
+@element
+class Ground(Element):
+    """Shapes that stand still: a floor, a wall, a box without a lid.
+
+    Parameters
+    ----------
+    name : str
+        Of this part of ground, such as ``"floor"``.
+    shape : shape or list of shapes
+        What is seen, and touched where a `Contact` says so. Masses of shapes mean nothing here.
+    position : point [m]
+        Origin of its frame, in the world.
+    angle : number [rad]
+        Planar: orientation of its frame.
+    orientation : quaternion (scalar first), Bryant angles (x-y-z) [rad], rotation object or 3x3 matrix
+        Spatial: orientation of its frame.
+    material : str
+        `Material` of the shapes that name none of their own.
+    color : str
+        Colour in pictures.
+    """
+
+    shape: Shapes = field(kw_only=True)
+    position: Point = (0.0, 0.0, 0.0)
+    angle: Angle = 0.0
+    orientation: Orientation | None = None
+    material: Name | None = None
+    color: str | None = None
+
+    category: ClassVar[str] = "ground"
+
+    def shapes(self) -> tuple[Solid, ...]:
+        """Its shapes, as a tuple."""
+        return shape_tuple(self.shape)
+
+    def rotation(self, n: Any) -> np.ndarray:
+        """Rotation matrix of its frame."""
+        if n.orientation is not None:
+            return orientation_matrix(n.orientation, f"orientation of {self.title}")
+        return rotation_about(2, n.angle)
+
+    def check(self, n: SimpleNamespace) -> None:
+        """A shape, and nothing that has no effect on ground."""
+        if self.color is not None:
+            check_color(self.color, self.title)
+        if not self.shapes():
+            raise ModelError(f"{self.title}: it has no shape; give shape=Plane() or another")
+        for s in self.shapes():
+            _check_weightless(self, s)
+
+
+def _check_weightless(e: Ground, s: Solid) -> None:
+    for name in ("mass", "density"):
+        if getattr(s, name) is not None:
+            raise ModelError(f"{e.title}: {s.title} has a {name}, which means nothing on ground; leave it out")
+    if s.hole:
+        raise ModelError(f"{e.title}: {s.title} is a hole, which takes away mass only; leave it out")
+
+
+def frame_of(e: Ground, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
+    """Origin and axes of its frame, in the world."""
+    p = np.zeros(3)
+    p[: len(n.position)] = np.real(n.position)
+    return p, np.real(e.rotation(n))
+
+
+def _read(path: Path) -> np.ndarray:
+    """The array in a file of NumPy, or in a text with commas."""
+    kind = path.suffix.lower()
+    if kind not in (".npy", ".csv"):
+        raise ValueError("give an array of numbers, or the path of a file '*.npy' or '*.csv' that holds one")
+    try:
+        return np.load(path, allow_pickle=False) if kind == ".npy" else np.loadtxt(path, delimiter=",", ndmin=1)
+    except OSError as error:
+        raise ValueError(f"cannot read {os.fspath(path)!r}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise ValueError(f"{os.fspath(path)!r} holds no array of numbers: {error}") from None
+
+
+def _numbers(value: Any) -> Any:
+    """An array of numbers of its own, not to be changed."""
+    if isinstance(value, (str, os.PathLike)):
+        value = _read(current_folder() / value)
+    try:
+        a = np.array(value)
+    except ValueError:
+        raise ValueError("give an array of numbers, as long in every row") from None
+    if a.dtype.kind not in "iuf":
+        raise ValueError("give an array of numbers, in SI units")
+    a = np.array(a, float, order="C")
+    a.setflags(write=False)
+    return a
+
+
+Array = Annotated[Any, BeforeValidator(_numbers)]
+ARRAYS = ("position", "angle", "orientation", "velocity", "angular_velocity", "scale")
+
+
+@element
+class Bodies(Element):
+    """Many bodies of one shape, on nothing but gravity and contact: grains, balls, bricks.
+
+    Their numbers are arrays in SI units with a row for each body: 100,000 take no longer to describe than one. In place
+    of an array the path of a file that holds it will do, ``"grains.npy"`` or ``"grains.csv"``, counted from the folder
+    of the model file; it is read at once, and what is saved holds the numbers. In messages and results the eighteenth
+    of ``"balls"`` is ``"balls[17]"``. Joints, drivers and forces act on a `Body`.
+
+    Parameters
+    ----------
+    name : str
+    shape : shape or list of shapes
+        Of each of them, in its own reference frame.
+    position : (n, 3) numbers [m]
+        Origins of their reference frames, in the world; in a planar mechanism (n, 2) will do.
+    density : number [kg/m^3]
+        Of shapes without a mass or density of their own, as for a `Body`.
+    mass, inertia : number [kg], [kg m^2]
+        Of each of them, as for a `Body`.
+    angle : n numbers [rad]
+        Planar: orientations of the reference frames; 0 if not given. One number holds for all.
+    orientation : (n, 4) numbers
+        Spatial: quaternions, scalar first; the world's axes if not given. One row holds for all.
+    velocity : (n, 3) numbers [m/s]
+        At the start, of the reference frames' origins, world axes; 0 if not given. One row holds for all.
+    angular_velocity : (n, 3) numbers [rad/s]
+        At the start, world axes; in a planar mechanism n numbers. 0 if not given. One row holds for all.
+    scale : n numbers [1]
+        Size of each relative to ``shape``: lengths grow with it, masses with its cube, inertias with its fifth power.
+    material : str
+        `Material` of the shapes that name none of their own.
+    color : str
+        Colour in pictures.
+    """
+
+    shape: Shapes = field(kw_only=True)
+    position: Array = field(kw_only=True, repr=False)
+    density: Density | None = None
+    mass: Mass | None = None
+    inertia: Inertia | None = None
+    angle: Array | None = field(default=None, repr=False)
+    orientation: Array | None = field(default=None, repr=False)
+    velocity: Array | None = field(default=None, repr=False)
+    angular_velocity: Array | None = field(default=None, repr=False)
+    scale: Array | None = field(default=None, repr=False)
+    material: Name | None = None
+    color: str | None = None
+
+    category: ClassVar[str] = "bulk"
+
+    def __eq__(self, other: object) -> bool:
+        """Equal if everything is, to the bit."""
+        return isinstance(other, Bodies) and all(
+            _same(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.shape, self.position.tobytes()))
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        for name in ARRAYS:
+            if getattr(self, name) is not None:
+                getattr(self, name).setflags(write=False)
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.position)
+
+    @cached_property
+    def one(self) -> Body:
+        """One of them, with ``scale`` 1 and at the origin."""
+        return Body(
+            self.name,
+            shape=self.shape,
+            density=self.density,
+            mass=self.mass,
+            inertia=self.inertia,
+            material=self.material,
+            color=self.color,
+        )
+
+    def shapes(self) -> tuple[Solid, ...]:
+        """Its shapes, as a tuple."""
+        return shape_tuple(self.shape)
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Arrays of as many finite numbers as there are bodies; what depends on the plane is looked at later."""
+        self.one.check(n)
+        if not self.shapes():
+            raise ModelError(f"{self.title}: it has no shape; give shape=Sphere(radius=...) or another")
+        if self.position.ndim != 2 or not len(self.position):
+            raise ModelError(
+                f"{self.title}: position has the shape {self.position.shape}; give an array (n, 3), a row for each body"
+            )
+        for name in ARRAYS:
+            a = getattr(self, name)
+            if a is not None and not (np.abs(a) <= LARGEST_NUMBER).all():
+                k = np.argwhere(~(np.abs(a) <= LARGEST_NUMBER))[0]
+                raise ModelError(
+                    f"{self.title}: {name}[{', '.join(map(str, k))}] is {a[tuple(k)]:g}; give finite numbers, "
+                    f"{LARGEST_NUMBER:g} at most"
+                )
+        if self.scale is not None and not (self.scale > 0.0).all():
+            k = int(np.argmin(self.scale > 0.0))
+            raise ModelError(f"{self.title}: scale[{k}] is {self.scale.flat[k]:g}; it must be greater than 0")
+
+    def weight(self, n: SimpleNamespace, env: Any, planar: bool) -> MassProperties:
+        """Mass properties of one of them with ``scale`` 1.
+
+        Raises
+        ------
+        ModelError
+            If a shape makes no sense, or it has no mass or inertia.
+        """
+        given = {name: getattr(n, name) for name in ("mass", "density", "inertia")}
+        given |= dict.fromkeys(("inertia_about", "inertia_axes", "com"))
+        found = mass_properties(self.one, SimpleNamespace(**given), env, planar)
+        if not found.mass.real > 0.0:
+            raise ModelError(f"{self.title}: its mass is 0, and what touches needs one")
+        return found
+
+    def start(self, planar: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Positions (n, 3), rotations (n, 3, 3), velocities (n, 3) of the origins and angular velocities (n, 3).
+
+        Raises
+        ------
+        ModelError
+            If an array has another shape than it must.
+        """
+        n = self.count
+        p = _rows(self, "position", n, (3, 2) if planar else (3,))
+        v = _rows(self, "velocity", n, (3, 2) if planar else (3,))
+        if planar:
+            if self.orientation is not None:
+                raise ModelError(f"{self.title}: in a planar mechanism give angle=, not orientation=")
+            if (np.abs(p[:, 2]) + np.abs(v[:, 2])).any():
+                raise ModelError(f"{self.title}: the mechanism is planar; z of position and velocity must be 0")
+            turn, w = _line(self, "angle", n), np.zeros((n, 3))
+            w[:, 2] = _line(self, "angular_velocity", n)
+            R = np.zeros((n, 3, 3))
+            R[:, 0, 0] = R[:, 1, 1] = np.cos(turn)
+            R[:, 1, 0] = np.sin(turn)
+            R[:, 0, 1] = -R[:, 1, 0]
+            R[:, 2, 2] = 1.0
+            return p, R, v, w
+        if self.angle is not None:
+            raise ModelError(f"{self.title}: in a spatial mechanism give orientation=, not angle=")
+        return p, self._turned(n), v, _rows(self, "angular_velocity", n, (3,))
+
+    def _turned(self, n: int) -> np.ndarray:
+        if self.orientation is None:
+            return np.broadcast_to(np.eye(3), (n, 3, 3))
+        e = unit_quaternions(_rows(self, "orientation", n, (4,)), f"orientation of {self.title}")
+        return np.stack(quaternion_matrix(*e.T), axis=1).reshape(n, 3, 3)
+
+    def sizes(self) -> np.ndarray:
+        """Scale (n,) of each."""
+        return np.ones(self.count) if self.scale is None else _line(self, "scale", self.count)
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.shape == b.shape and a.tobytes() == b.tobytes()
+    return type(a) is type(b) and bool(a == b)
+
+
+def _rows(e: Bodies, name: str, n: int, widths: tuple[int, ...]) -> np.ndarray:
+    """An array (n, 3 or 4) of a field: as given, one row for all, or zeros."""
+    out = np.zeros((n, widths[0]))
+    a = getattr(e, name)
+    if a is None:
+        return out
+    if a.shape[-1:] not in {(w,) for w in widths} or a.ndim > 2 or (a.ndim == 2 and len(a) != n):
+        wanted = " or ".join(f"({n}, {w})" for w in widths)
+        raise ModelError(f"{e.title}: {name} has the shape {a.shape}; it must be {wanted}, a row for each body")
+    out[:, : a.shape[-1]] = a
+    return out
+
+
+def _line(e: Bodies, name: str, n: int) -> np.ndarray:
+    """An array (n,) of a field: as given, one number for all, or zeros."""
+    a = getattr(e, name)
+    if a is not None and a.shape not in ((), (n,)):
+        raise ModelError(f"{e.title}: {name} has the shape {a.shape}; it must be ({n},), a number for each body")
+    return np.zeros(n) if a is None else np.broadcast_to(a, (n,))

@@ -1,20 +1,70 @@
-"""What every controller declares: states of its own, signals that laws may name, and what it is given.
+"""Sensors, and what every controller declares: states of its own, signals that laws may name, and its inputs.
 
-A controller is described by formulas in the language of the laws, whose names are those of its own states, of its own
-signals and of what it is given. A state of a continuous controller has a rate, one of a sampled controller a next
-value. A sampled controller holds its signals from one instant to the next: to laws they are states, too.
+A controller is described by formulas in the language of laws, whose names are those of its own states, its own
+signals and its inputs. A state of a continuous controller has a rate, one of a sampled controller a next value. A
+sampled controller holds its signals from one instant to the next: to laws they are states, too.
 """
 
 from __future__ import annotations
 
 import keyword
 from abc import ABC, abstractmethod
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from ..errors import ModelError
-from .element import Element, Number, Unit, positive
+from .element import Element, Number, Unit, element, positive
+
+
+@element
+class Sensor(Element):
+    """A measured quantity with a name of its own.
+
+    Positions, angles, lengths and their rates may be named in the laws of forces; positions, angles and lengths in
+    those of drivers too. Whatever depends on accelerations (reactions, accelerations themselves) is an output only.
+    Sampling never forces the integrator to a step.
+
+    Parameters
+    ----------
+    name : str
+        Its name in results and in laws.
+    of : str
+        What it measures, a curve of the result: ``"A.angle"``, ``"A.rate"``, ``"tip.y"``, ``"tip.vy"``,
+        ``"spring.length"``, ``"A.fx"``, ``"energy.kinetic"``.
+    """
+
+    of: str = field(kw_only=False)
+
+    category: ClassVar[str] = "sensors"
+
+    def ends(self) -> dict[str, str]:
+        """It has no frame of its own."""
+        return {}
+
+
+@element
+class IMU(Element):
+    """An inertial measurement unit fixed on a body: what accelerometers and gyroscopes in it would show.
+
+    Its curves are the specific force ``fx``, ``fy``, ``fz`` [m/s^2] (acceleration of its origin less gravity) and the
+    angular velocity ``wx``, ``wy``, ``wz`` [rad/s], both along its own axes. In the plane: ``fx``, ``fy``, ``w``.
+
+    Parameters
+    ----------
+    name : str
+    frame : str
+        Body or frame that it is fixed to; it has its origin and axes.
+    """
+
+    frame: str = field(kw_only=False)
+
+    category: ClassVar[str] = "sensors"
+
+    def ends(self) -> dict[str, str]:
+        """At the frame."""
+        return {"M": self.frame}
+
 
 OUTPUT = "output"
 """What a single output is called if nobody names it."""
@@ -112,7 +162,7 @@ class Controller(Element, ABC):
         """Its states; ``n`` holds the resolved fields."""
 
 
-def numbered(letter: str, count: int) -> tuple[str, ...]:
+def numbered_names(letter: str, count: int) -> tuple[str, ...]:
     """Names of so many states or signals: x1, x2; of one only the letter."""
     return (letter,) if count == 1 else tuple(f"{letter}{k + 1}" for k in range(count))
 

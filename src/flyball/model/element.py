@@ -24,8 +24,8 @@ from ..errors import ModelError
 from .expressions import number
 
 T = TypeVar("T", bound=type)
-LARGEST = 1e50  # numbers of elements; what is computed from them holds products of several
-LONG = 300  # letters of a value in a message
+LARGEST_NUMBER = 1e50  # numbers of elements; what is computed from them holds products of several
+LONG_TEXT = 300  # letters of a value in a message
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class LawOf:
     forces: bool = False  # and what parts carry, such as A.force
 
 
-def plain(value: Any) -> Any:
+def python_data(value: Any) -> Any:
     """NumPy scalars and arrays become Python numbers and lists; a bool is no number."""
     if isinstance(value, bool):
         raise ValueError("a truth value is not a number")
@@ -59,7 +59,7 @@ def plain(value: Any) -> Any:
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, (list, tuple)):
-        return tuple(plain(v) for v in value)
+        return tuple(python_data(v) for v in value)
     return value
 
 
@@ -82,13 +82,13 @@ def _name(value: Any) -> Any:
 Flag = Annotated[bool, BeforeValidator(_flag)]
 Name = Annotated[str, BeforeValidator(_name)]
 """The name of another part."""
-Number = Annotated[float | str, BeforeValidator(plain)]
+Number = Annotated[float | str, BeforeValidator(python_data)]
 """A number, a unit string such as ``"30 deg"``, or an expression of named parameters."""
-Numbers = Annotated[tuple[float | str, ...], BeforeValidator(plain)]
+Numbers = Annotated[tuple[float | str, ...], BeforeValidator(python_data)]
 Function = Callable[..., Any]
-Law = Annotated[float | str | Function, BeforeValidator(plain)]
+Law = Annotated[float | str | Function, BeforeValidator(python_data)]
 """A number, a unit string, an expression of time, inputs, sensors and parameters, or a Python function of these."""
-Laws = Annotated[tuple[float | str | Function, ...], BeforeValidator(plain)]
+Laws = Annotated[tuple[float | str | Function, ...], BeforeValidator(python_data)]
 
 Length = Annotated[Number, Unit("m")]
 Ratio = Annotated[Number, Unit("1")]
@@ -102,7 +102,7 @@ PointPair = Annotated[tuple[Numbers, Numbers], Unit("m"), Vector()]
 Direction = Annotated[Numbers, Unit(""), Vector()]
 Directions = Annotated[tuple[Numbers, Numbers], Unit(""), Vector()]
 Velocity = Annotated[Numbers, Unit("m/s"), Vector()]
-AngularVelocity = Annotated[float | str | tuple[float | str, ...], BeforeValidator(plain), Unit("rad/s")]
+AngularVelocity = Annotated[float | str | tuple[float | str, ...], BeforeValidator(python_data), Unit("rad/s")]
 
 
 CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
@@ -219,7 +219,7 @@ def _is_branch(place: str) -> bool:
 def _short(value: Any) -> str:
     """A value as it is written, cut where it is long: the vertices of a mesh, for instance."""
     text = repr(value)
-    return text if len(text) <= LONG else text[:LONG] + "..."
+    return text if len(text) <= LONG_TEXT else text[:LONG_TEXT] + "..."
 
 
 def _did_you_mean(word: str, known: list[str]) -> str:
@@ -342,20 +342,20 @@ def si_numbers(value: Any, env: Mapping[str, float], dimension: str | None, wher
         return tuple(si_numbers(v, env, dimension, where) for v in value)
     if type(value) is not float or value - value != 0.0:
         value = number(value, env, dimension, where)
-    return limited(value, dimension, where)
+    return checked_size(value, dimension, where)
 
 
-def limited(value: Any, dimension: str | None, where: str) -> Any:
+def checked_size(value: Any, dimension: str | None, where: str) -> Any:
     """The number; refused if it is so large that nothing can be computed with it."""
-    if not abs(value) <= LARGEST:
+    if not abs(value) <= LARGEST_NUMBER:
         unit = f" {dimension}" if dimension not in (None, "", "1") else ""
         raise ModelError(
-            f"{where}: {value:g}{unit} is beyond {LARGEST:g}, where squares and products overflow; is its unit right?"
+            f"{where}: {value:g}{unit} is beyond {LARGEST_NUMBER:g}, where squares and products overflow; is its unit right?"
         )
     return value
 
 
-def written(e: Any) -> dict[str, Any]:
+def written_fields(e: Any) -> dict[str, Any]:
     """The fields that differ from their defaults, as plain data: what a model file holds."""
     out: dict[str, Any] = {}
     for f in dataclasses.fields(e):
@@ -373,7 +373,7 @@ def _data(value: Any) -> Any:
     if isinstance(value, (tuple, list)):
         return [_data(v) for v in value]
     if dataclasses.is_dataclass(value):
-        return {"type": type(value).__name__, **written(value)}
+        return {"type": type(value).__name__, **written_fields(value)}
     return value
 
 

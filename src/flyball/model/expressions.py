@@ -1,12 +1,13 @@
 """What a user may write where a number is wanted: a number, a quantity ("30 deg"), an expression ("2*k").
 
-Expressions are read with Python's own grammar into a small tree of known operations; nothing is ever executed.
-The same tree is evaluated here on numbers, arrays and symbols, and compiled for laws of time in `system.laws`. Laws may
-call tables by name, and a Python function may stand in place of a law (`model.function`).
+Expressions are trees of known operations (`expression_parser`), evaluated here on numbers, arrays and symbols,
+and compiled to bytecode in `laws`. Laws may call tables by name, and a Python function may stand in place of a
+law. Named parameters may be numbers, quantities, or expressions of each other in any order.
 """
 
 from __future__ import annotations
 
+import keyword
 import operator
 import sys
 from collections.abc import Callable, Collection, Mapping
@@ -19,16 +20,25 @@ import numpy as np
 
 from ..errors import ExpressionError, ModelError, UnitError
 from ..math import scalar
-from .attached import refuse_attached, remedy
-from .function import apply, arguments, function_tree
-from .grammar import CONSTANTS, FUNCTIONS, Node, did_you_mean, read, refuse
-from .units import is_unit, split_quantity, to_si
-from .words import shortened
+from .expression_parser import (
+    CONSTANTS,
+    FUNCTIONS,
+    SyntaxNode,
+    apply_function,
+    did_you_mean,
+    function_arguments,
+    function_tree,
+    parse_text,
+    refuse_expression,
+)
+from .messages import shortened_list
+from .units import is_unit, quantity_remedy, refuse_attached, split_quantity, to_si
 
 if TYPE_CHECKING:
     from .table import Table
 
-NAMES = 600  # characters of the known names in a message
+
+MAX_NAMES = 600  # characters of the known names in a message
 
 
 @dataclass(frozen=True)
@@ -36,7 +46,7 @@ class Expression:
     """A formula of named quantities, such as "speed*t + sin(2*pi*t)"; equal if the text is equal."""
 
     text: str
-    tree: Node = field(repr=False, compare=False)
+    tree: SyntaxNode = field(repr=False, compare=False)
     function: Callable[..., Any] | None = field(default=None, repr=False, hash=False)
     where: str = field(default="", repr=False, compare=False)  # what it is the law of, for messages
 
@@ -65,7 +75,7 @@ class Expression:
     @classmethod
     def constant(cls, value: float) -> Expression:
         """The expression that is one number."""
-        return cls(repr(float(value)), Node("number", value=float(value)))
+        return cls(repr(float(value)), SyntaxNode("number", value=float(value)))
 
     @cached_property
     def names(self) -> frozenset[str]:
@@ -93,7 +103,7 @@ class Expression:
                 raise ExpressionError(f"'{self}': {error}") from None
         if all(name in known for name in self.names):
             return
-        nodes = self.tree.walk() if self.function is None else arguments(self.tree, known)
+        nodes = self.tree.walk() if self.function is None else function_arguments(self.tree, known)
         node = next((n for n in nodes if n.kind == "name" and n.value not in known), None)
         if node is None:
             return
@@ -109,8 +119,8 @@ class Expression:
             cure = f"a unit follows a single number, as in '2 {name}', in a formula within parentheses"
         else:
             cure = f"define a parameter '{name}', or correct the name"
-        listed = f"known names: {shortened(sorted(known), NAMES) or 'none'}; {cure}"
-        refuse(self.text, node.start, node.stop, f"unknown name '{name}'", listed)
+        listed = f"known names: {shortened_list(sorted(known), MAX_NAMES) or 'none'}; {cure}"
+        refuse_expression(self.text, node.start, node.stop, f"unknown name '{name}'", listed)
 
     def evaluate(self, env: Mapping[str, Any], tables: Mapping[str, Table] | None = None) -> Any:
         """Value with the names in `env`: numbers (real or complex), arrays, or SymPy symbols; and the tables it calls.
@@ -143,7 +153,7 @@ class Expression:
 @lru_cache(maxsize=8192)
 def _parsed(text: str, tables: frozenset[str], curves: bool) -> Expression:
     """The same text is read when an element is added, and again for each analysis."""
-    return Expression(*read(text, tables, curves))
+    return Expression(*parse_text(text, tables, curves))
 
 
 def number(
@@ -211,20 +221,20 @@ def law_expression(
     return Expression.constant(number(value, {}, dimension, where, {"t", *names, *tables}))
 
 
-def folded(node: Node, text: str) -> Node:
+def fold_constants(node: SyntaxNode, text: str) -> SyntaxNode:
     """The tree with parts made of literals replaced by their value; `ExpressionError` if one is not finite."""
-    args = tuple(folded(arg, text) for arg in node.args)
+    args = tuple(fold_constants(arg, text) for arg in node.args)
     if node.kind in ("step", "step5") and args[1].kind == args[3].kind == "number" and args[1].value == args[3].value:
         value = float(args[1].value)
         wider = f"give x1 another value than x0 = {value:g}; a jump is where(x < {value:g}, y0, y1)"
-        refuse(text, node.start, node.stop, "this step has no width", wider)
+        refuse_expression(text, node.start, node.stop, "this step has no width", wider)
     if node.kind in _UNFOLDED or any(arg.kind != "number" for arg in args):
         return replace(node, args=args)
     value = float(OPERATIONS[node.kind](*(float(arg.value) for arg in args)))
     if value - value != 0.0:
         problem = f"this part is {value}, which is not a finite number"
-        refuse(text, node.start, node.stop, problem, "check divisions by zero, roots, and the ends of steps")
-    return Node("number", (), value, node.start, node.stop)
+        refuse_expression(text, node.start, node.stop, problem, "check divisions by zero, roots, and the ends of steps")
+    return SyntaxNode("number", (), value, node.start, node.stop)
 
 
 def is_number_text(text: str) -> bool:
@@ -282,19 +292,21 @@ def _of_text(value: str, env: Mapping[str, Any], dimension: str | None, names: C
     try:
         return to_si(value, dimension)
     except UnitError as error:
-        raise UnitError(f"{error}{remedy(*parts)}") from None
+        raise UnitError(f"{error}{quantity_remedy(*parts)}") from None
 
 
-def _evaluate(node: Node, env: Mapping[str, Any], tables: Mapping[str, Table]) -> Any:
+def _evaluate(node: SyntaxNode, env: Mapping[str, Any], tables: Mapping[str, Table]) -> Any:
     if node.kind == "number":
         return node.value
     if node.kind == "name":
         return env[node.value]
-    args = [_evaluate(arg, env, tables) for arg in (arguments(node, env) if node.kind == "function" else node.args)]
+    args = [
+        _evaluate(arg, env, tables) for arg in (function_arguments(node, env) if node.kind == "function" else node.args)
+    ]
     if node.kind == "table":
         return tables[node.value].value(*args)
     if node.kind in ("function", "called"):
-        return apply(node.value.function if node.kind == "called" else node.value, *args)
+        return apply_function(node.value.function if node.kind == "called" else node.value, *args)
     return OPERATIONS[node.kind](*args)
 
 
@@ -365,3 +377,88 @@ OPERATIONS = {
     "not": lambda a: not a if isinstance(a, bool) else ~a,
 }
 _UNFOLDED = frozenset({"number", "name", "where", "<", "<=", "and", "or", "not", "table", "function", "called"})
+
+
+def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of named parameters, which may be numbers, quantities, or expressions of each other in any order.
+
+    Raises
+    ------
+    ExpressionError
+        If parameters depend on each other in a circle, or a name is not allowed or not known.
+    UnitError
+        If a quantity has no known unit.
+    """
+    for name in parameters:
+        _check_parameter_name(name)
+    formulas: dict[str, Expression] = {}
+    values: dict[str, Any] = {}
+    for name, value in parameters.items():
+        if isinstance(value, Expression) or (isinstance(value, str) and split_quantity(value) is None):
+            formulas[name] = law_expression(value, None, f"parameter '{name}'")
+        else:
+            values[name] = number(value, {}, None, f"parameter '{name}'", parameters.keys())
+    for name, formula in formulas.items():
+        try:
+            formula.require(parameters.keys())
+        except ExpressionError as error:
+            raise ExpressionError(f"parameter '{name}': {error}") from None
+    for name in _in_order(formulas):
+        values[name] = number(formulas[name], values, None, f"parameter '{name}'")
+    return {name: values[name] for name in parameters}
+
+
+def parameter_formulas(parameters: Mapping[str, Any]) -> dict[str, Expression]:
+    """Those of parameters that can be resolved which depend on others, each after those that it uses."""
+    formulas = {
+        name: law_expression(value, None, f"parameter '{name}'")
+        for name, value in parameters.items()
+        if isinstance(value, Expression) or (isinstance(value, str) and split_quantity(value) is None)
+    }
+    return {name: formulas[name] for name in _in_order(formulas)}
+
+
+def resolve_changed(
+    known: Mapping[str, Any], formulas: Mapping[str, Expression], changed: Mapping[str, Any]
+) -> dict[str, Any]:
+    """`resolve_parameters` with some changed to numbers: only these are found anew, and what depends on them.
+
+    ``known`` are all values as they were, ``formulas`` those of `parameter_formulas`.
+    """
+    out = dict(known)
+    for name, value in changed.items():
+        out[name] = number(value, {}, None, f"parameter '{name}'", known.keys())
+    reached = set(changed)
+    for name, formula in formulas.items():
+        if name not in changed and not reached.isdisjoint(formula.names):
+            out[name] = number(formula, out, None, f"parameter '{name}'")
+            reached.add(name)
+    return out
+
+
+def _in_order(formulas: Mapping[str, Expression]) -> list[str]:
+    """Names sorted so that each comes after those it uses."""
+    order: dict[str, None] = {}
+    for first in formulas:
+        path = [first]
+        while path:
+            missing = sorted(n for n in formulas[path[-1]].names if n in formulas and n not in order)
+            if not missing:
+                order[path.pop()] = None
+            elif missing[0] in path:
+                circle = " -> ".join([*path[path.index(missing[0]) :], missing[0]])
+                raise ExpressionError(
+                    f"parameters depend on each other in a circle: {circle}; give one of them a value"
+                )
+            else:
+                path.append(missing[0])
+    return list(order)
+
+
+def _check_parameter_name(name: Any) -> None:
+    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+        reason = "is a word of the expression language" if keyword.iskeyword(name) else "is not a plain name"
+        raise ExpressionError(f"parameter {name!r}: {reason}; use letters, digits and _, e.g. 'spring_rate'")
+    kind = "a function" if name in FUNCTIONS else "a constant" if name in CONSTANTS else "time"
+    if name in FUNCTIONS or name in CONSTANTS or name == "t":
+        raise ExpressionError(f"parameter '{name}': the name is taken, it means {kind}; rename it, e.g. '{name}_0'")

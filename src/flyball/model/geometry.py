@@ -1,17 +1,18 @@
-"""Vectors and orientations that users write, as NumPy arrays."""
+"""Vectors and orientations as users write them, converted to NumPy arrays."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import BeforeValidator
 
 from ..errors import ModelError
-from ..math.products import product
+from ..math.rotation import axis_rotation
 from ..math.scalar import real_parts
-from ..math.turns import turn
-from ..math.vec import cross, quaternion_matrix
-from ..rotations.checks import quaternion_of, rotation_matrices, unit_quaternions
+from ..math.vec import cross, matrix_product, quaternion_matrix
+from ..rotations.arrays import quaternion_of, rotation_matrices, unit_quaternions
+from .element import Unit, python_data
 
 
 def vector(values: Any, planar: bool, what: str, direction: bool = False) -> np.ndarray:
@@ -56,7 +57,7 @@ def triad(z: np.ndarray) -> np.ndarray:
 
 def rotation_about(axis: int, angle: float) -> np.ndarray:
     """Rotation about a coordinate axis (0, 1, 2) by an angle [rad]."""
-    return np.array(turn(axis, angle)).reshape(3, 3)
+    return np.array(axis_rotation(axis, angle)).reshape(3, 3)
 
 
 def quaternion_to_matrix(e: np.ndarray) -> np.ndarray:
@@ -83,5 +84,20 @@ def orientation_matrix(value: Any, what: str) -> np.ndarray:
     if a.shape == (4,):
         return quaternion_to_matrix(unit_quaternions(a, what))
     if a.shape == (3,):
-        return product(product(rotation_about(0, a[0]), rotation_about(1, a[1])), rotation_about(2, a[2]))
+        return matrix_product(matrix_product(rotation_about(0, a[0]), rotation_about(1, a[1])), rotation_about(2, a[2]))
     raise ModelError(f"{what}: give a quaternion (4, scalar first), Bryant angles (3) or a 3x3 rotation matrix")
+
+
+def oriented(value: Any) -> Any:
+    """A rotation object (with ``as_quat`` or ``as_matrix``) becomes a quaternion, scalar first."""
+    if hasattr(value, "as_matrix"):
+        value = matrix_to_quaternion(np.asarray(value.as_matrix()))
+    value = python_data(value)
+    if not isinstance(value, (tuple, list)):
+        raise ValueError("give a quaternion (4, scalar first), Bryant angles (3) or a 3x3 rotation matrix")
+    if len(value) == 3 and all(isinstance(row, (tuple, list)) and len(row) == 3 for row in value):
+        value = matrix_to_quaternion(orientation_matrix(value, "orientation")).tolist()
+    return tuple(value)
+
+
+Orientation = Annotated[tuple[float | str, ...], BeforeValidator(oriented), Unit("rad")]

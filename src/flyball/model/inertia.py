@@ -1,7 +1,12 @@
-"""Mass, centre of mass and inertia of a body from whatever the user gave; physically impossible ones are refused."""
+"""Mass, centre of mass and inertia of a body, from numbers or from its shapes.
+
+Physically impossible values are refused.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -9,17 +14,120 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
-from ..math.products import inner, product
 from ..math.scalar import real_parts
-from .element import positive
+from ..math.vec import inner_product, matrix_product
+from .element import positive, resolve
 from .geometry import orientation_matrix, vector
-from .weighing import checked, shifted, weighed
+from .shapes import Solid
 
 if TYPE_CHECKING:
-    from .body import Body
+    from .body import Body, Ground
 
-TRIANGLE = 1e-9
-SAME = 1e-9  # a centre of mass that differs by less than this part of the body's size is the same
+
+@dataclass(frozen=True)
+class ShapeMasses:
+    """Mass [kg], centre [m], inertia [kg m^2] about it and volume [m^3] of a body's shapes; body axes."""
+
+    mass: Any
+    com: np.ndarray
+    inertia: np.ndarray
+    volume: Any
+
+
+def parallel_axis_term(mass: Any, d: np.ndarray) -> np.ndarray:
+    """Inertia of a point mass at d: m (d.d 1 - d d^T), the term of the parallel axis theorem (Hahn, eq. 4.26)."""
+    return mass * (inner_product(d, d) * np.eye(3) - np.outer(d, d))
+
+
+def checked_shapes(body: Body | Ground, env: Any, planar: bool) -> list[tuple[Solid, SimpleNamespace, str]]:
+    """The body's (or ground's) shapes with their numbers and what to call them in messages, every one checked."""
+    out = []
+    shapes = body.shapes()
+    for k, s in enumerate(shapes, 1):
+        where = f"{body.title}: " if len(shapes) == 1 else f"{body.title}, shape {k}: "
+        with _errors_located(where):
+            n = resolve(s, env)
+            for field in () if planar else s.points:
+                if len(getattr(n, field)) != 3:
+                    value = getattr(n, field)
+                    raise ModelError(f"{field} of {s.title}: expected 3 components, got {len(value)}: {value}")
+            s.check(n)
+        out.append((s, n, where))
+    return out
+
+
+@contextmanager
+def _errors_located(where: str) -> Iterator[None]:
+    """Errors in here say where they happened."""
+    try:
+        yield
+    except ModelError as error:
+        raise type(error)(f"{where}{error}") from None
+
+
+def shape_masses(body: Body, n: SimpleNamespace, shapes: list[tuple[Solid, SimpleNamespace, str]]) -> ShapeMasses:
+    """Add up the shapes that have a mass.
+
+    Raises
+    ------
+    ModelError
+        If a shape has no mass, has one in two ways, or the holes weigh more than the rest.
+    """
+    _consistent(body, n, shapes)
+    parts = []
+    for s, x, where in shapes:
+        with _errors_located(where):
+            volume = s.volume(x)
+            centre, gyration = s.placed(x)
+        density = next((d for d in (x.density, n.density) if d is not None), 1.0)
+        mass = volume * density if x.mass is None else x.mass
+        sign = -1.0 if s.hole else 1.0
+        parts.append((sign * mass, centre, gyration, sign * volume))
+    total, volume = sum(m for m, *_ in parts), sum(v for *_, v in parts)
+    if not (total.real > 0.0 and volume.real > 0.0):
+        raise ModelError(
+            f"{body.title}: its holes take more than there is: {volume:g} m^3 are left. Holes must lie inside the "
+            f"other shapes"
+        )
+    com = sum(m * c for m, c, *_ in parts) / total
+    inertia = sum(m * k + parallel_axis_term(m, c - com) for m, c, k, _ in parts)
+    if n.mass is not None:
+        total, inertia = n.mass, inertia * (n.mass / total)
+    return ShapeMasses(total, com, inertia, volume)
+
+
+def _consistent(body: Body, n: SimpleNamespace, shapes: list[tuple[Solid, SimpleNamespace, str]]) -> None:
+    """Every shape has a mass in one way, and nothing that is given has no effect."""
+    own = [x.mass is not None or x.density is not None for _, x, _ in shapes]
+    if n.mass is not None:
+        if n.density is not None:
+            raise ModelError(
+                f"{body.title}: mass {n.mass:g} kg and density {n.density:g} kg/m^3 are both given; leave one out "
+                f"(a mass is shared out by volume; for shapes of different materials give each its density)"
+            )
+        for _, x, where in shapes:
+            if x.mass is not None:
+                raise ModelError(
+                    f"{where}it has a mass of its own, {x.mass:g} kg, and so has the body, {n.mass:g} kg; leave one out"
+                )
+        if any(own) and not all(own):
+            raise ModelError(
+                f"{shapes[own.index(False)][2]}it has no density, but others have. The body's mass is shared out by "
+                f"volume times density: give a density to all of its shapes or to none"
+            )
+    elif n.density is None and not all(own):
+        raise ModelError(
+            f"{shapes[own.index(False)][2]}its mass is missing; give mass=... or density=... of the body or the shape"
+        )
+    elif n.density is not None and all(own):
+        raise ModelError(
+            f"{body.title}: density {n.density:g} kg/m^3 has no effect, since all its shapes have a mass or density of "
+            f"their own; leave it out"
+        )
+
+
+TRIANGLE_TOLERANCE = 1e-9
+SYMMETRY_TOLERANCE = 1e-9  # a centre of mass that differs by less than this part of the body's size is the same
 
 
 @dataclass(frozen=True)
@@ -45,7 +153,7 @@ def mass_properties(body: Body, n: SimpleNamespace, env: Any, planar: bool) -> M
         If mass or inertia is missing, given in two ways, negative, not symmetric, or breaks the triangle inequality
         by more than 1e-9 of its size; if a shape makes no sense.
     """
-    if n.mass is not None and not n.mass.real > 0.0 and not _nothing(n):
+    if n.mass is not None and not n.mass.real > 0.0 and not _is_massless(n):
         why = (
             "A ring or link without mass, which joints hold, has inertia=0 too; a massless link is also a Distance"
             if n.mass == 0.0
@@ -53,7 +161,7 @@ def mass_properties(body: Body, n: SimpleNamespace, env: Any, planar: bool) -> M
         )
         raise ModelError(f"{body.title}: mass is {n.mass:g} kg; a mass must be greater than 0. {why}")
     positive(body, n, "density")
-    shapes = checked(body, env, planar)
+    shapes = checked_shapes(body, env, planar)
     heavy = [s for s in shapes if not s[0].looks]
     if n.inertia is not None:
         found = _from_numbers(body, n, planar, heavy)
@@ -66,7 +174,7 @@ def mass_properties(body: Body, n: SimpleNamespace, env: Any, planar: bool) -> M
     return found
 
 
-def _nothing(n: SimpleNamespace) -> bool:
+def _is_massless(n: SimpleNamespace) -> bool:
     """Whether a body has neither mass nor inertia: a part that only joins others."""
     return (
         n.mass == 0.0
@@ -120,12 +228,12 @@ def _from_shapes(body: Body, n: SimpleNamespace, planar: bool, heavy: list) -> M
     for field in ("inertia_about", "inertia_axes"):
         if getattr(n, field) is not None:
             raise ModelError(f"{body.title}: {field} says how inertia= is counted, which is not given; leave it out")
-    found = weighed(body, n, heavy)
+    found = shape_masses(body, n, heavy)
     com = found.com * np.array([1.0, 1.0, 0.0]) if planar else found.com
     if n.com is not None:
         given = vector(n.com, planar, f"com of {body.title}")
-        size = np.sqrt(abs(np.trace(found.inertia)) / abs(found.mass)) + np.sqrt(abs(inner(com, com)))
-        if np.sqrt(abs(inner(given - com, given - com))) > SAME * size:
+        size = np.sqrt(abs(np.trace(found.inertia)) / abs(found.mass)) + np.sqrt(abs(inner_product(com, com)))
+        if np.sqrt(abs(inner_product(given - com, given - com))) > SYMMETRY_TOLERANCE * size:
             raise ModelError(
                 f"{body.title}: com is {_numbers(given)} m, but the centre of mass of its shapes is {_numbers(com)} m. "
                 f"Leave com out, or give mass and inertia as well: the shapes are then for looks only"
@@ -164,10 +272,10 @@ def _given(body: Body, n: SimpleNamespace, planar: bool, com: np.ndarray) -> np.
         J = _matrix(body, n)
         if n.inertia_axes is not None:
             T = orientation_matrix(n.inertia_axes, f"inertia_axes of {body.title}")
-            J = product(product(T, J), T.T)
+            J = matrix_product(matrix_product(T, J), T.T)
     if n.inertia_about is not None:
         about = vector(n.inertia_about, planar, f"inertia_about of {body.title}")
-        J = J - shifted(n.mass, about - com)
+        J = J - parallel_axis_term(n.mass, about - com)
         if planar:
             J[:2] = 0.0
     return J
@@ -193,10 +301,10 @@ def _matrix(body: Body, n: SimpleNamespace) -> np.ndarray:
 def _check(body: Body, n: SimpleNamespace, found: MassProperties) -> None:
     """Refuse an inertia that no body of positive mass has."""
     a, b, c = _moments(found.inertia)
-    slack = TRIANGLE * max(abs(c), abs(a))
+    slack = TRIANGLE_TOLERANCE * max(abs(c), abs(a))
     inside = "Its holes must lie inside the other shapes" if n.inertia is None else ""
     if a < -slack:
-        why = inside or _doubt(n)
+        why = inside or _suspect_inertia(n)
         raise ModelError(
             f"{body.title}: its inertia has a negative principal moment: {a:g}, {b:g}, {c:g} kg m^2. {why}"
         )
@@ -217,7 +325,7 @@ def _moments(J: np.ndarray) -> np.ndarray:
     return np.linalg.eigvalsh(real_parts(J))
 
 
-def _doubt(n: SimpleNamespace) -> str:
+def _suspect_inertia(n: SimpleNamespace) -> str:
     """What of the given inertia may be wrong."""
     if n.inertia_about is not None:
         return "Check whether inertia_about is the point that it is about"

@@ -10,35 +10,33 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..errors import ModelError
-from . import wiring
-from .body import GROUND, Body, Driver, Frame, Initial
-from .bulk import Bodies
-from .contact import Contact
-from .controller import Controller
-from .copies import CATEGORIES, changed, copied, refuse_changes, same_values, snapshot, thawed
-from .coupling import Coupling
-from .element import Element, LawOf, Number, field_with, fields_with, plain, resolve
+from . import controller_signals
+from .body import GROUND, Bodies, Body, Driver, Frame, Ground, Initial
+from .contact import Contact, Material, MaterialPair
+from .controller import IMU, Controller, Sensor
+from .element import Element, LawOf, Number, field_with, fields_with, python_data, resolve
 from .event import Event
-from .examine import but_is, carriers, check_units, measured
-from .expressions import Expression, number
-from .force import Force
+from .expressions import Expression, number, parameter_formulas, resolve_changed, resolve_parameters
+from .force import Force, Unilateral
 from .geometry import vector
-from .ground import Ground
-from .joint import Joint
-from .kept import Kept
-from .lawful import law_of
-from .limit import Unilateral
-from .material import Material, MaterialPair
-from .naming import check_name
-from .parameters import parameter_formulas, resolve_changed, resolve_parameters
-from .references import check_references
-from .sensor import IMU, Sensor
-from .summary import summary
+from .joint import Coupling, Joint
+from .messages import listing as listing
+from .messages import suggest as suggest
+from .messages import summary
+from .quantities import actual_kind, carrier_names, check_units, measured_quantity
+from .snapshot import (
+    CATEGORIES,
+    ResultCache,
+    changed_copy,
+    model_copy,
+    picklable_state,
+    refuse_changes,
+    same_values,
+    snapshot,
+)
 from .table import Table
 from .units import same_kind
-from .validity import check_kind, check_vectors, told_gravity
-from .words import listing as listing
-from .words import suggest as suggest
+from .validation import check_kind, check_name, check_references, check_vectors, checked_law, gravity_as_written
 
 
 class Model:
@@ -56,7 +54,7 @@ class Model:
     """
 
     frozen: ClassVar[bool] = False  # whether it is a snapshot
-    kept: Kept  # of a snapshot: what was worked out of it
+    kept: ResultCache  # of a snapshot: what was worked out of it
     aside: frozenset[str] = frozenset()  # parts of a copy that stand for something else: in no energy and no work
 
     def __init__(
@@ -77,11 +75,11 @@ class Model:
                 f"parameters of {name!r} maps names to values, for instance {{'mass': 2}}, not {parameters!r}"
             )
         try:
-            self.parameters = {k: plain(v) for k, v in (parameters or {}).items()}
+            self.parameters = {k: python_data(v) for k, v in (parameters or {}).items()}
         except (ValueError, TypeError, AttributeError) as error:
             raise ModelError(f"parameters of {name!r}: {error}") from None
         self.environment()
-        self.gravity = tuple(told_gravity(self, (0.0,) * (2 if planar else 3) if gravity is None else gravity))
+        self.gravity = tuple(gravity_as_written(self, (0.0,) * (2 if planar else 3) if gravity is None else gravity))
         self.gravity_told = gravity is not None
         self.gravity_vector()
         self.bodies: list[Body] = []
@@ -132,7 +130,7 @@ class Model:
 
     def copy(self) -> Any:
         """A mechanism of the same parts, to be changed without changing this one."""
-        return copied(self)
+        return model_copy(self)
 
     __copy__ = copy
 
@@ -145,15 +143,15 @@ class Model:
 
     def changed(self, parts: Mapping[str, Element | None]) -> Any:
         """A copy with other parts under these names, or (None) without them; nothing is checked."""
-        return changed(self, parts)
+        return changed_copy(self, parts)
 
     def __getstate__(self) -> dict[str, Any]:
-        return thawed(vars(self))
+        return picklable_state(vars(self))
 
     def __setattr__(self, name: str, value: Any) -> None:
         refuse_changes(self, f"{name!r} cannot be set")
         if name == "gravity":  # the caller's list stays the caller's
-            value = told_gravity(self, value)
+            value = gravity_as_written(self, value)
         super().__setattr__(name, value)
 
     def gravity_vector(self, env: Mapping[str, float] | None = None) -> np.ndarray:
@@ -176,7 +174,7 @@ class Model:
         if not isinstance(other, Model):
             return NotImplemented
         same = ("name", "planar", "gravity", "parameters", *CATEGORIES)
-        mine, its = thawed(vars(self)), thawed(vars(other))
+        mine, its = picklable_state(vars(self)), picklable_state(vars(other))
         return all(mine[k] == its[k] for k in same)
 
     __hash__ = None  # type: ignore[assignment]
@@ -271,10 +269,10 @@ class Model:
         if isinstance(found, Frame):
             return found.body
         if name != GROUND and not isinstance(found, Body):
-            names = carriers(self)
+            names = carrier_names(self)
             raise ModelError(
                 f"{e.title}: {field_with(e, name)}there is no body or frame named {name!r}"
-                f"{but_is(self, name, 'body or frame')}"
+                f"{actual_kind(self, name, 'body or frame')}"
                 f"{suggest(name, names)}; {listing(names)}"
             )
         return name
@@ -286,7 +284,7 @@ class Model:
             names = [j.name for j in self.joints]
             raise ModelError(
                 f"{e.title}: {field_with(e, f'{name}.{coordinate}', name)}there is no joint named {name!r}"
-                f"{but_is(self, name, 'joint')}{suggest(name, names)}; {listing(names)}"
+                f"{actual_kind(self, name, 'joint')}{suggest(name, names)}; {listing(names)}"
             )
         has = found.measured(self.planar)
         if coordinate not in has:
@@ -325,7 +323,7 @@ class Model:
         ModelError
             If there is no such part, or it has no such curve.
         """
-        return measured(self, e)
+        return measured_quantity(self, e)
 
     def validate(self, e: Element, env: dict[str, float]) -> None:
         """Resolve the element's numbers and refuse those that make no sense."""
@@ -334,7 +332,7 @@ class Model:
         check_vectors(e, n, self.planar)
         self._check_laws(e)
         if isinstance(e, Controller):
-            wiring.check(self, e)
+            controller_signals.check_controller(self, e)
         check_units(self, e, env)
         check_kind(self, e, n, env)
 
@@ -364,9 +362,9 @@ class Model:
 
         Formulas of controllers' signals stand in the places of their names, if ``whole``.
         """
-        return law_of(self, value, of, where, driver, whole)
+        return checked_law(self, value, of, where, driver, whole)
 
     def names_in_laws(self, of: LawOf) -> set[str]:
         """All names that such a law may use; curves besides, where it may."""
         sensors = (x.name for x in self.sensors if isinstance(x, Sensor))
-        return {"t", *of.inputs, *self.parameters, *sensors, *wiring.names(self)}
+        return {"t", *of.inputs, *self.parameters, *sensors, *controller_signals.signal_names(self)}

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import FlyballError, ModelError
+from .messages import suggest
 from .model import Model
-from .words import suggest
 
 M = TypeVar("M", bound=Model)
 

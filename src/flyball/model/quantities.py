@@ -1,28 +1,32 @@
-"""What a result says of each part: names, units, and which component of what. The one table of such names.
+"""What a result contains for each part: names, units and components. The one table of such names.
 
-What only a result can compute is known by name already when a part is described, so that a wrong name is refused then;
-views of a result, its curves, data sets, sensors and outputs of analyses all read this table.
+A name is known before anything is computed, so that a wrong one is refused when a part is described. Results,
+their curves, data sets, sensors and outputs of analyses all read this table. Forces that joints, force elements
+and drivers transmit are known only with the accelerations: events may name them, laws may not.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import permutations
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..errors import ModelError
-from .actions import Lock
-from .body import Body, Driver, Frame
-from .controller import Controller
-from .coupling import Coupling
-from .force import BodyForce, CoordinateForce, Force, TwoFrameForce
-from .joint import Joint
-from .sensor import IMU, Sensor
-from .wiring import wiring_of
-from .words import suggest
+from ..errors import ModelError, UnitError
+from .body import GROUND, Body, Driver, Frame
+from .controller import IMU, Controller, Sensor
+from .controller_signals import controller_names
+from .element import Element, LawOf, Unit, fields_with
+from .event import Lock
+from .expressions import law_expression, number
+from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
+from .joint import Coupling, Joint
+from .messages import listing, suggest
+from .units import split_quantity
 
 if TYPE_CHECKING:
     from .model import Model
+
 
 ENERGY = "energy"  # the name under which a result has the energies of all
 MOST = 256  # parts whose tables are kept
@@ -61,14 +65,18 @@ Table = dict[str, Quantity]
 def quantities(model: Model, name: str) -> Table:
     """Everything that a result says of a part (or of ``"energy"``), by name; not to be changed."""
     kept = getattr(model, "kept", None)  # of a snapshot
-    return _told(model, name) if kept is None else kept.get("quantities", name, MOST, lambda: _told(model, name))
+    return (
+        _quantity_table(model, name)
+        if kept is None
+        else kept.get("quantities", name, MOST, lambda: _quantity_table(model, name))
+    )
 
 
-def _told(model: Model, name: str) -> Table:
+def _quantity_table(model: Model, name: str) -> Table:
     axes = "xy" if model.planar else "xyz"
     touching = bool(getattr(model, "contacts", ()))
     if name == ENERGY:
-        return _of_energy(touching, switching(model))
+        return _of_energy(touching, has_switches(model))
     member = MEMBER.fullmatch(name)
     if member and member[1] in model.by_name and model[member[1]].category == "bulk":
         return _of_member(axes)
@@ -78,7 +86,7 @@ def _told(model: Model, name: str) -> Table:
     if isinstance(e, Frame):
         return _of_point(axes)
     if e.category == "bulk":
-        return of_set(axes)
+        return body_set_quantities(axes)
     if isinstance(e, Joint):
         return _of_joint(e, axes)
     if isinstance(e, Force):
@@ -92,11 +100,11 @@ def _told(model: Model, name: str) -> Table:
     if isinstance(e, IMU):
         return _of_imu(axes)
     if isinstance(e, Controller):
-        return {k: Quantity("", curve=True, array=True) for k in wiring_of(model, e)}
+        return {k: Quantity("", curve=True, array=True) for k in controller_names(model, e)}
     return {"value": Quantity(_unit_of(model, e.of), curve=True, array=True)} if isinstance(e, Sensor) else {}
 
 
-def unknown(owner: str, what: str, table: Mapping[str, Quantity]) -> str:
+def unknown_quantity(owner: str, what: str, table: Mapping[str, Quantity]) -> str:
     """What to say of a name that a part has not."""
     curves = [k for k, x in table.items() if x.curve]
     rest = [k for k, x in table.items() if not x.curve]
@@ -104,13 +112,13 @@ def unknown(owner: str, what: str, table: Mapping[str, Quantity]) -> str:
     return f"{owner} has no curve {what!r}{suggest(what, table)}; it has {has or 'none'}"
 
 
-def components(table: Mapping[str, Quantity], name: str) -> list[str]:
+def component_names(table: Mapping[str, Quantity], name: str) -> list[str]:
     """Names of the components of a vector, in order."""
     own = [(x.component, k) for k, x in table.items() if x.of == name and x.component is not None]
     return [k for _, k in sorted(own)]
 
 
-def one(model: Model, name: str) -> Quantity:
+def single_quantity(model: Model, name: str) -> Quantity:
     """The quantity of a name such as ``"slider.x"``, or of a sensor's name: one number at a time.
 
     Raises
@@ -127,9 +135,9 @@ def one(model: Model, name: str) -> Quantity:
         listed = ", ".join(f"{owner}.{k}" for k, q in table.items() if not q.width)
         raise ModelError(f"{name!r} is a whole part ({model[owner].title}); name one of {listed or 'another part'}")
     if x is None:
-        raise ModelError(unknown(model[owner].title if owner != ENERGY else ENERGY, what, table))
+        raise ModelError(unknown_quantity(model[owner].title if owner != ENERGY else ENERGY, what, table))
     if x.width:
-        own = ", ".join(f"{owner}.{k}" for k in components(table, what))
+        own = ", ".join(f"{owner}.{k}" for k in component_names(table, what))
         raise ModelError(f"{name!r} has {x.width} components" + (f"; name one: {own}" if own else ""))
     return x
 
@@ -143,7 +151,7 @@ def _unit_of(model: Model, text: str) -> str:
     return quantities(model, owner)[what].unit
 
 
-def switching(model: Model) -> bool:
+def has_switches(model: Model) -> bool:
     """Whether there is something that holds at times and lets go at others, or events."""
     return bool(getattr(model, "events", ())) or any(e.switches() for e in model.elements())
 
@@ -201,7 +209,7 @@ def _of_member(axes: str) -> Table:
     return own | _of_contact(axes)
 
 
-def of_set(axes: str) -> Table:
+def body_set_quantities(axes: str) -> Table:
     """Of a whole set of bodies: arrays over time and bodies."""
     wholes = ("position", "angle", "velocity", "angular_velocity", "quaternion", "contact_force")
     return {k: x._replace(curve=False) for k, x in _of_member(axes).items() if k in wholes}
@@ -258,3 +266,149 @@ def _of_imu(axes: str) -> Table:
         return f | {"w": Quantity("rad/s", "angular_velocity", 2, curve=True, array=True)} | wholes
     w = {k: x._replace(array=True) for k, x in _split((f"w{a}" for a in axes), "rad/s", "angular_velocity").items()}
     return f | w | wholes
+
+
+WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz", "force", "torque")
+"""What is told of a joint, the last two being sizes."""
+EFFORTS = ("effort", "reversed")
+"""What is told of a force along a coordinate, and of a driver: the effort, and that the other way round."""
+SPIN = 5  # in the plane the torque, which has a sign
+
+
+class TransmittedForce(NamedTuple):
+    """A force or torque by name: whose it is, and which of `WRENCH` or `EFFORTS`."""
+
+    element: Element
+    column: int
+
+
+def transmitted_force(model: Model, name: str) -> TransmittedForce | None:
+    """What a name such as ``"A.fx"`` or ``"rope.tension"`` says of what a part carries; None if it is something else.
+
+    ``"A.force"`` is the size of a joint's force; in space ``"A.torque"`` that of its torque.
+    """
+    owner, _, what = name.partition(".")
+    e = model.find(owner)
+    if isinstance(e, Joint):
+        if model.planar and what in ("fx", "fy", "force", "torque"):
+            return TransmittedForce(e, SPIN if what == "torque" else WRENCH.index(what))
+        return TransmittedForce(e, WRENCH.index(what)) if what in WRENCH and not model.planar else None
+    if isinstance(e, CoordinateForce) and what in list(e.outputs)[2:3]:
+        way = getattr(e, "direction", 1.0)  # as results tell it
+        return None if isinstance(way, str) else TransmittedForce(e, 0 if e.sign * way > 0.0 else 1)
+    return TransmittedForce(e, 0) if isinstance(e, Driver) and what == "effort" else None
+
+
+class Curve(NamedTuple):
+    """A curve such as A.angle where nobody has given it a name, and what asks for it."""
+
+    title: str
+    of: str
+
+
+def measured_quantity(model: Model, e: Sensor | Curve) -> tuple[str, str, int] | None:
+    """What a sensor measures; see `Model.measured`."""
+    owner, _, what = e.of.partition(".")
+    found = model.find(owner)
+    if found is None and owner != ENERGY:
+        known = model.names()
+        raise ModelError(
+            f"{e.title}: {e.of!r} is no curve of a part; write part.curve, for instance 'A.angle'. There is no "
+            f"part named {owner!r}{suggest(owner, known)}; {listing(known)}"
+        )
+    table = quantities(model, owner)
+    if what not in table:
+        has = [k for k, x in table.items() if x.curve]
+        whose = ENERGY if found is None else found.title
+        raise ModelError(
+            f"{e.title}: {e.of!r} is no curve; {whose} has {', '.join(f'{owner}.{c}' for c in has) or 'none'}"
+            f"{suggest(what, table)}"
+        )
+    x = table[what]
+    if x.width:
+        parts = " or ".join(f"{owner}.{k}" for k in component_names(table, what))
+        raise ModelError(
+            f"{e.title}: {e.of!r} has {x.width} numbers, and a sensor measures one"
+            + (f"; measure {parts}" if parts else "")
+        )
+    if isinstance(found, (Body, Frame)):
+        return _point_curves(owner, x.of or what, x.component, model.planar)
+    if isinstance(found, Joint):
+        own, name = found.measured(model.planar), x.of or what
+        if name in own:
+            return "coordinate", f"{owner}.{name}", 0
+        name = name.removesuffix("_rate")
+        return ("coordinate", f"{owner}.{name}", 1) if name in own else None
+    if isinstance(found, (TwoPointForce, CoordinateForce)) and what in found.outputs:
+        order = list(found.outputs).index(what)
+        return ("force", owner, order) if order < 2 else None
+    return None
+
+
+def _point_curves(owner: str, whole: str, component: int | None, planar: bool) -> tuple[str, str, int] | None:
+    """What laws may use of a body or frame: places, angles, and their rates."""
+    if whole in ("position", "velocity") and component is not None:
+        return "coordinate", f"{owner}.{'xyz'[component]}", int(whole == "velocity")
+    if planar and whole in ("angle", "angular_velocity"):
+        return "coordinate", f"{owner}.angle", int(whole == "angular_velocity")
+    spin = whole == "angular_velocity" and component is not None
+    return ("spin", f"{owner}.{'xyz'[component or 0]}", 1) if spin else None
+
+
+def carrier_names(model: Model) -> list[str]:
+    """Names of what can carry something: bodies, frames, ground."""
+    return [*(b.name for b in model.bodies), *(f.name for f in model.frames), GROUND]
+
+
+def actual_kind(model: Model, name: str, requested: str) -> str:
+    """'; 'A' is a Revolute' where a name means something else than was wanted."""
+    found = model.find(name)
+    return "" if found is None else f" ({name!r} is a {type(found).__name__}, no {requested})"
+
+
+def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
+    """Refuse units that do not fit the coordinate that an element acts along or couples, or what it compares."""
+    if isinstance(e, Controller):
+        _check_set_point(model, e)
+    if isinstance(e, CoordinateForce) and e.along():
+        turning = model.unit(e.along()[0], e) == "rad"
+        for name, pair in e.dimensions.items():
+            value = getattr(e, name, None)
+            if value is not None and name in fields_with(e.__class__, Unit):
+                number(value, env, pair[turning], f"{name} of {e.title}")
+            elif value is not None and name in fields_with(e.__class__, LawOf):
+                tables = {x.name: x for x in model.tables}
+                names = model.names_in_laws(fields_with(e.__class__, LawOf)[name])
+                where = f"{name} of {e.title}"
+                law = law_expression(value, pair[turning], where, tables, names, any("." in k for k in names))
+                if name in e.not_negative and law.names <= set(env) and not law.tables and law.function is None:
+                    given = law.evaluate(env)
+                    if not given.real >= 0.0:
+                        raise ModelError(f"{where} is {given:g} {pair[turning]}; it must be zero or greater")
+    for name, kinds in (e.dimensions if isinstance(e, Coupling) else getattr(e, "kinds", {})).items():
+        value = getattr(e, name)
+        for x in value if isinstance(value, tuple) else (value,):
+            _value_in_units(x, kinds, env, f"{name} of {e.title}")
+
+
+def _check_set_point(model: Model, e: Controller) -> None:
+    """Refuse a set point of another kind than the curve that is to follow it; what is no plain curve says no unit."""
+    given = {k: x for k in e.compared if isinstance(x := getattr(e, k), str)}
+    for (name, told), (_, curve) in permutations(given.items(), 2):
+        owner, _, what = curve.partition(".")
+        table = quantities(model, owner) if model.find(owner) is not None else {}
+        if what in table and table[what].unit and split_quantity(told) is not None:
+            number(told, {}, table[what].unit, f"{name} of {e.title}")
+
+
+def _value_in_units(value: Any, kinds: tuple[str, ...], env: Mapping[str, float], where: str) -> None:
+    """The value is in one of these units."""
+    problem: ModelError | None = None
+    for kind in kinds if value is not None else ():
+        try:
+            number(value, env, kind, where)
+            return
+        except UnitError as error:
+            problem = problem or error
+    if problem is not None:
+        raise problem

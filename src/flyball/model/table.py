@@ -12,12 +12,12 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from ..errors import ModelError, UnitError
-from ..math.spline import BREAKS, packed, spline, symbolic
-from .element import Element, element, limited, plain
-from .grammar import CONSTANTS, FUNCTIONS
+from ..math.spline import BREAKS, pack_spline, spline, spline_expression
+from .element import Element, checked_size, element, python_data
+from .expression_parser import CONSTANTS, FUNCTIONS
 from .units import to_si
 
-Column = Annotated[tuple[float, ...], BeforeValidator(plain)]
+Column = Annotated[tuple[float, ...], BeforeValidator(python_data)]
 
 
 @element
@@ -84,7 +84,7 @@ class Table(Element):
         """Value at ``x`` [SI]: a number (real or complex), an array, or a SymPy expression."""
         if isinstance(x, float | int | complex | np.ndarray | np.generic):
             return self.values(x)[0]
-        return symbolic(self._array, 0, x)
+        return spline_expression(self._array, 0, x)
 
     def ends(self) -> tuple[float, float]:
         """The first and the last x [SI] that it has a value for: all, unless ``beyond`` is ``"refuse"``."""
@@ -93,7 +93,7 @@ class Table(Element):
         count = int(self._array[1])
         return float(self._array[BREAKS]), float(self._array[BREAKS + count - 1])
 
-    def told_beyond(self, x: float) -> str:
+    def out_of_range_message(self, x: float) -> str:
         """Why it has no value at ``x`` [SI], and what to do."""
         unit = f" {self.x_unit}" if self.x_unit else ""
         written = x / (to_si(f"1 {self.x_unit}", None) if self.x_unit else 1.0)
@@ -113,7 +113,7 @@ class Table(Element):
     def _array(self) -> np.ndarray:
         x, y = self._points()
         with np.errstate(all="ignore"):
-            return packed(x, y, _MAKERS[self.interpolation](x, y, self.beyond == "repeat"), self.beyond)
+            return pack_spline(x, y, _MAKERS[self.interpolation](x, y, self.beyond == "repeat"), self.beyond)
 
     def _points(self) -> tuple[np.ndarray, np.ndarray]:
         """The points in SI units, checked."""
@@ -147,7 +147,7 @@ class Table(Element):
         for k, value in enumerate(values):
             if value - value != 0.0:
                 raise ModelError(f"{self.title}: {name}[{k}] is {value}; give a finite number, or leave the point out")
-            limited(value, None, f"{self.title}: {name}[{k}]")
+            checked_size(value, None, f"{self.title}: {name}[{k}]")
         try:
             return np.array(values) * (to_si(f"1 {unit}", None) if unit else 1.0)
         except UnitError as error:

@@ -1,17 +1,105 @@
-"""Text with units ("30 deg", "2 kN/m") to numbers in SI units, by a table of the common ones, else through pint.
+"""Text with units ("30 deg", "60 rpm", "2 kN/m") to numbers in SI units.
 
-Angles are kept apart from plain numbers here, which pint does not do: "5 deg" is no length, and "50 Hz" (1/s) is no
-angular speed (rad/s), a mistake of 2 pi that nobody sees.
+Common units are in a table; others are looked up in pint.
+
+Angles are distinguished from plain numbers, which pint does not do: "5 deg" is no length, and "50 Hz" (1/s) is no
+angular speed (rad/s), an error of 2 pi that is easily overlooked.
+
+A symbol of a unit that is also a name where it is written is refused. In the law ``"2 m/s^2*t"`` the t is time,
+and also the symbol of the tonne; read as a unit it would make a constant force of 2000 N. Such a symbol is a unit
+only where the usual way of writing the quantity contains it: "250 g" and "5 N*m" remain quantities beside
+parameters g and m.
 """
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Collection
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import UnitError
-from .common_units import COMMON, common_unit
+
+_LENGTH, _MASS, _TIME, _ANGLE = {"meter": 1}, {"kilogram": 1}, {"second": 1}, {"radian": 1}
+_FORCE, _PRESSURE = {"kilogram": 1, "meter": 1, "second": -2}, {"kilogram": 1, "meter": -1, "second": -2}
+_ENERGY, _POWER = {"kilogram": 1, "meter": 2, "second": -2}, {"kilogram": 1, "meter": 2, "second": -3}
+COMMON: dict[str, tuple[str, float, dict[str, int]]] = {
+    "m": ("meter", 1.0, _LENGTH),
+    "mm": ("millimeter", 1e-3, _LENGTH),
+    "cm": ("centimeter", 1e-2, _LENGTH),
+    "km": ("kilometer", 1e3, _LENGTH),
+    "g": ("gram", 1e-3, _MASS),
+    "kg": ("kilogram", 1.0, _MASS),
+    "s": ("second", 1.0, _TIME),
+    "ms": ("millisecond", 1e-3, _TIME),
+    "min": ("minute", 60.0, _TIME),
+    "h": ("hour", 3600.0, _TIME),
+    "rad": ("radian", 1.0, _ANGLE),
+    "deg": ("degree", math.pi / 180, _ANGLE),
+    "rev": ("turn", 2 * math.pi, _ANGLE),
+    "turn": ("turn", 2 * math.pi, _ANGLE),
+    "rpm": ("revolutions_per_minute", 2 * math.pi / 60, {"radian": 1, "second": -1}),
+    "Hz": ("hertz", 1.0, {"second": -1}),
+    "kHz": ("kilohertz", 1e3, {"second": -1}),
+    "N": ("newton", 1.0, _FORCE),
+    "mN": ("millinewton", 1e-3, _FORCE),
+    "kN": ("kilonewton", 1e3, _FORCE),
+    "MN": ("meganewton", 1e6, _FORCE),
+    "Nm": ("newton_meter", 1.0, _ENERGY),
+    "Pa": ("pascal", 1.0, _PRESSURE),
+    "kPa": ("kilopascal", 1e3, _PRESSURE),
+    "MPa": ("megapascal", 1e6, _PRESSURE),
+    "GPa": ("gigapascal", 1e9, _PRESSURE),
+    "J": ("joule", 1.0, _ENERGY),
+    "kJ": ("kilojoule", 1e3, _ENERGY),
+    "W": ("watt", 1.0, _POWER),
+    "kW": ("kilowatt", 1e3, _POWER),
+}
+"""Symbol -> long name, factor to SI, powers of base units."""
+
+_FACTOR = r"(?:[A-Za-z]+)(?:(?:\^|\*\*)-?\d)?"
+_PRODUCT = re.compile(rf"(?:1/)?{_FACTOR}(?:\s*[*/]\s*{_FACTOR})*")
+_PIECE = re.compile(r"([*/]?)\s*([A-Za-z]+)(?:(?:\^|\*\*)(-?\d))?")
+
+
+class CommonUnit(NamedTuple):
+    """A unit made of those of the table.
+
+    Attributes
+    ----------
+    factor : float
+        To SI.
+    powers : tuple
+        Base unit and its power, sorted by name.
+    written : dict
+        Long name of each symbol -> its power, as written.
+    """
+
+    factor: float
+    powers: tuple[tuple[str, float], ...]
+    written: dict[str, float]
+
+
+@lru_cache(maxsize=512)
+def common_unit(text: str) -> CommonUnit | None:
+    """The unit of a text such as "kN/m" or "kg*m^2", or None if there is another symbol or another spelling in it."""
+    text = text.strip()
+    if not _PRODUCT.fullmatch(text):
+        return None
+    factor, powers, written = 1.0, dict[str, float](), dict[str, float]()
+    for join, symbol, exponent in _PIECE.findall(text.removeprefix("1")):
+        if symbol not in COMMON:
+            return None
+        name, size, base = COMMON[symbol]
+        power = (-1 if join == "/" else 1) * int(exponent or 1)
+        factor *= size**power
+        written[name] = written.get(name, 0) + power
+        for unit, p in base.items():
+            powers[unit] = powers.get(unit, 0) + p * power
+    kept = {name: p for name, p in written.items() if p}
+    return CommonUnit(factor, tuple(sorted((name, p) for name, p in powers.items() if p)), kept)
+
 
 _NUMBER = r"[+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(  # a number keeps its exponent: "1e6*t" is a formula, not 1 of a unit "e6*t"
@@ -207,3 +295,103 @@ def _hint(unit: str) -> str:
     right = {symbol.lower(): symbol for symbol in SYMBOLS}
     words = [right[w.lower()] for w in re.findall(r"[^\W\d]+", unit) if right.get(w.lower(), w) != w]
     return f" (did you mean {', '.join(repr(w) for w in words)}?)" if words else ""
+
+
+_SYMBOL = re.compile(r"[^\W\d]\w*")
+_FORMULA = re.compile(r"[*/+-]\s*[\d(]")  # what no unit has in it
+_JOIN = re.compile(r"[\s*/·+-]*\(*$")
+
+
+def refuse_attached(number: str, unit: str, names: Collection[str], dimension: str | None) -> None:
+    """Raise `UnitError` if a symbol of a unit could be meant as one of these names, or is called like a function.
+
+    Where time is no name, "t" behind a unit is refused too: "60 rpm*t" is meant as a law, and would be read in tonnes.
+    """
+    found = _doubtful(unit, names, dimension)
+    if not found:
+        return
+    match = found[0]
+    for later in found:  # as much of the text as can be is left to the quantity
+        if not _doubtful(_head(unit, later.start()), names, None):
+            match = later
+    symbol, long = match[0], unit_name(match[0])
+    text = f"{number} {unit}"
+    as_unit = f"; for the unit '{number} {unit[: match.start()]}{long}{unit[match.end() :]}'"
+    if symbol == "t" and "t" not in names:
+        raise UnitError(
+            f"'{text}': 't' stands for time behind a unit, and time is known only in laws of drivers and forces; write "
+            f"'{product_text(number, unit, match.start())}' there{as_unit}"
+        )
+    raise UnitError(
+        f"'{text}': '{symbol}' is a name here, and so no part of a unit; for the product write "
+        f"'{product_text(number, unit, match.start())}'{as_unit if long != symbol and _fits(text, dimension) else ''}"
+    )
+
+
+def _fits(text: str, dimension: str | None) -> bool:
+    """Whether a text is a quantity of this dimension."""
+    try:
+        to_si(text, dimension)
+    except UnitError:
+        return False
+    return True
+
+
+def _doubtful(unit: str, names: Collection[str], dimension: str | None) -> list[re.Match[str]]:
+    out = []
+    for m in _SYMBOL.finditer(unit):
+        called = unit[m.end() :].lstrip().startswith("(")
+        alone = not _head(unit, m.start()).strip("1")
+        if m[0] == "t" and "t" not in names:
+            doubtful = not (alone and _of_known_kind(unit, dimension))
+        else:
+            doubtful = m[0] in names and not _customary(m[0], unit, dimension, alone)
+        if called or doubtful:
+            out.append(m)
+        if called:
+            break
+    return out
+
+
+def quantity_remedy(number: str, unit: str) -> str:
+    """How to write a text that is no unit as a whole, if it is a product or a sum that begins with a quantity."""
+    for match in _SYMBOL.finditer(unit):
+        if not unit_name(match[0]) and match.start() > 0:
+            return f"; if you mean a product, write '{product_text(number, unit, match.start())}'"
+    return "; in a formula a quantity stands in parentheses, as in '(60 rpm)*t'" if _FORMULA.search(unit) else ""
+
+
+def product_text(number: str, unit: str, start: int) -> str:
+    """The text as a product: the quantity that ends before ``start`` in parentheses, then the rest."""
+    head = _head(unit, start)
+    if not head:
+        return f"{number}*{unit}"
+    rest = unit[len(head) :].strip()
+    return f"({number} {head}){rest if rest[0] in '*/+-' else '*' + rest}"
+
+
+def _head(unit: str, start: int) -> str:
+    """What stands before a place in a unit, without the operator between."""
+    return _JOIN.sub("", unit[:start])
+
+
+def _of_known_kind(unit: str, dimension: str | None) -> bool:
+    """Whether a unit measures what is wanted, or something that has a name: "t" a mass, "t/m^3" a density."""
+    try:
+        return powers_in_si(unit) in [powers_in_si(k) for k in (*KINDS, dimension or "1") if k not in ("", "1")]
+    except UnitError:
+        return False
+
+
+def _customary(symbol: str, unit: str, dimension: str | None, single: bool) -> bool:
+    """Whether a symbol belongs to the usual way of writing a quantity: behind the number, or as in its SI unit."""
+    if single and symbol in SYMBOLS:
+        return True
+    try:
+        written, si = powers_as_written(unit), powers_in_si(unit)
+    except UnitError:
+        return False
+    kinds = [dimension] if dimension else [k for k in KINDS if k != "1" and powers_in_si(k) == si]
+    ways = [powers_as_written(k) for k in kinds if k != "1"]
+    name = unit_name(symbol)
+    return any(name in way and way[name] == written.get(name) for way in (*ways, *([si] if ways else [])))

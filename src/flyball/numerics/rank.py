@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-TOLERANCE = 1e-8  # singular values below this part of the largest count as zero; rows scaled to unit length
+RANK_TOLERANCE = 1e-8  # singular values below this part of the largest count as zero; rows scaled to unit length
 
 
 def svd(A: np.ndarray, full: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -23,7 +23,7 @@ def svd(A: np.ndarray, full: bool = False) -> tuple[np.ndarray, np.ndarray, np.n
         return by_iteration(A, full_matrices=full, lapack_driver="gesvd")
 
 
-class Parts(NamedTuple):
+class FundamentalSubspaces(NamedTuple):
     """Orthonormal bases of the four spaces of a matrix A (n, m) of rank r."""
 
     span: np.ndarray  # (n, r): what A makes of vectors
@@ -38,7 +38,9 @@ class Parts(NamedTuple):
         return len(self.values)
 
 
-def parts(A: np.ndarray, tolerance: float = TOLERANCE, size: float | None = None) -> Parts:
+def fundamental_subspaces(
+    A: np.ndarray, tolerance: float = RANK_TOLERANCE, size: float | None = None
+) -> FundamentalSubspaces:
     """A matrix taken apart.
 
     Parameters
@@ -51,29 +53,29 @@ def parts(A: np.ndarray, tolerance: float = TOLERANCE, size: float | None = None
     """
     n, m = A.shape
     if not A.size:
-        return Parts(np.zeros((n, 0)), np.eye(n), np.zeros((m, 0)), np.eye(m), np.zeros(0))
+        return FundamentalSubspaces(np.zeros((n, 0)), np.eye(n), np.zeros((m, 0)), np.eye(m), np.zeros(0))
     U, d, Vt = svd(A, full=True)
-    r = _counted(d, tolerance, size)
-    return Parts(U[:, :r], U[:, r:], Vt[:r].T, Vt[r:].T, d[:r])
+    r = _count_nonzero(d, tolerance, size)
+    return FundamentalSubspaces(U[:, :r], U[:, r:], Vt[:r].T, Vt[r:].T, d[:r])
 
 
-def rank(A: np.ndarray, tolerance: float = TOLERANCE, size: float | None = None) -> int:
-    """How many rows (and columns) are independent; as for `parts`."""
-    return _counted(np.linalg.svd(A, compute_uv=False), tolerance, size) if A.size else 0
+def rank(A: np.ndarray, tolerance: float = RANK_TOLERANCE, size: float | None = None) -> int:
+    """How many rows (and columns) are independent; as for `fundamental_subspaces`."""
+    return _count_nonzero(np.linalg.svd(A, compute_uv=False), tolerance, size) if A.size else 0
 
 
-def span(A: np.ndarray, tolerance: float = TOLERANCE, size: float | None = None) -> np.ndarray:
-    """An orthonormal basis (n, r) of what the columns span; as for `parts`, for few columns."""
+def column_space(A: np.ndarray, tolerance: float = RANK_TOLERANCE, size: float | None = None) -> np.ndarray:
+    """An orthonormal basis (n, r) of what the columns span; as for `fundamental_subspaces`, for few columns."""
     if not A.size:
         return A[:, :0]
     U, d, _ = svd(A)
-    return U[:, : _counted(d, tolerance, size)]
+    return U[:, : _count_nonzero(d, tolerance, size)]
 
 
-def null_space(A: np.ndarray, tolerance: float = TOLERANCE, size: float | None = None) -> np.ndarray:
-    """An orthonormal basis (m, m - r) of the vectors that A takes to nothing; as for `parts`."""
-    return parts(A, tolerance, size).null
+def null_space(A: np.ndarray, tolerance: float = RANK_TOLERANCE, size: float | None = None) -> np.ndarray:
+    """An orthonormal basis (m, m - r) of the vectors that A takes to nothing; as for `fundamental_subspaces`."""
+    return fundamental_subspaces(A, tolerance, size).null
 
 
-def _counted(d: np.ndarray, tolerance: float, size: float | None) -> int:
+def _count_nonzero(d: np.ndarray, tolerance: float, size: float | None) -> int:
     return int((d > tolerance * max(d[0] if size is None else size, 1e-300)).sum())

@@ -1,30 +1,162 @@
-"""Rank and null spaces of sparse matrices whose rows have unit length: by singular values, or large ones by pivots."""
+"""Rank, null spaces and saddle-point solves of sparse matrices whose rows have unit length.
+
+Rank and dependencies are found by singular values where the matrix is small, by the pivots of L D L^T of G G^T
+where it is large. Saddle-point equations (an operator with constraint rows) are solved by a sparse L U with
+iterative refinement, which also yields an orthonormal basis of what independent rows allow.
+
+The compiled part finds the combinations of rows with the smallest singular values by inverse iteration with one
+factor of H H^T (Golub and Van Loan 2013, sections 7.3 and 8.2). All but the last vector of a block become
+dependencies; the last turns to the combination with the smallest singular value that is not zero. Dependencies
+are refined with the true residual x H, because squaring in H H^T loses digits.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from .ldl import Pattern, analyse, factor_kernel
-from .rank import TOLERANCE, parts
+from ..compiler.formulas import formula
+from ..errors import AnalysisError
+from .rank import RANK_TOLERANCE, fundamental_subspaces
 from .rank import rank as rank_of_array
+from .sparse_factorisation import LDLPattern, analyse_ldl, ldl_factor_kernel, ldl_solve
+
+MAX_ITERATIONS, MIN_ITERATIONS = 50, 2  # iterations
+VALUE_TOLERANCE = 1e-4  # change of a singular value, of itself, at which its iteration ends
+DEPENDENCY_REFINEMENTS = 2  # times that a dependency is
+
+
+@formula
+def combine_rows(row_p, col_i, H, x, w):
+    """Leave x H in w; returns its square."""
+    for d in range(w.shape[0]):
+        w[d] = 0.0
+    for k in range(x.shape[0]):
+        for e in range(row_p[k], row_p[k + 1]):
+            w[col_i[e]] += H[e] * x[k]
+    s = 0.0
+    for d in range(w.shape[0]):
+        s += w[d] * w[d]
+    return s
+
+
+@formula
+def largest_singular_value(row_p, col_i, H, y, w):
+    """The largest singular value, by multiplications of y with H H^T; y is to go on from one matrix to the next."""
+    value = 0.0
+    for _ in range(MAX_ITERATIONS):
+        size = 0.0
+        for k in range(y.shape[0]):
+            size += y[k] * y[k]
+        size = size**0.5
+        for k in range(y.shape[0]):
+            y[k] /= size
+        before = value
+        value = combine_rows(row_p, col_i, H, y, w) ** 0.5
+        for k in range(y.shape[0]):
+            y[k] = row_times_vector(row_p, col_i, H, w, k)
+        if abs(before - value) <= VALUE_TOLERANCE * value:
+            break
+    return value
+
+
+@formula
+def row_times_vector(row_p, col_i, H, w, k):
+    """Row k of H times w."""
+    s = 0.0
+    for e in range(row_p[k], row_p[k + 1]):
+        s += H[e] * w[col_i[e]]
+    return s
+
+
+@formula
+def solve_normal_equations(P, L, D, x, z):
+    """x becomes (H H^T)^-1 x; ``z`` is scratch."""
+    for k in range(x.shape[0]):
+        z[P.perm[k]] = x[k]
+    ldl_solve(P, L, D, z)
+    for k in range(x.shape[0]):
+        x[k] = z[P.perm[k]]
+
+
+@formula
+def refine_dependency(P, L, D, row_p, col_i, H, x, w, z):
+    """Take off x what its residual x H says that is no dependency."""
+    combine_rows(row_p, col_i, H, x, w)
+    for k in range(x.shape[0]):
+        z[P.perm[k]] = row_times_vector(row_p, col_i, H, w, k)
+    ldl_solve(P, L, D, z)
+    for k in range(x.shape[0]):
+        x[k] -= z[P.perm[k]]
+
+
+@formula
+def orthonormalise(X, i):
+    """Make vector i orthogonal to those before it, twice since rounding is magnified, and of unit length."""
+    n = X.shape[1]
+    for _ in range(2):
+        s = 0.0
+        for k in range(n):
+            s += X[i, k] * X[i, k]
+        s = 1.0 / s**0.5 if s > 0.0 else 0.0
+        for k in range(n):
+            X[i, k] *= s
+        for j in range(i):
+            s = 0.0
+            for k in range(n):
+                s += X[i, k] * X[j, k]
+            for k in range(n):
+                X[i, k] -= s * X[j, k]
+    s = 0.0
+    for k in range(n):
+        s += X[i, k] * X[i, k]
+    s = 1.0 / s**0.5 if s > 0.0 else 0.0
+    for k in range(n):
+        X[i, k] *= s
+
+
+@formula
+def smallest_singular_values(P, L, D, row_p, col_i, H, X, w, z):
+    """Turn the rows of X to the weakest combinations; ``w`` (m,) and ``z`` (n,) are scratch.
+
+    Returns (singular value of the last one, the largest of those of the others, which are to be dependencies).
+    """
+    last = X.shape[0] - 1
+    value = 1e300
+    for turn in range(MAX_ITERATIONS):
+        for i in range(last + 1):
+            solve_normal_equations(P, L, D, X[i], z)
+            orthonormalise(X, i)
+        before = value
+        value = combine_rows(row_p, col_i, H, X[last], w) ** 0.5
+        if turn >= MIN_ITERATIONS and abs(before - value) <= VALUE_TOLERANCE * value:
+            break
+    largest = 0.0
+    for i in range(last):
+        for _ in range(DEPENDENCY_REFINEMENTS):
+            refine_dependency(P, L, D, row_p, col_i, H, X[i], w, z)
+        orthonormalise(X, i)
+        largest = max(largest, combine_rows(row_p, col_i, H, X[i], w) ** 0.5)
+    return value, largest
+
 
 FEW = 150  # rows or columns up to which singular values take no longer than pivots
 DENSE = 1500  # rows or columns up to which they decide where pivots leave a doubt
-CLEAR = 1e-8  # pivots of unit rows above this are surely some: singular values of 1e-4 and more
-WEAK = 1e-10  # pivots of a large matrix with unit rows below this count as zero
-SPREAD = 1e-5  # up to this one may be nothing but what was added, of a vector whose square is up to 1e8
-ADDED = 1e-13  # to the diagonal of such a matrix
+CERTAIN_PIVOT = 1e-8  # pivots of unit rows above this are surely some: singular values of 1e-4 and more
+ZERO_PIVOT = 1e-10  # pivots of a large matrix with unit rows below this count as zero
+DOUBTFUL_PIVOT = 1e-5  # up to this one may be nothing but what was added, of a vector whose square is up to 1e8
+DIAGONAL_SHIFT = 1e-13  # to the diagonal of such a matrix
 ROOM = 2**24  # numbers (128 MB) that the vectors of a null space may have, of a matrix that is larger than `DENSE`
 
 
-def rank(G: Any) -> int:
+def sparse_matrix_rank(G: Any) -> int:
     """How many rows are independent, of a sparse matrix or an array."""
-    if max(G.shape) > FEW and (found := by_pivots(G)) is not None:
+    if max(G.shape) > FEW and (found := rank_by_pivots(G)) is not None:
         return found[0]
-    return rank_of_array(_array(G))
+    return rank_of_array(_as_array(G))
 
 
 def null_spaces(G: Any) -> tuple[int, np.ndarray, np.ndarray | None]:
@@ -33,23 +165,23 @@ def null_spaces(G: Any) -> tuple[int, np.ndarray, np.ndarray | None]:
     G is sparse, or an array. Where pivots decide, the dependencies are no orthonormal basis, and nothing of what is
     allowed is given; of a matrix larger than `DENSE` as many dependencies are as there is `ROOM` for.
     """
-    if max(G.shape) > FEW and (found := by_pivots(G)) is not None:
+    if max(G.shape) > FEW and (found := rank_by_pivots(G)) is not None:
         return *found, None
-    q = parts(_array(G))
+    q = fundamental_subspaces(_as_array(G))
     return q.rank, q.dependencies, q.null
 
 
-def by_pivots(G: Any) -> tuple[int, np.ndarray] | None:
+def rank_by_pivots(G: Any) -> tuple[int, np.ndarray] | None:
     """Rank, and a basis of the dependencies among rows; None where pivots leave a doubt that singular values do not."""
     import scipy.sparse as sp
 
     G = sp.csr_matrix(G)
-    p = Pivots(G @ G.T)
+    p = SemidefinitePivots(G @ G.T)
     basis = p.vectors(p.shown) if max(G.shape) > DENSE else p.dependencies(G)
     return None if basis is None else (int(G.shape[0]) - len(p.weak), basis)
 
 
-def _array(G: Any) -> np.ndarray:
+def _as_array(G: Any) -> np.ndarray:
     return G if isinstance(G, np.ndarray) else np.asarray(G.toarray())
 
 
@@ -69,11 +201,11 @@ def weak_pivots(A: Any) -> tuple[np.ndarray, np.ndarray]:
     vectors : ndarray (n, k)
         A basis of the null space: as many of its vectors as there is `ROOM` for.
     """
-    p = Pivots(A)
+    p = SemidefinitePivots(A)
     return np.argsort(p.pattern.perm)[p.weak], p.vectors(p.shown)
 
 
-class Pivots:
+class SemidefinitePivots:
     """Pivots of a sparse positive semidefinite matrix, in an order of its own: where they are none.
 
     From A = L D L^T: where a pivot is nothing but what was added to the diagonal, L^T x = e_k gives a vector of the
@@ -94,26 +226,26 @@ class Pivots:
         n = A.shape[0]
         self.size = np.sqrt(np.where(A.diagonal() > 0.0, A.diagonal(), 1.0))
         unit = sp.diags(1.0 / self.size)
-        self.pattern, L, self.inverse = _factor(unit @ A @ unit, ADDED)
+        self.pattern, L, self.inverse = _factor_shifted(unit @ A @ unit, DIAGONAL_SHIFT)
         self.lower = sp.csc_matrix((L, self.pattern.Li, self.pattern.Lp), shape=(n, n)) + sp.identity(n, format="csc")
         with np.errstate(divide="ignore"):
             pivots = 1.0 / self.inverse
-        sure, doubtful = ~(pivots > WEAK), (pivots > WEAK) & (pivots < SPREAD)
+        sure, doubtful = ~(pivots > ZERO_PIVOT), (pivots > ZERO_PIVOT) & (pivots < DOUBTFUL_PIVOT)
         found = [np.flatnonzero(sure)]
-        for which in np.split(rest := np.flatnonzero(doubtful), range(most(n), len(rest), most(n))):
+        for which in np.split(rest := np.flatnonzero(doubtful), range(max_vectors(n), len(rest), max_vectors(n))):
             quotients = pivots[which] / np.maximum((self._ends(which) ** 2).sum(axis=0), 1.0)
-            found.append(which[quotients < 10.0 * ADDED])
+            found.append(which[quotients < 10.0 * DIAGONAL_SHIFT])
         self.weak = np.sort(np.concatenate(found))
         self.least = float(np.delete(pivots, self.weak).min(initial=np.inf))
 
     @property
     def shown(self) -> np.ndarray:
         """Those weak pivots for whose vectors there is `ROOM`."""
-        return self.weak[: most(len(self.inverse))]
+        return self.weak[: max_vectors(len(self.inverse))]
 
     def vectors(self, which: np.ndarray) -> np.ndarray:
         """Vectors (n, k) of the null space that belong to weak pivots, their largest entry 1."""
-        return _scaled(self._ends(which)[self.pattern.perm] / self.size[:, None])
+        return _scale_columns(self._ends(which)[self.pattern.perm] / self.size[:, None])
 
     def dependencies(self, G: Any) -> np.ndarray | None:
         """A basis (n, k) of the null space where the matrix is G G^T; None if it is in doubt what is none.
@@ -121,12 +253,12 @@ class Pivots:
         What was added to the diagonal is taken out by a step of inverse iteration; what is left of x G then says
         whether rows depend on one another as truly as singular values tell it.
         """
-        if not self.least > CLEAR:
+        if not self.least > CERTAIN_PIVOT:
             return None
         x = self.vectors(self.weak)
         if len(self.weak):
-            x = _scaled(x - self._solve(G @ (G.T @ x)))
-            if not (np.linalg.norm(G.T @ x, axis=0) <= TOLERANCE * np.linalg.norm(x, axis=0)).all():
+            x = _scale_columns(x - self._solve(G @ (G.T @ x)))
+            if not (np.linalg.norm(G.T @ x, axis=0) <= RANK_TOLERANCE * np.linalg.norm(x, axis=0)).all():
                 return None
         return x
 
@@ -153,30 +285,100 @@ class Pivots:
         return y[self.pattern.perm] / self.size[:, None]
 
 
-def most(n: int) -> int:
+def max_vectors(n: int) -> int:
     """How many vectors of n numbers there is `ROOM` for."""
     return max(ROOM // max(n, 1), 1)
 
 
-def _scaled(x: np.ndarray) -> np.ndarray:
+def _scale_columns(x: np.ndarray) -> np.ndarray:
     """Columns whose largest entry is 1."""
     return x / np.maximum(np.abs(x).max(axis=0, initial=0.0), 1e-300)
 
 
 def negative_pivots(A: Any) -> int:
     """How many eigenvalues of a sparse symmetric matrix are negative (Sylvester's law of inertia)."""
-    return int((_factor(A, 0.0)[2] < 0.0).sum())
+    return int((_factor_shifted(A, 0.0)[2] < 0.0).sum())
 
 
-def _factor(A: Any, added: float) -> tuple[Pattern, np.ndarray, np.ndarray]:
+def _factor_shifted(A: Any, added: float) -> tuple[LDLPattern, np.ndarray, np.ndarray]:
     """L D L^T in a pattern and order of its own, of A and so much more on its diagonal; D is inverse."""
     A = A.tocoo()
     n = A.shape[0]
-    P, place = analyse(n, A.row, A.col)
+    P, place = analyse_ldl(n, A.row, A.col)
     upper = P.perm[A.row] <= P.perm[A.col]  # each pair of entries counts once
     x = np.zeros(len(P.Ai))
     np.add.at(x, place[: A.nnz][upper], A.data[upper])
     x[P.Ap[1:] - 1] += added
     D, L = np.zeros(n), np.zeros(len(P.Li))
-    factor_kernel(P, x, L, D, np.zeros(n))
+    ldl_factor_kernel(P, x, L, D, np.zeros(n))
     return P, L, D
+
+
+SOLVE_REFINEMENTS = 2  # times that a solution is improved
+INDEPENDENCE_MARGIN = 1e-4  # singular values above this part of the largest are surely some
+
+
+def saddle_point_solver(
+    P: Any, G: Any, H: Any = None, refined: int = SOLVE_REFINEMENTS
+) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """What gives x and l of P x - G^T l = f, H x = g; H is G if not given; improved so many times.
+
+    Raises
+    ------
+    AnalysisError
+        If there are no such x and l for every f and g.
+    """
+    import scipy.sparse as sp
+    from scipy.sparse.linalg import splu
+
+    n, size = P.shape[0], abs(P).max() or 1.0
+    A = (sp.bmat([[P, -size * G.T], [size * (G if H is None else H), None]]) if G.shape[0] else P).tocsc()
+    try:
+        factor = splu(A)
+    except RuntimeError:
+        raise AnalysisError(
+            "the linear equations have no one solution: something moves without inertia, or this is an eigenvalue"
+        ) from None
+
+    def once(b: np.ndarray) -> np.ndarray:
+        if np.iscomplexobj(b) and not np.iscomplexobj(A.data):
+            return once(np.ascontiguousarray(b.real)) + 1j * once(np.ascontiguousarray(b.imag))
+        return factor.solve(b.astype(A.dtype))
+
+    def solve(f: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        b = np.concatenate([f, size * g])
+        y = once(b)
+        for _ in range(refined):
+            y += once(b - A @ y)
+        return y[:n], size * y[n:]
+
+    return solve
+
+
+def null_basis(G: Any) -> np.ndarray:
+    """An orthonormal basis (n, n - m) of what independent rows (m, n) allow.
+
+    Random vectors are projected on it and made orthonormal by Cholesky's factor of their products, twice (Yamamoto and
+    others 2015): that is matrix products, where Householder's reflections would take several times as long.
+    """
+    import scipy.sparse as sp
+    from scipy.linalg import solve_triangular
+
+    m, n = G.shape
+    if not m:
+        return np.eye(n)
+    project = saddle_point_solver(sp.identity(n, format="csr"), G, refined=0)  # twice, which improves it
+    basis = np.random.default_rng(1).standard_normal((n, n - m))
+    for _ in range(2):
+        basis = project(basis, np.zeros((m, n - m)))[0]
+        basis = solve_triangular(np.linalg.cholesky(basis.T @ basis), basis.T, lower=True).T
+    return basis
+
+
+def clearly_independent(G: Any) -> bool:
+    """Whether rows of unit size are far from depending on one another: G G^T less a little has no negative pivots."""
+    import scipy.sparse as sp
+
+    A = G @ G.T
+    largest = np.sqrt(abs(A).sum(axis=1).max())
+    return negative_pivots(A - (INDEPENDENCE_MARGIN * largest) ** 2 * sp.identity(A.shape[0])) == 0

@@ -1,1 +1,7 @@
-"""Motions read by name, with energies and a health report."""
+"""What analyses return: motions read by name, energies, reactions, events, health, linear models, studies.
+
+Results hold arrays and the model they belong to; they compute derived quantities when first asked for. They may
+import model, tables, engine, laws, math and numerics, but no analysis; figures and pages (view) are imported
+inside functions. ``results/part_views`` holds what a result says of one part: one view class per kind of element.
+A new result class has ``lines()``, ``as_dict()`` and, where there is something to draw, ``plot()``.
+"""

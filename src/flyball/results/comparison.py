@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
-from ..model.words import listing, suggest
+from ..model.messages import listing, suggest
 
 if TYPE_CHECKING:
     from .result import Result
 
-FIGURES = (
+FIGURE_NAMES = (
     "position_drift", "velocity_drift", "energy_drift", "difference", "steps", "rejected", "evaluations",
     "factorisations", "exchanges", "cpu",
 )  # fmt: skip
-COLUMNS = ("|g|", "|G v - nu|", "energy [J]", "difference", "steps", "evaluations", "CPU [ms]")
+COLUMN_HEADS = ("|g|", "|G v - nu|", "energy [J]", "difference", "steps", "evaluations", "CPU [ms]")
 
 
 @dataclass
@@ -72,21 +72,21 @@ class Formulation:
     @property
     def position_drift(self) -> float:
         """Largest |g| at an output time [m or rad]; nan if there is none."""
-        return _largest(self.g)
+        return _largest_size(self.g)
 
     @property
     def velocity_drift(self) -> float:
         """Largest |G v - nu| at an output time [m/s or rad/s]."""
-        return _largest(self.gv)
+        return _largest_size(self.gv)
 
     @property
     def energy_drift(self) -> float:
         """Largest deviation from the energy balance [J]."""
-        return _largest(self.balance)
+        return _largest_size(self.balance)
 
     def as_dict(self) -> dict[str, Any]:
         """Figures as plain numbers."""
-        plain = {k: getattr(self, k) for k in FIGURES}
+        plain = {k: getattr(self, k) for k in FIGURE_NAMES}
         return {"meaning": self.meaning, "success": self.success, "message": self.message} | plain
 
 
@@ -133,8 +133,8 @@ class Comparison:
 
     def lines(self) -> list[tuple[str, str]]:
         """A table for people, and what did not reach the end."""
-        widths = [max(11, len(c)) for c in COLUMNS]
-        out = [("formulation", " ".join(f"{c:>{w}}" for c, w in zip(COLUMNS, widths, strict=True)))]
+        widths = [max(11, len(c)) for c in COLUMN_HEADS]
+        out = [("formulation", " ".join(f"{c:>{w}}" for c, w in zip(COLUMN_HEADS, widths, strict=True)))]
         for f in self.formulations:
             cells = [f"{x:.1e}" for x in (f.position_drift, f.velocity_drift, f.energy_drift, f.difference)]
             cells += [str(f.steps + f.rejected), str(f.evaluations), f"{1e3 * f.cpu:.3g}"]
@@ -154,7 +154,7 @@ class Comparison:
 
     def plot(self, path: str | os.PathLike | None = None) -> Any:
         """Drift and energy over time, and cost; returns the Matplotlib figure, or writes it to ``path``."""
-        from ..view.comparison import comparison_plot
+        from ..view.comparison_plots import comparison_plot
 
         return comparison_plot(self, path)
 
@@ -163,5 +163,5 @@ class Comparison:
         return "\n".join(f"{label:<{width}}  {text}" for label, text in self.lines())
 
 
-def _largest(x: np.ndarray) -> float:
+def _largest_size(x: np.ndarray) -> float:
     return float(np.abs(x).max()) if len(x) else float("nan")

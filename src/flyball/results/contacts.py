@@ -1,9 +1,13 @@
-"""Contacts of a motion: where bodies touched at each output time, and with which forces."""
+"""Contacts of a motion: where bodies touch at each output time, their forces, and convergence of the solves.
+
+`Contacts` is a table with one row per contact and output time; `PairForce` sums the rows of a pair of bodies or
+sets. Of an event-driven motion the table is found from its constraint rows (`ContactHistory`).
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,13 +15,121 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
-from .convergence import Convergence
-from .sides import OPEN, SLIP, STATES, STICK, Sides
+from ..model.messages import listing, suggest
+from ..model.quantities import MEMBER
 
 if TYPE_CHECKING:
     import pandas
 
-ARRAYS = {  # columns of the table: type, numbers a row
+
+@dataclass(frozen=True, eq=False)
+class Convergence:
+    """Residuals of solves, one row each.
+
+    Attributes
+    ----------
+    x : ndarray (n,)
+        Time at the end of the step [s], or number of the iteration.
+    velocity : ndarray (n,) [m/s]
+        What is left of velocities that should vanish.
+    force : ndarray (n,)
+        What is left of an impulse, over the largest one.
+    iterations : ndarray (n,) of int
+        Iterations of each solve; of one solve's own history those up to the row.
+    over : str
+        What ``x`` is: ``"time"`` or ``"iteration"``.
+    solver : str
+        Which solver it was.
+    objective : ndarray (n,) or None
+        1/2 p' N p + b' p [J], of one solve's own history.
+    """
+
+    x: np.ndarray
+    velocity: np.ndarray
+    force: np.ndarray
+    iterations: np.ndarray
+    over: str = "time"
+    solver: str = ""
+    objective: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse columns of other lengths."""
+        sizes = {len(a) for a in (self.x, self.velocity, self.force, self.iterations)}
+        if len(sizes) != 1 or self.over not in ("time", "iteration"):
+            raise ValueError(f"convergence: columns of {sorted(sizes)} rows over {self.over!r}")
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain lists."""
+        columns = {k: np.asarray(getattr(self, k)).tolist() for k in ("x", "velocity", "force", "iterations")}
+        return {"over": self.over, "solver": self.solver} | columns
+
+    def plot(self, path: str | os.PathLike | None = None) -> Any:
+        """Plot both residuals, in logarithmic scale; returns the figure, or writes it to ``path``."""
+        from ..view.force_plots import plot_convergence
+
+        return plot_convergence([self], path)
+
+
+STICK, SLIP, OPEN = 0, 1, 2
+STATES = ("stick", "slip", "open")
+
+
+class ContactBodies:
+    """Who touches: single bodies, ground and the members of sets, counted through.
+
+    Parameters
+    ----------
+    names : names
+        Of bodies, of ``"ground"``, and of sets of bodies.
+    counts : int
+        For each name the number of members of the set, -1 for a single body.
+    """
+
+    def __init__(self, names: Iterable[str], counts: Iterable[int]) -> None:
+        self.names, self.counts = tuple(names), tuple(int(n) for n in counts)
+        self.first = np.cumsum([0, *(1 if n < 0 else n for n in self.counts)])
+
+    def __len__(self) -> int:
+        return int(self.first[-1])
+
+    def name(self, k: int) -> str:
+        """Name of side ``k``: ``"ball"``, or ``"balls[17]"`` of a set."""
+        owner = int(np.searchsorted(self.first, k, "right")) - 1
+        return self.names[owner] if self.counts[owner] < 0 else f"{self.names[owner]}[{k - self.first[owner]}]"
+
+    def span(self, name: str) -> tuple[int, int]:
+        """First side of a name, and the one after its last: of a body, a set, or a member such as ``"balls[17]"``.
+
+        Raises
+        ------
+        ModelError
+            If there is none of that name.
+        """
+        owner, k = name, -1
+        if name not in self.names and (found := MEMBER.fullmatch(name)):
+            owner, k = found[1], int(found[2])
+        if owner not in self.names:
+            known = listing(list(self.names))
+            raise ModelError(f"nothing that can touch is named {name!r}{suggest(name, self.names)}; {known}")
+        at = self.names.index(owner)
+        low, high = int(self.first[at]), int(self.first[at + 1])
+        if k < 0:
+            return low, high
+        if self.counts[at] < 0 or k >= high - low:
+            rule = "is a single body" if self.counts[at] < 0 else f"has the members 0 to {high - low - 1}"
+            raise ModelError(f"there is no {name!r}: {owner!r} {rule}")
+        return low + k, low + k + 1
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ContactBodies) and (self.names, self.counts) == (other.names, other.counts)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+CONTACT_COLUMNS = {  # columns of the table: type, numbers a row
     "pair": ("i8", 2),
     "point": ("f8", 3),
     "normal": ("f8", 3),
@@ -46,7 +158,7 @@ class Contacts:
         Who touches.
     begin : ndarray (n + 1,) of int
     pair : ndarray (k, 2) of int
-        The two sides, as `Sides` counts them.
+        The two sides, as `ContactBodies` counts them.
     point : ndarray (k, 3) [m]
         Where the force acts, midway between the surfaces, world axes; in steps by impulses where the step began.
     normal : ndarray (k, 3)
@@ -66,7 +178,7 @@ class Contacts:
     """
 
     t: np.ndarray
-    sides: Sides
+    sides: ContactBodies
     begin: np.ndarray
     pair: np.ndarray
     point: np.ndarray
@@ -82,7 +194,7 @@ class Contacts:
     def __post_init__(self) -> None:
         """Refuse tables that do not fit together."""
         k, n = len(self.pair), len(self.t)
-        for name, (_, width) in ARRAYS.items():
+        for name, (_, width) in CONTACT_COLUMNS.items():
             want = (k, width) if width else (k,)
             if np.shape(getattr(self, name)) != want:
                 raise ValueError(f"contacts: {name} must have shape {want}, got {np.shape(getattr(self, name))}")
@@ -141,7 +253,7 @@ class Contacts:
         times = np.asarray(times, int)
         begin = np.r_[0, np.cumsum(self.count[times])]
         rows = np.arange(begin[-1]) + np.repeat(np.asarray(self.begin)[times] - begin[:-1], self.count[times])
-        own = {name: getattr(self, name)[rows] for name in ARRAYS}
+        own = {name: getattr(self, name)[rows] for name in CONTACT_COLUMNS}
         return replace(self, t=self.t[times], begin=begin, history=None, **own)
 
     def between(self, a: str, b: str) -> PairForce:
@@ -165,7 +277,7 @@ class Contacts:
 
     def _summed(self, on: str, by: str | None) -> PairForce:
         if (on, by) not in self._known:
-            self._known[on, by] = summed(self, on, by)
+            self._known[on, by] = pair_force(self, on, by)
         return self._known[on, by]
 
     def force_on(self, low: int, high: int) -> np.ndarray:
@@ -187,7 +299,11 @@ class Contacts:
     def table(self) -> dict[str, np.ndarray]:
         """Every row as columns: time, names of the sides, x, y, z, normal, gap, force, state, friction."""
         names = self.names()
-        out = {"t": self.t[self.when], "side_1": _texts([a for a, _ in names]), "side_2": _texts([b for _, b in names])}
+        out = {
+            "t": self.t[self.when],
+            "side_1": _text_array([a for a, _ in names]),
+            "side_2": _text_array([b for _, b in names]),
+        }
         axes = "xy" if self.planar else "xyz"
         for label, what in (("", self.point), ("n", self.normal), ("f", self.force)):
             out |= {f"{label}{a}": what[:, k] for k, a in enumerate(axes)}
@@ -205,12 +321,12 @@ class Contacts:
         return frame
 
     def pairs(self) -> list[tuple[str, str]]:
-        """The pairs that touched, each once, in the order of `Sides`."""
+        """The pairs that touched, each once, in the order of `ContactBodies`."""
         return [(self.sides.name(a), self.sides.name(b)) for a, b in np.unique(self.pair, axis=0).tolist()]
 
     def plot(self, *pairs: Sequence[str], path: str | os.PathLike | None = None) -> Any:
-        """Plot normal and tangential forces of pairs over time; see `flyball.view.contacts.plot_contacts`."""
-        from ..view.contacts import plot_contacts
+        """Plot normal and tangential forces of pairs over time; see `flyball.view.force_plots.plot_contacts`."""
+        from ..view.force_plots import plot_contacts
 
         return plot_contacts(self, pairs, path)
 
@@ -235,14 +351,14 @@ class Contacts:
         return "\n".join(f"{k:<14} {v}" for k, v in self.lines())
 
 
-def end_to_end(every: Sequence[Contacts], t: np.ndarray) -> Contacts:
+def concatenate_contacts(every: Sequence[Contacts], t: np.ndarray) -> Contacts:
     """Contacts of times that follow one another, as those of all of them."""
     begin = np.concatenate([[0], *(c.count for c in every)]).cumsum()
-    columns: dict[str, Any] = {name: np.concatenate([getattr(c, name) for c in every]) for name in ARRAYS}
+    columns: dict[str, Any] = {name: np.concatenate([getattr(c, name) for c in every]) for name in CONTACT_COLUMNS}
     return Contacts(t=t, sides=every[0].sides, begin=begin, planar=every[0].planar, **columns)
 
 
-def _texts(names: list[str]) -> np.ndarray:
+def _text_array(names: list[str]) -> np.ndarray:
     return np.array(names, object)
 
 
@@ -323,7 +439,7 @@ class PairForce:
         return f"<contact force of {self.title}: pressing at {touching} of {len(self.t)} times, up to {most:.4g} N>"
 
 
-def summed(contacts: Contacts, on: str, by: str | None) -> PairForce:
+def pair_force(contacts: Contacts, on: str, by: str | None) -> PairForce:
     """Sum what ``by`` (None: everyone else) does to ``on``.
 
     Raises

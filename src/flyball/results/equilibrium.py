@@ -1,4 +1,4 @@
-"""An equilibrium or steady motion: where it is, what everything carries there, and whether it is stable."""
+"""An equilibrium or steady motion with its stability and contacts, and a series of equilibria over a parameter."""
 
 from __future__ import annotations
 
@@ -9,16 +9,54 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..model.writing import PAGE, write
-from .numbers import number
-from .touch import Touch
+from ..model.output_files import PAGE, write_file
+from .wording import number_text
 
 if TYPE_CHECKING:
     from .result import Result
 
-EIGENVALUES, MULTIPLIERS = "eigenvalues of the closed loop", "multipliers of the closed loop, sample by sample"
-STABLE, MARGINAL, UNSTABLE, UNJUDGED = "stable", "marginal", "unstable", "not judged"
-SHOWN = 12  # contacts in a text
+
+STICKS, FRICTIONLESS, AT_FRICTION_LIMIT, ABOUT_TO_PART = "sticks", "smooth", "at its friction limit", "about to part"
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A closed contact, or a stop that is reached, of a mechanism at rest.
+
+    Attributes
+    ----------
+    name : str
+        ``"block-floor"``, with a number where there are several; of a stop its own name.
+    state : str
+        ``"sticks"``; ``"smooth"`` without friction; ``"at its friction limit"``, where any more would make it slide; or
+        ``"about to part"``, which carries nothing.
+    normal : float
+        Force that presses [N]; of a stop its effort [N or N m]; of friction in a joint, a brake or clutch the most that
+        it bears.
+    tangential : float [N]
+        Friction force.
+    used : float
+        Friction force in parts of what friction bears; 0 without friction.
+    gap : float [m]
+        Distance of the surfaces; below 0 they overlap.
+    """
+
+    name: str
+    state: str
+    normal: float
+    tangential: float = 0.0
+    used: float = 0.0
+    gap: float = 0.0
+
+    def __str__(self) -> str:
+        part = f"{100.0 * self.used:.3g} % of what it bears"
+        friction = f", friction {self.tangential:.4g} N, {part}" if self.used else ""
+        return f"{self.name} {self.state}, presses with {self.normal:.4g}{friction}"
+
+
+BY_EIGENVALUES, BY_MULTIPLIERS = "eigenvalues of the closed loop", "multipliers of the closed loop, sample by sample"
+STABLE, MARGINAL, UNSTABLE, NOT_JUDGED = "stable", "marginal", "unstable", "not judged"
+MAX_CONTACTS = 12  # contacts in a text
 
 
 @dataclass
@@ -101,9 +139,9 @@ class Equilibrium:
             what = "least stiffness" + (" with controllers' states held" if self.judged_by else "")
             out.append((what, f"{self.least:.3g} of what acts, along {parts}"))
         out += [("kink", text) for text in self.kinks]
-        out += [("contact", str(k)) for k in self.touching[:SHOWN]]
-        if len(self.touching) > SHOWN:
-            out.append(("contact", f"and {len(self.touching) - SHOWN} more"))
+        out += [("contact", str(k)) for k in self.touching[:MAX_CONTACTS]]
+        if len(self.touching) > MAX_CONTACTS:
+            out.append(("contact", f"and {len(self.touching) - MAX_CONTACTS} more"))
         out += [("note", text) for text in self.notes]
         out += [("speed", f"{k}: {v:.9g}") for k, v in self.speeds.items()]
         out += [("preload", f"{k}: {v + 0.0:.6g}") for k, v in self.preload.items()]
@@ -116,7 +154,7 @@ class Equilibrium:
         size = {a: 1.0 if a == "angle" else length for a in axes}
         return [
             f"{b}: "
-            + ", ".join(f"{a} {number(self[f'{b}.{a}'], size[a])} {'rad' if a == 'angle' else 'm'}" for a in axes)
+            + ", ".join(f"{a} {number_text(self[f'{b}.{a}'], size[a])} {'rad' if a == 'angle' else 'm'}" for a in axes)
             for b in bodies[:12]
         ] + ([f"and {len(bodies) - 12} more bodies"] if len(bodies) > 12 else [])
 
@@ -133,19 +171,19 @@ class Equilibrium:
 
     def html(self) -> str:
         """The mechanism where it is with the verdict beside it, as a page's text."""
-        from ..view.equilibrium import resting
+        from ..view.animation import equilibrium_page
 
-        return resting(self)
+        return equilibrium_page(self)
 
     def to_html(self, path: str | os.PathLike) -> None:
         """Write the page that shows the mechanism where it is, and the verdict."""
-        write(path, self.html(), PAGE)
+        write_file(path, self.html(), PAGE)
 
     def _repr_html_(self) -> str:
         """The page, in a notebook."""
-        from ..view.notebook import iframe
+        from ..view.page import notebook_iframe
 
-        return iframe(self.html())
+        return notebook_iframe(self.html())
 
     def __repr__(self) -> str:
         return "\n".join(f"{a}: {b}" for a, b in self.lines())

@@ -1,4 +1,4 @@
-"""What happened at an instant of a motion: events that the model names, impacts, stops, what stuck or let go."""
+"""Events of a motion at their instants: events of the model, impacts, stops, sticking and sliding."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from ..errors import ModelError
-from ..model.words import listing, shortened, suggest
-from .kinds import HAPPENED
-from .moment import Moment
-from .struck import COMPONENTS, Struck, plain
+from ..model.messages import listing, shortened_list, suggest
+from .phases import Moment
+from .reactions import IMPULSE_COMPONENTS, EventImpulses, impulse_data
+from .wording import EVENT_KINDS
 
 if TYPE_CHECKING:
     import pandas
 
     from .result import Result
 
-SHOWN = 20  # lines of a printed table
-HEAD = ("t [s]", "name", "kind", "done", "lost [J]")
+MAX_ROWS = 20  # lines of a printed table
+TABLE_HEAD = ("t [s]", "name", "kind", "done", "lost [J]")
 
 
 @dataclass(frozen=True)
-class Happening:
+class EventRecord:
     """What happened at one instant.
 
     Attributes
@@ -40,7 +40,7 @@ class Happening:
     lost : float [J]
         Energy that impacts and sudden locking took.
     impulses : mapping
-        Element -> impulse [N s] or [N m s]: a number along its coordinate, or components; see `struck.Struck`.
+        Element -> impulse [N s] or [N m s]: a number along its coordinate, or components; see `reactions.EventImpulses`.
     before, after : Moment, optional
         The motion just before and after: ``happening.after["block.vx"]``.
     """
@@ -57,7 +57,7 @@ class Happening:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, without the states."""
-        told = {k: plain(x) for k, x in self.impulses.items()}
+        told = {k: impulse_data(x) for k, x in self.impulses.items()}
         return {
             "t": float(self.t),
             "name": self.name,
@@ -79,20 +79,20 @@ class Events(Sequence):
     ``of`` is the result that they are of.
     """
 
-    def __init__(self, happened: Iterable[Happening], of: Result | None = None) -> None:
-        self._all, self._of = tuple(happened), of
+    def __init__(self, records: Iterable[EventRecord], of: Result | None = None) -> None:
+        self._all, self._of = tuple(records), of
 
     def __len__(self) -> int:
         return len(self._all)
 
-    def __iter__(self) -> Iterator[Happening]:
+    def __iter__(self) -> Iterator[EventRecord]:
         return iter(self._all)
 
     @overload
-    def __getitem__(self, which: int) -> Happening: ...
+    def __getitem__(self, which: int) -> EventRecord: ...
     @overload
     def __getitem__(self, which: slice | str) -> Events: ...
-    def __getitem__(self, which: int | slice | str) -> Happening | Events:
+    def __getitem__(self, which: int | slice | str) -> EventRecord | Events:
         """One by its number, several by a slice, or those of a name or kind."""
         if isinstance(which, str):
             return self.of(which)
@@ -107,7 +107,7 @@ class Events(Sequence):
             If there is nothing of that name; the message lists what happened.
         """
         found = [h for h in self._all if h.kind == name or name in h.name.split(", ")]
-        if not found and name not in HAPPENED and name not in (able := self._able()):
+        if not found and name not in EVENT_KINDS and name not in (able := self._able()):
             names = self.names()
             meant, known = suggest(name, [*names, *sorted(able)]), listing(names) if names else "nothing did"
             raise ModelError(f"nothing named {name!r} happened{meant}; {known}")
@@ -117,7 +117,7 @@ class Events(Sequence):
         """Names of all that might have happened."""
         if self._of is None:
             return set()
-        held = self._of.stretches.all[0].values.structure.switches if self._of.stretches is not None else ()
+        held = self._of.phases.all[0].values.structure.switches if self._of.phases is not None else ()
         return {e.name for e in self._of.model.elements()} | {x.switch.label or x.element.name for x in held}
 
     def names(self) -> list[str]:
@@ -146,7 +146,7 @@ class Events(Sequence):
         """How many, and how often each; empty where nothing happened."""
         if not self._all:
             return ""
-        told = shortened((f"{name} {n} times" if n > 1 else name for name, n in self.counts().items()), 90)
+        told = shortened_list((f"{name} {n} times" if n > 1 else name for name, n in self.counts().items()), 90)
         lost = f"; {self.lost.sum():.4g} J lost" if self.lost.any() else ""
         return f"{len(self)}: {told}{lost}"
 
@@ -157,12 +157,12 @@ class Events(Sequence):
         rows: list[dict[str, Any]] = []
         for h in self._all:
             row = {"t": h.t, "name": h.name, "kind": h.kind, "done": "; ".join(h.done), "lost": h.lost}
-            rows.append(row | dict(_columns(h.impulses)))
+            rows.append(row | dict(_impulse_columns(h.impulses)))
         return pd.DataFrame(rows, columns=None if rows else ["t", "name", "kind", "done", "lost"])
 
     def _table(self) -> tuple[list[tuple[str, ...]], str]:
         """Rows of the printed table, and what is left out of it."""
-        shown = self._all if len(self._all) <= SHOWN else (*self._all[: SHOWN - 1], self._all[-1])
+        shown = self._all if len(self._all) <= MAX_ROWS else (*self._all[: MAX_ROWS - 1], self._all[-1])
         rows: list[tuple[str, ...]]
         rows = [(f"{h.t:.6g}", h.name, h.kind, "; ".join(h.done), f"{h.lost:.4g}" if h.lost else "") for h in shown]
         left = len(self._all) - len(shown)
@@ -172,8 +172,11 @@ class Events(Sequence):
         if not self._all:
             return "<no events>"
         rows, left = self._table()
-        widths = [max(len(row[k]) for row in (HEAD, *rows)) for k in range(len(HEAD))]
-        text = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in (HEAD, *rows)]
+        widths = [max(len(row[k]) for row in (TABLE_HEAD, *rows)) for k in range(len(TABLE_HEAD))]
+        text = [
+            "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
+            for row in (TABLE_HEAD, *rows)
+        ]
         if left:
             text.insert(-1, f"... {left}")
         return "\n".join(text)
@@ -182,25 +185,31 @@ class Events(Sequence):
         from html import escape
 
         rows, left = self._table()
-        head = "".join(f"<th>{escape(cell)}</th>" for cell in HEAD)
+        head = "".join(f"<th>{escape(cell)}</th>" for cell in TABLE_HEAD)
         body = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows]
         if left:
-            body.insert(-1, f"<td colspan={len(HEAD)}>... {left}</td>")
+            body.insert(-1, f"<td colspan={len(TABLE_HEAD)}>... {left}</td>")
         return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
 
 
-def _columns(impulses: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+def _impulse_columns(impulses: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
     """Impulses by the names of their columns: a number, or each component."""
     for name, x in impulses.items():
-        parts = dict(x) if isinstance(x, Mapping) else dict(zip(COMPONENTS, x, strict=True)) if np.ndim(x) else {"": x}
+        parts = (
+            dict(x)
+            if isinstance(x, Mapping)
+            else dict(zip(IMPULSE_COMPONENTS, x, strict=True))
+            if np.ndim(x)
+            else {"": x}
+        )
         yield from ((f"impulse {name} {k}".rstrip(), float(v)) for k, v in parts.items())
 
 
-def bound(happened: list[Happening], result: Result) -> Iterator[Happening]:
+def with_moments(records: list[EventRecord], result: Result) -> Iterator[EventRecord]:
     """With states that can be read by name, by the parameters of their time."""
-    now = next((h.tables[0] for h in happened if h.tables is not None), result.values)
+    now = next((h.tables[0] for h in records if h.tables is not None), result.values)
     since, came = np.nan, None
-    for h in happened:
+    for h in records:
         if h.t != since:
             since, came = h.t, h.before if isinstance(h.before, np.ndarray) else None
         both = h.tables or (now, now)
@@ -210,6 +219,6 @@ def bound(happened: list[Happening], result: Result) -> Iterator[Happening]:
             for k, (x, y) in enumerate(zip(both, (h.before, h.after), strict=True))
         )
         impulses = h.impulses
-        if isinstance(impulses, Struck) and isinstance(before, Moment) and isinstance(after, Moment):
+        if isinstance(impulses, EventImpulses) and isinstance(before, Moment) and isinstance(after, Moment):
             impulses = impulses.bound(before, after)
         yield dataclasses.replace(h, before=before, after=after, impulses=impulses)

@@ -1,20 +1,58 @@
-"""Modes of a linear model: eigenvalues, frequencies, damping ratios and shapes."""
+"""Modes of a linear model, their shapes as motions, root loci over a parameter, and which motions grow.
+
+Equilibria, modes and root loci judge growth in the same way: eigenvalues come without their rounding errors
+(`derivatives/eigenvalues.py`), so a real part that is not zero is one.
+"""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model.writing import PAGE, write
-from .growth import growing
+from ..engine.kinematics import retract
+from ..model.output_files import PAGE, write_file
+from .health import Health
+from .result import Result
 
-if TYPE_CHECKING:
-    from .result import Result
+AXIS_TOLERANCE = (
+    1e-8  # part of an eigenvalue within which a locus has it on the axis: nearer, crossings are not told apart
+)
 
-ROUNDING = 1e-9  # damping ratios below this are 0
+
+def is_growing(values: np.ndarray) -> np.ndarray:
+    """Which eigenvalues belong to motions that grow, bool as ``values``."""
+    return np.asarray(values).real > 0.0
+
+
+def half_plane(values: np.ndarray) -> np.ndarray:
+    """Which half plane each eigenvalue of a locus lies in: 1, -1, or 0 on the axis or just beside it, as ``values``."""
+    w = np.asarray(values)
+    return np.where(np.abs(w.real) > AXIS_TOLERANCE * np.abs(w), np.sign(w.real), 0.0).astype(int)
+
+
+def largest_growth(values: np.ndarray, blur: np.ndarray, *, discrete: bool) -> float:
+    """The largest growth: above zero if a motion grows, below if all decay, zero if that is open.
+
+    Parameters
+    ----------
+    values : ndarray (n,) complex
+        Eigenvalues.
+    blur : ndarray (n,)
+        What each is uncertain by.
+    discrete : bool
+        Whether they are multipliers from one instant to the next, which must not exceed 1 in size.
+    """
+    grows = values.real
+    if discrete:
+        grows = np.abs(values) - 1.0
+        grows[np.abs(grows) <= blur] = 0.0
+    return float(grows.max(initial=-1.0))
+
+
+DAMPING_ROUNDING = 1e-9  # damping ratios below this are 0
 
 
 @dataclass
@@ -83,13 +121,13 @@ class Modes:
         size = np.abs(self.eigenvalues)
         still = self._still
         ratio = np.where(still, 0.0, -self.eigenvalues.real / np.where(still, 1.0, size))
-        return np.where(np.abs(ratio) > ROUNDING, ratio, 0.0)
+        return np.where(np.abs(ratio) > DAMPING_ROUNDING, ratio, 0.0)
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """``"oscillation"``, ``"decay"``, ``"unstable"`` or ``"rigid"`` for every mode."""
         out = []
-        for w, still, grows in zip(self.eigenvalues, self._still, growing(self.eigenvalues), strict=True):
+        for w, still, grows in zip(self.eigenvalues, self._still, is_growing(self.eigenvalues), strict=True):
             out.append("rigid" if still else "unstable" if grows else "decay" if w.imag == 0.0 else "oscillation")
         return tuple(out)
 
@@ -156,21 +194,134 @@ class Modes:
 
         Damping is left out, so that the motion repeats. A mode that does not oscillate goes out and back.
         """
-        from .shapes import motion
+        pass
 
-        return motion(self, k, amplitude, outputs)
+        return mode_motion(self, k, amplitude, outputs)
 
     def to_html(self, path: str | os.PathLike, **options: Any) -> None:
-        """Write a page in which the modes move; options as for `flyball.view.modes.page`."""
-        from ..view.modes import page
+        """Write a page in which the modes move; options as for `flyball.view.mode_animation.modes_page`."""
+        from ..view.mode_animation import modes_page
 
-        write(path, page(self, **options), PAGE)
+        write_file(path, modes_page(self, **options), PAGE)
 
     def plot(self, path: str | os.PathLike | None = None) -> Any:
         """Eigenvalues in the complex plane; returns the Matplotlib figure, or writes it to ``path``."""
-        from ..view.linear import eigenvalues
+        from ..view.linear_plots import eigenvalues
 
         return eigenvalues(self, path)
 
     def __repr__(self) -> str:
         return "\n".join(f"{a:>4} {b}" for a, b in self.lines())
+
+
+NONOSCILLATING_PERIOD = 1.0  # period [s] of a mode that does not oscillate
+
+
+def mode_motion(m: Modes, k: int, amplitude: float, outputs: int) -> Result:
+    """See `Modes.motion`. To first order in the amplitude the joints stay closed."""
+    x = m.point
+    rate = abs(m.eigenvalues[k].imag)
+    period = 2.0 * np.pi / rate if rate > 0.0 else NONOSCILLATING_PERIOD
+    t = np.linspace(0.0, period, outputs)
+    length = x.values.length
+    scale = np.array([1.0 if u == "m" else length for u in m.units])
+    shape = m.shapes[:, k] * (amplitude * length / np.abs(scale * m.shapes[:, k]).max())
+    swing = np.exp(2j * np.pi * t / period)
+    step, speed, acceleration = (
+        ((2j * np.pi / period) ** n * shape[:, None] * swing).real for n in range(3)
+    )  # (nv, outputs) each
+    q = np.repeat(x.q.T, outputs, axis=1)
+    retract(x.values.system, q, step)
+    states = np.repeat(x.states, outputs, axis=0)
+    lam = np.repeat(x.multipliers, outputs, axis=0)
+    health = Health(True, f"mode {k}, not a simulation", 0.0, 0.0, 0, 0, 0, 0, 0.0, late=dict(x.health.late))
+    return Result(x.model, x.values, t, np.ascontiguousarray(q.T), speed.T, states, acceleration.T, lam, health)
+
+
+class Crossing(NamedTuple):
+    """Where stability changes: eigenvalues pass from one half plane into the other.
+
+    Attributes
+    ----------
+    value : float
+        The parameter's.
+    eigenvalue : complex [1/s]
+        On the imaginary axis; of a pair the upper one.
+    kind : str
+        ``"flutter"`` where oscillations begin to grow or cease to, ``"divergence"`` at zero.
+    change : int
+        How many eigenvalues more have a positive real part beyond it.
+    """
+
+    value: float
+    eigenvalue: complex
+    kind: str
+    change: int
+
+
+@dataclass(repr=False)
+class RootLocus:
+    """Eigenvalues of the linear equations over values of a parameter.
+
+    Attributes
+    ----------
+    parameter : str
+    values : ndarray (m,)
+    eigenvalues : ndarray (m, n) complex [1/s]
+        Each column is a branch, followed by eigenvalues and shapes; parts that are rounding are 0.
+    crossings : list of Crossing
+        Every change of stability between the values, found to rounding, not interpolated.
+    path_values, path : ndarray (p,), (p, n) complex
+        The same branches with the values that were added where something happens, as they are drawn.
+    seen_from : tuple of str
+        Frames from which motions along it are steady, in words; empty at rest.
+    """
+
+    name: str
+    parameter: str
+    values: np.ndarray
+    eigenvalues: np.ndarray
+    crossings: list[Crossing] = field(default_factory=list)
+    path_values: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    path: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), complex))
+    seen_from: tuple[str, ...] = ()
+
+    @property
+    def unstable(self) -> np.ndarray:
+        """How many eigenvalues have a positive real part, (m,)."""
+        return (half_plane(self.eigenvalues) > 0).sum(axis=1)
+
+    def lines(self) -> list[tuple[str, str]]:
+        """A table for people."""
+        out = [(self.parameter, f"{'unstable':>8}  largest real part [1/s], with imaginary part [rad/s]")]
+        for value, w, n in zip(self.values, self.eigenvalues, self.unstable, strict=True):
+            top = max(w, key=lambda x: (x.real, x.imag)) if len(w) else 0j
+            out.append((f"{value:.6g}", f"{n:8d}  {top.real:.6g}, {abs(top.imag):.6g}"))
+        for c in self.crossings:
+            at = f"{self.parameter} = {c.value:.9g}, imaginary part {c.eigenvalue.imag:.6g} rad/s"
+            now = f"{abs(c.change)} {'more' if c.change > 0 else 'fewer'} unstable"
+            out.append(("stability changes", f"{at}: {c.kind}, {now}"))
+        out += [("seen from", text) for text in self.seen_from]
+        return out
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers and names."""
+        return {
+            "name": self.name,
+            "parameter": self.parameter,
+            "values": self.values.tolist(),
+            "eigenvalues": [[[float(x.real), float(x.imag)] for x in row] for row in self.eigenvalues],
+            "crossings": [c._asdict() | {"eigenvalue": [c.eigenvalue.real, c.eigenvalue.imag]} for c in self.crossings],
+            "unstable": self.unstable.tolist(),
+            "seen_from": list(self.seen_from),
+        }
+
+    def plot(self, path: str | os.PathLike | None = None) -> Any:
+        """Branches in the complex plane; returns the Matplotlib figure, or writes it to ``path``."""
+        from ..view.linear_plots import root_locus_plot
+
+        title = f"{self.name}: eigenvalues over {self.parameter}"
+        return root_locus_plot(self.path, self.path_values, self.parameter, title, path, known=self.crossings)
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{a:>18}  {b}" for a, b in self.lines())

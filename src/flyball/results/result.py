@@ -1,9 +1,11 @@
-"""A motion, read by name."""
+"""`Result`: a motion read by name; and results of consecutive parts of a motion concatenated to one."""
 
 from __future__ import annotations
 
+import dataclasses
 import os
-from collections.abc import Callable, Iterable
+import threading
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,33 +13,46 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
-from ..model.quantities import ENERGY, MEMBER, one, quantities
-from ..model.writing import PAGE, RESULT, TABLE, ending, write
-from ..tables.values import Values
-from .booked import Begun
-from .bulk import Bulk
-from .contacts import Contacts
-from .energy import Energy
-from .events import Events, Happening, bound
-from .health import Health
-from .measured import Measured
-from .numbers import span
-from .reactions import Reactions
-from .records import Records
-from .stretches import Stretches, cut_up
-from .turn import Turn
-from .views import has_view, view
-from .views.base import Curves
-from .views.bulk import MemberView, SetView
-from .views.spliced import Spliced
-
-TOLD = 12  # curves in a text
-_NO_WHOLE: Any = None  # else a result and the output times that are a piece of it
-Owed = Callable[[], tuple[np.ndarray, np.ndarray]]
+from ..model.output_files import PAGE, RESULT, TABLE, file_extension, write_file
+from ..model.quantities import ENERGY, MEMBER, quantities, single_quantity
+from ..tables.values import Values, values
+from .body_sets import SET_MOTION_ARRAYS, BodySetMotion
+from .contacts import Contacts, concatenate_contacts
+from .energy_balance import CONTACT_ELASTIC, Energy
+from .events import EventRecord, Events, with_moments
+from .health import ContactHealth, Health
+from .part_views import has_view, view_of
+from .part_views.base import Curves, SplicedView
+from .part_views.bodies import BodySetView, SetMemberView
+from .phases import Moment, MotionStart, Phase, Phases, event_energies, phases_or_none, split_by_parameters
+from .reactions import EventImpulses, JointReactions
+from .recorded_kinematics import MeasuredQuantities, RecordedMotion
+from .wording import range_text
 
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+
+class OwnedLock:
+    """A lock that the thread which has it may take again; a copy or a pickle of its owner has one of its own."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+    def __reduce__(self) -> Any:
+        return OwnedLock, ()
+
+
+SHOWN_CURVES = 12  # curves in a text
+_NO_PARENT: Any = None  # else a result and the output times that are a piece of it
+DeferredArrays = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 
 class Result:
@@ -56,16 +71,16 @@ class Result:
     health : Health
     energy : Energy
     wound : dict
-        Planar body -> whole turns [rad] that coordinates count and its angle does not (`records.wound`): those that a
+        Planar body -> whole turns [rad] that coordinates count and its angle does not (`recorded_kinematics.extra_turns`): those that a
         joint was told to begin with.
     contacts : Contacts
         Where bodies touched and with which forces; None where the mechanism has no contact.
     bulk : dict
-        Set of bodies -> its motion (`Bulk`); their members are read by ``result["balls[17]"]``.
+        Set of bodies -> its motion (`BodySetMotion`); their members are read by ``result["balls[17]"]``.
     events : Events
         What happened at instants, in the order of time: the model's events, impacts, what stuck, locked or let go.
     exchanged : dict
-        Energy [J] since the start, (n,), by the names of `energy.EXCHANGED`, and given by events.
+        Energy [J] since the start, (n,), by the names of `energy_balance.EXCHANGE_SIGNS`, and given by events.
     begun : Begun
         How it began, and what had been exchanged before.
     carried : dict
@@ -88,17 +103,19 @@ class Result:
     ) -> None:
         self.model, self.values, self.health = model, values, health
         self.t, self.q, self.v, self._vdot, self._multipliers = t, q, v, vdot, multipliers
-        self._turn, self._states = Turn(), states
-        self.unsolved: Owed | None = None  # finds accelerations and multipliers that are not there yet
-        self.owed: Owed | None = None  # finds works that are not there yet
+        self._turn, self._states = OwnedLock(), states
+        self.deferred_accelerations: DeferredArrays | None = (
+            None  # finds accelerations and multipliers that are not there yet
+        )
+        self.deferred_works: DeferredArrays | None = None  # finds works that are not there yet
         self._final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
         self.wound: dict[str, float] = {}
         self.contacts: Contacts | None = None
-        self.bulk: dict[str, Bulk] = {}
+        self.bulk: dict[str, BodySetMotion] = {}
         self.exchanged: dict[str, np.ndarray] = {}
-        self.begun, self.within = Begun(), _NO_WHOLE
+        self.begun, self.within = MotionStart(), _NO_PARENT
         self.carried: dict[str, Any] = {}
-        self.stretches: Stretches | None = None
+        self.phases: Phases | None = None
         self._events = Events((), self)
         self.energy = Energy(self)
 
@@ -116,9 +133,9 @@ class Result:
 
     def _solve(self) -> None:
         with self._turn:  # there is one scratch
-            if (find := self.unsolved) is not None:
+            if (find := self.deferred_accelerations) is not None:
                 self._vdot, self._multipliers = find()
-                self.unsolved = None
+                self.deferred_accelerations = None
 
     @property
     def events(self) -> Events:
@@ -126,9 +143,9 @@ class Result:
         return self._events
 
     @events.setter
-    def events(self, happened: Iterable[Happening]) -> None:
+    def events(self, happened: Iterable[EventRecord]) -> None:
         """Say what happened; states before and after are read by name from then on."""
-        self._events = Events(bound(list(happened), self), self)
+        self._events = Events(with_moments(list(happened), self), self)
         self.health.events = self._events.summary()
 
     @property
@@ -155,10 +172,10 @@ class Result:
 
     def _settle(self) -> None:  # works of a motion that was followed, not integrated
         with self._turn:
-            if (find := self.owed) is not None:  # owed still if it is interrupted
+            if (find := self.deferred_works) is not None:  # owed still if it is interrupted
                 self._states, y = find()
                 self._final = (self._final[0], y)
-                self.owed = None
+                self.deferred_works = None
 
     def __getstate__(self) -> dict[str, Any]:
         """All is found before it is pickled or copied: of what it is found with nothing goes along."""
@@ -174,27 +191,27 @@ class Result:
     @cached_property
     def pieces(self) -> tuple[Result, ...]:
         """The motion piece by piece, if parameters changed in it, each with its own; else none."""
-        return cut_up(self)
+        return split_by_parameters(self)
 
     @cached_property
-    def records(self) -> Records:
+    def records(self) -> RecordedMotion:
         """Kinematics of every body and frame at the output times."""
-        return Records(self.values, self.q, self.v, self.vdot, self.wound)
+        return RecordedMotion(self.values, self.q, self.v, self.vdot, self.wound)
 
     @cached_property
-    def motions(self) -> Records:
+    def motions(self) -> RecordedMotion:
         """The same without the accelerations, which have to be solved for."""
-        return Records(self.values, self.q, self.v, None, self.wound)
+        return RecordedMotion(self.values, self.q, self.v, None, self.wound)
 
     @cached_property
-    def measured(self) -> Measured:
+    def measured(self) -> MeasuredQuantities:
         """Quantities that forces act along and that laws name."""
-        return Measured(self)
+        return MeasuredQuantities(self)
 
     @cached_property
-    def reactions(self) -> Reactions:
+    def reactions(self) -> JointReactions:
         """Wrenches that joints carry."""
-        return Reactions(self)
+        return JointReactions(self)
 
     def __getitem__(self, name: str) -> Any:
         """A part by its name, or anything of it by ``"part.quantity"``.
@@ -228,12 +245,12 @@ class Result:
             return self.energy
         if (found := self._set_of(name)) is None:
             if self.pieces:
-                return Spliced([p._view(name) for p in self.pieces], [len(p.t) for p in self.pieces])
-            return view(self, self.model[name])
+                return SplicedView([p._view(name) for p in self.pieces], [len(p.t) for p in self.pieces])
+            return view_of(self, self.model[name])
         own, k = found
-        return SetView(self, own) if k is None else MemberView(self, own, k)
+        return BodySetView(self, own) if k is None else SetMemberView(self, own, k)
 
-    def _set_of(self, name: str) -> tuple[Bulk, int | None] | None:
+    def _set_of(self, name: str) -> tuple[BodySetMotion, int | None] | None:
         """The set of bodies of a name; of a member such as ``"balls[17]"`` its set and its number.
 
         Raises
@@ -282,7 +299,7 @@ class Result:
         ModelError
             If there is none of that name, or it has several components.
         """
-        one(self.model, name)
+        single_quantity(self.model, name)
         return self.channel(name if "." in name else f"{name}.value")
 
     def channels(self) -> dict[str, tuple[str, np.ndarray]]:
@@ -306,7 +323,9 @@ class Result:
         """Labels and texts for people: times, what the health says, and between which values the first curves stay."""
         over = f"{self.t[0]:g} to {self.t[-1]:g} s, {len(self.t)} times" if len(self.t) else "no times"
         out = [("motion", f"{self.model.name}, {over}"), *self.health.lines()]
-        return out + [(name, f"{span(v)} {unit.replace('*', ' ')}") for name, (unit, v) in self._telling().items()]
+        return out + [
+            (name, f"{range_text(v)} {unit.replace('*', ' ')}") for name, (unit, v) in self._telling().items()
+        ]
 
     def _telling(self) -> Curves:
         """At most a dozen curves that say most: what sensors measure, efforts of drivers, coordinates of joints."""
@@ -315,7 +334,7 @@ class Result:
         names += [f"{d.name}.effort" for d in m.drivers]
         names += [f"{j.name}.{what}" for j in m.joints for what in j.measured(planar)]
         names += [f"{b.name}.{a}" for b in m.bodies for a in (("x", "y", "angle") if planar else "xyz")]
-        return {name: self.channel(name) for name in names[:TOLD]} if len(self.t) else {}
+        return {name: self.channel(name) for name in names[:SHOWN_CURVES]} if len(self.t) else {}
 
     def as_dict(self) -> dict[str, Any]:
         """Everything as plain numbers and names: times, all curves with their units, and the health."""
@@ -354,7 +373,7 @@ class Result:
         """
         from .files import save
 
-        found = ending(path, (*RESULT, *TABLE, *PAGE))
+        found = file_extension(path, (*RESULT, *TABLE, *PAGE))
         if found in TABLE:
             self.to_csv(path)
         elif found in PAGE:
@@ -364,21 +383,21 @@ class Result:
 
     def plot(self, *names: str, path: str | os.PathLike | None = None) -> Any:
         """Plot curves over time; returns the Matplotlib figure, or writes it to ``path``."""
-        from ..view.plots import plot
+        from ..view.result_plots import plot_curves
 
-        return plot(self, *names, path=path)
+        return plot_curves(self, *names, path=path)
 
     def plot_path(self, *points: Any, **options: Any) -> Any:
-        """Draw paths of points with their velocities; see `flyball.view.paths.plot_path` for the options."""
-        from ..view.paths import plot_path
+        """Draw paths of points with their velocities; see `flyball.view.path_plots.plot_path` for the options."""
+        from ..view.path_plots import plot_path
 
         return plot_path(self, *points, **options)
 
     def html(self, **options: Any) -> str:
-        """The animation page as text; ``paths`` and ``show`` as in `flyball.view.animate.animation`."""
-        from ..view.animate import animation
+        """The animation page as text; ``paths`` and ``show`` as in `flyball.view.animation.animation_html`."""
+        from ..view.animation import animation_html
 
-        return animation(self, **options)
+        return animation_html(self, **options)
 
     def to_html(self, path: str | os.PathLike, **options: Any) -> None:
         """Write the animation page: one file that opens offline in any browser. Options as for `html`.
@@ -388,13 +407,13 @@ class Result:
         ModelError
             If the file cannot be written, or there is nothing to draw.
         """
-        write(path, self.html(**options), PAGE)
+        write_file(path, self.html(**options), PAGE)
 
     def report(self, **options: Any) -> str:
         """The report as text: summary, animation, plots, tables of the model, and its file. Options as for `html`."""
-        from ..view.report import report
+        from ..view.report import report_html
 
-        return report(self, **options)
+        return report_html(self, **options)
 
     def to_report(self, path: str | os.PathLike, **options: Any) -> None:
         """Write the report: one file that opens offline in any browser. Options as for `html`.
@@ -404,13 +423,176 @@ class Result:
         ModelError
             If the file cannot be written, or there is nothing to draw.
         """
-        write(path, self.report(**options), PAGE)
+        write_file(path, self.report(**options), PAGE)
 
     def _repr_html_(self) -> str:
-        from ..view.notebook import iframe
+        from ..view.page import notebook_iframe
 
-        return iframe(self.html())
+        return notebook_iframe(self.html())
 
     def __repr__(self) -> str:
         span = f"{self.t[0]:g} to {self.t[-1]:g} s, {len(self.t)} times" if len(self.t) else "no times"
         return f"<Result of {self.model.name!r}: {span}>\n{self.health}"
+
+
+def concatenate_results(parts: Sequence[Result], times: np.ndarray) -> Result:
+    """The parts as one result at the output times that were asked for; the last row of the last part stays, too.
+
+    Energies that each counts since its own start are added up. What its health tells late is for the caller to say.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    last = parts[-1]
+    keep = [np.isin(p.t, times) for p in parts]
+    if len(keep[-1]):
+        keep[-1][-1] = True
+    for p, mine, after in zip(parts, keep, parts[1:], strict=False):
+        if len(p.t) and len(after.t) and p.t[-1] == after.t[0]:  # what happened at that time is in the later one
+            mine[-1] = False
+    t, *rows = (
+        np.concatenate([getattr(p, name)[k] for p, k in zip(parts, keep, strict=True)])
+        for name in ("t", "q", "v", "states", "vdot", "multipliers")
+    )
+    q, v, states, vdot, multipliers = rows
+    out = Result(last.model, last.values, t, q, v, states, vdot, multipliers, _joined_health([p.health for p in parts]))
+    out.final, out.carried, out.wound = last.final, dict(last.carried), parts[0].wound
+    out.begun = parts[0].begun
+    known = SharedTables(last.values)
+    out.phases = _joined_phases(parts, keep, known)
+    out.exchanged = _joined_exchanges(parts, keep)
+    if out.phases is not None:
+        out.exchanged |= event_energies(out)
+    if last.contacts is not None:
+        taken = [
+            p.contacts.taken(np.flatnonzero(k)) for p, k in zip(parts, keep, strict=True) if p.contacts is not None
+        ]
+        out.contacts = concatenate_contacts(taken, out.t)
+    out.bulk = {name: _joined_set([p.bulk[name] for p in parts], keep) for name in last.bulk}
+    out.events = [_unbound_event(h, known) for p in parts for h in p.events]  # type: ignore[assignment]
+    return out
+
+
+class SharedTables:
+    """Tables of one structure by the parameters that they are made with: parts from files bring others of their own."""
+
+    def __init__(self, x: Values) -> None:
+        self._structure, self._all = x.structure, {self._key(x): x}
+
+    @staticmethod
+    def _key(x: Values) -> bytes:
+        return x.system.const[: len(x.structure.model.parameters)].tobytes()
+
+    def __call__(self, x: Values) -> Values:
+        """The same numbers in the one structure, always the same object."""
+        key = self._key(x)
+        if key not in self._all:
+            self._all[key] = x if x.structure is self._structure else values(self._structure, x.told)
+        return self._all[key]
+
+
+def _joined_phases(parts: Sequence[Result], keep: Sequence[np.ndarray], known: SharedTables) -> Phases | None:
+    out: list[Phase] = []
+    lost = given = 0.0
+    for p, k in zip(parts, keep, strict=True):
+        if p.phases is None:
+            return None
+        first = 0
+        for x in p.phases.all:
+            mine = k[first : first + x.rows]
+            first += x.rows
+            out.append(
+                dataclasses.replace(
+                    x,
+                    rows=int(mine.sum()),
+                    sigma=x.sigma[:, mine] if x.sigma.ndim == 2 else x.sigma,
+                    values=known(x.values),
+                    lost=x.lost + lost,
+                    given=x.given + given,
+                )
+            )
+        lost, given = out[-1].lost, out[-1].given
+    return phases_or_none(out)
+
+
+def _joined_exchanges(parts: Sequence[Result], keep: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+    """What contacts exchanged since the start of all; the last row of a part is its end."""
+    out = {}
+    for name in parts[-1].exchanged:
+        rows, before = [], 0.0
+        for p, k in zip(parts, keep, strict=True):
+            x = p.exchanged[name] + (0.0 if name == CONTACT_ELASTIC else before)
+            rows.append(x[k])
+            before = float(x[-1]) if len(x) else before
+        out[name] = np.concatenate(rows)
+    return out
+
+
+def _joined_set(every: Sequence[BodySetMotion], keep: Sequence[np.ndarray]) -> BodySetMotion:
+    """Quaternions go on with the sign that they had."""
+    turns = [every[0].quaternion]
+    for b in every[1:]:
+        q = b.quaternion
+        if len(q) and len(turns[-1]):
+            q = q * np.where((q[:1] * turns[-1][-1:]).sum(axis=2, keepdims=True) < 0.0, -1.0, 1.0)
+        turns.append(q)
+    told = {name: [getattr(b, name) for b in every] for name in SET_MOTION_ARRAYS} | {"quaternion": turns}
+    rows: dict[str, Any] = {
+        name: np.concatenate([x[k] for x, k in zip(all_of, keep, strict=True)]) for name, all_of in told.items()
+    }
+    return dataclasses.replace(every[0], **rows)
+
+
+def _unbound_event(h: EventRecord, known: SharedTables) -> EventRecord:
+    """What happened, as the motion knew it: its states are read in the whole."""
+    sides = [x.y if isinstance(x, Moment) else x for x in (h.before, h.after)]
+    both = [known(x.values) for x in (h.before, h.after) if isinstance(x, Moment)]
+    impulses = h.impulses.loose() if isinstance(h.impulses, EventImpulses) else h.impulses
+    tables = tuple(both) if len(both) == 2 else None
+    return dataclasses.replace(h, before=sides[0], after=sides[1], tables=tables, impulses=impulses)
+
+
+def _joined_health(every: Sequence[Health]) -> Health:
+    first, last = every[0], every[-1]
+    return dataclasses.replace(
+        last,
+        **{name: max(getattr(h, name) for h in every) for name in ("violation", "velocity_violation")},
+        **{name: sum(getattr(h, name) for h in every) for name in SUMMED_FIGURES},
+        **{name: getattr(first, name) for name in ("coordinates", "engine", "departures", "options")},
+        method=_joined_method([h.method for h in every]),
+        remarks=tuple(dict.fromkeys(r for h in every for r in h.remarks)),
+        watched=next((h.watched for h in reversed(every) if h.watched), ""),
+        contact=_joined_contact_health([h.contact for h in every if h.contact]),
+        late={},
+    )
+
+
+def _joined_method(every: Sequence[str]) -> str:
+    """By what each part went from when on; why it was not by another method is told once."""
+    told = every[0].split("; ")
+    for words in (x for part in every[1:] for x in part.split("; ") if CHANGE_MARK in x):
+        if words not in told and not (NO_CHANGE_MARK in words and any(NO_CHANGE_MARK in x for x in told)):
+            told.append(words)
+    return "; ".join(told)
+
+
+CHANGE_MARK, NO_CHANGE_MARK = (
+    " from t = ",
+    ", though ",
+)  # how `Pace` tells a change of the method, and that there is none
+SUMMED_FIGURES = ("steps", "rejected", "evaluations", "factorisations", "seconds", "compiling")
+LARGEST_CONTACT_FIGURES = ("most", "worst_overlap", "residual", "force_residual")
+SUMMED_CONTACT_FIGURES = ("solves", "iterations", "unconverged", "halved", "reduced", "impacted")
+
+
+def _joined_contact_health(every: Sequence[ContactHealth]) -> ContactHealth | None:
+    if not every:
+        return None
+    worst = max(every, key=lambda h: h.residual)
+    return dataclasses.replace(
+        every[0],
+        **{name: max(getattr(h, name) for h in every) for name in LARGEST_CONTACT_FIGURES},
+        **{name: sum(getattr(h, name) for h in every) for name in SUMMED_CONTACT_FIGURES},
+        impacts=next((h.impacts for h in every if h.impacts), ""),
+        worst_at=worst.worst_at,
+        notes=tuple(dict.fromkeys(n for h in every for n in h.notes)),
+    )

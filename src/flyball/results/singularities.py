@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .kinds import SELF_MOTION
+from .wording import SELF_MOTION
 
-SMALL = 1e-7  # numbers below this part of the largest are printed as zero
-SHOWN = 6  # coordinates of a vector that are printed
+NEGLIGIBLE_PART = 1e-7  # numbers below this part of the largest are printed as zero
+MAX_COMPONENTS = 6  # coordinates of a vector that are printed
 
 
 class Motion(NamedTuple):
@@ -118,17 +118,17 @@ class Singularity:
         told = ", ".join(f"{n:g} for {w}" for n, w in zip(counts, ("a' = 1", "a'' = 1", "a'' = -1"), strict=True))
         more = "; self-motion with the driver held" if self.self_motion and self.kind != SELF_MOTION else ""
         more += "; nothing leads away from here" if self.isolated else ""
-        yield f"a = {angle(self.a, unit)}", f"{self.kind}{more}; motions: {told}"
+        yield f"a = {coordinate_text(self.a, unit)}", f"{self.kind}{more}; motions: {told}"
         for n in self.null_vectors:
-            yield "", f"free with the driver held: {vector(n)}"
+            yield "", f"free with the driver held: {vector_text(n)}"
         for u in self.left_null_vectors:
-            yield "", f"dependent rows: {vector(u)}"
+            yield "", f"dependent rows: {vector_text(u)}"
         for k, b in enumerate(self.branches):
             side = {1: ", above a only", -1: ", below a only", 0: ""}[b.side]
-            yield "", f"branch {k}, {b.what}{side}: {vector(b.tangent)}"
+            yield "", f"branch {k}, {b.what}{side}: {vector_text(b.tangent)}"
         for m in self.motions:
             if m.rate == 0.0 and any(abs(v) > 0.0 for v in m.velocities.values()):
-                yield "", f"branch {m.branch}, a' = 0, a'' = {m.acceleration:g}: velocities {vector(m.velocities)}"
+                yield "", f"branch {m.branch}, a' = 0, a'' = {m.acceleration:g}: velocities {vector_text(m.velocities)}"
         if self.endless:
             yield "", "infinitely many directions lead away: more freedoms meet here"
         elif not self.decided:
@@ -196,7 +196,7 @@ class Singularities:
 
     def lines(self) -> list[tuple[str, str]]:
         """Label and text of what a reader wants to see first."""
-        low, high = (angle(x, self.unit) for x in self.reached)
+        low, high = (coordinate_text(x, self.unit) for x in self.reached)
         out = [
             ("driver", f"{self.driver!r} of {self.coordinate}, of {self.model!r}"),
             ("curve", f"from {low} to {high}, {len(self.s)} positions; {self._ends()}"),
@@ -216,7 +216,7 @@ class Singularities:
         head = ("a", "kind", "lost", "a' = 1", "a'' = 1", "a'' = -1", "branches")
         rows = [
             (
-                angle(p.a, self.unit),
+                coordinate_text(p.a, self.unit),
                 p.kind,
                 str(p.lost),
                 *(f"{p.count(**k):g}" for k in ({"rate": 1}, {"acceleration": 1}, {"acceleration": -1})),
@@ -245,28 +245,28 @@ class Singularities:
         coordinate : str, optional
             What is drawn over the driver's coordinate; by default what moves most.
         """
-        from ..view.singular import singular_plot
+        from ..view.singularity_plots import singularity_plot
 
-        return singular_plot(self, path, coordinate)
+        return singularity_plot(self, path, coordinate)
 
     def __repr__(self) -> str:
         width = max(len(k) for k, _ in self.lines())
         return "\n".join(f"{k:<{width}}  {v}" for k, v in self.lines())
 
 
-def angle(x: float, unit: str) -> str:
+def coordinate_text(x: float, unit: str) -> str:
     """A value with its unit; radians in degrees too."""
     x = 0.0 if abs(x) < 1e-12 else x
     return f"{x:.6g} rad ({math.degrees(x):.6g} deg)" if unit == "rad" else f"{x:.6g} {unit}"
 
 
-def vector(numbers: Mapping[str, float]) -> str:
+def vector_text(numbers: Mapping[str, float]) -> str:
     """The largest components, by name."""
     largest = max((abs(x) for x in numbers.values()), default=0.0)
-    shown = {k: x for k, x in numbers.items() if abs(x) > SMALL * max(largest, 1e-300)}
+    shown = {k: x for k, x in numbers.items() if abs(x) > NEGLIGIBLE_PART * max(largest, 1e-300)}
     names = [k for k in shown if "." in k]
     if not names:
         return "none"
-    kept = sorted(names, key=lambda k: -round(abs(shown[k]), 9))[:SHOWN]
+    kept = sorted(names, key=lambda k: -round(abs(shown[k]), 9))[:MAX_COMPONENTS]
     text = ", ".join(f"{k} {shown[k]:.6g}" for k in names if k in kept)
-    return text + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
+    return text + (f" and {len(names) - MAX_COMPONENTS} more" if len(names) > MAX_COMPONENTS else "")

@@ -1,31 +1,250 @@
-"""Many runs of one model at different values of its parameters."""
+"""Many runs of one model at different parameter values: the study, Sobol' indices, and study files.
+
+`Study` holds the quantities of all runs. Its file is NetCDF; a fingerprint tells whether a file belongs to the
+same study, so that an interrupted one can go on.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
+import json
 import os
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ModelError
-from ..model.words import listing, suggest
-from ..model.writing import RESULT, TABLE, ending, write
-from .indices import Indices
-from .numbers import plain, span
-from .study_file import RUN, save_study, to_xarray
+from ..errors import AnalysisError, ModelError
+from ..model.messages import listing, suggest
+from ..model.model import Model
+from ..model.output_files import RESULT, TABLE, file_extension, write_file
+from ..model.toml_file import dumps
+from .files import OWN_GROUP, SLASH_SUBSTITUTE, is_sealed, sealed_file_bytes, text_type
+from .result import Result
+from .wording import json_numbers, range_text
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-    from .result import Result
 
-WAITING, DONE, FAILED = 0, 1, 2
-WORDS, DOUBTFUL = ("still to be done", "done", "failed"), "done, but doubtful"
-TIMES = {"motion": "outputs", "kinematics": "times"}  # analysis -> the option that its output times are
-TOLD = 6  # reasons in a text
-NO_CROSS = "only the runs of design='saltelli' tell indices; this is a study of design={!r}"
+CONFIDENCE = 0.95  # confidence
+RESAMPLES = 499  # bootstrap samples
+
+
+@dataclass(frozen=True, repr=False)
+class Indices:
+    """Parts of the variance of each quantity that parameters account for.
+
+    Attributes
+    ----------
+    of, parameters : tuple of str
+    samples : int
+        How many they are found from: a power of two.
+    left_out : int
+        How many more there are of which one run failed.
+    first : ndarray (of, parameters) [1]
+        By itself: how much smaller the variance would be on average if the parameter were known.
+    total : ndarray (of, parameters) [1]
+        With all its interactions: what would be left of the variance if all others were known.
+    first_range, total_range : ndarray (of, parameters, 2)
+        Between which bounds they are with 95 % confidence, by resampling (BCa bootstrap); nan where nothing varies.
+    """
+
+    of: tuple[str, ...]
+    parameters: tuple[str, ...]
+    samples: int
+    first: np.ndarray
+    total: np.ndarray
+    first_range: np.ndarray
+    total_range: np.ndarray
+    left_out: int = 0
+
+    @classmethod
+    def of_runs(cls, of: tuple[str, ...], parameters: tuple[str, ...], y: np.ndarray) -> Indices:
+        """From y (of, 2 + parameters, samples): the samples A, B, and A with one column of B each; nan where a run
+        failed. SciPy's estimators take a power of two of samples: of those that are whole as many as that.
+        """
+        whole = np.isfinite(y).all(axis=(0, 1))
+        left = int(whole.sum())
+        if left < 2:
+            raise AnalysisError(f"{left} of {len(whole)} samples have all their runs: no variances are known")
+        y = y[:, :, whole][:, :, : 1 << (left.bit_length() - 1)]
+        found = [_estimate_indices(x) for x in y]
+        first, total, first_range, total_range = (np.array(x) for x in zip(*found, strict=True))
+        return cls(of, parameters, y.shape[2], first, total, first_range, total_range, len(whole) - left)
+
+    def __getitem__(self, of: str) -> dict[str, tuple[float, float]]:
+        """Parameter -> (first, total) of a quantity."""
+        k = self.of.index(of)
+        pairs = zip(self.first[k].tolist(), self.total[k].tolist(), strict=True)
+        return dict(zip(self.parameters, pairs, strict=True))
+
+    def lines(self) -> list[tuple[str, str]]:
+        """A table for people."""
+        out = [("samples", f"{self.samples}; in brackets what 95 % of resamplings stay within")]
+        if self.left_out:
+            text = f"{self.left_out} samples of which a run failed: where that is so is missing from the indices"
+            out.append(("left out", text))
+        for i, name in enumerate(self.of):
+            for k in np.argsort(-self.total[i], kind="stable"):
+                parts = [
+                    f"{what} {x[i, k]:.3f} [{r[i, k, 0]:.3f}, {r[i, k, 1]:.3f}]"
+                    for what, x, r in (("first", self.first, self.first_range), ("total", self.total, self.total_range))
+                ]
+                out.append((name, f"{self.parameters[k]:<16} {', '.join(parts)}"))
+        return out
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers and names."""
+        return {
+            "samples": self.samples,
+            "left_out": self.left_out,
+            "of": {
+                name: {
+                    p: {
+                        "first": float(self.first[i, k]),
+                        "total": float(self.total[i, k]),
+                        "first_range": json_numbers(self.first_range[i, k]),
+                        "total_range": json_numbers(self.total_range[i, k]),
+                    }
+                    for k, p in enumerate(self.parameters)
+                }
+                for i, name in enumerate(self.of)
+            },
+        }
+
+    def plot(self, path: str | os.PathLike | None = None) -> Any:
+        """Bars with their ranges; returns the Matplotlib figure, or writes it to ``path``."""
+        from ..view.study_plots import indices
+
+        return indices(self, path)
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{a:<16} {b}" for a, b in self.lines())
+
+
+def _estimate_indices(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Indices of one quantity, and their ranges, by SciPy's estimators; of a power of two of samples."""
+    import warnings
+
+    from scipy.stats import sobol_indices
+
+    d, n = len(y) - 2, y.shape[1]
+    if not np.ptp(y) > 0.0:
+        return np.zeros(d), np.zeros(d), np.full((d, 2), np.nan), np.full((d, 2), np.nan)
+    found = sobol_indices(func={"f_A": y[:1], "f_B": y[1:2], "f_AB": y[2:, None, :]}, n=n)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a parameter that changes nothing the bounds are not defined
+        spread = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=RESAMPLES)
+    ranges = [
+        np.stack([np.ravel(x.confidence_interval.low), np.ravel(x.confidence_interval.high)], axis=1)
+        for x in (spread.first_order, spread.total_order)
+    ]
+    return np.ravel(found.first_order), np.ravel(found.total_order), ranges[0], ranges[1]
+
+
+STUDY_FORMAT = 1
+RUN_DIMENSION, TIME_DIMENSION = "run", "time"
+DOUBTFUL_ATTRIBUTES = {"comment": "1: done, but perhaps not what its tolerance asks for"}
+TEXTS_BY_RUN = ("reasons", "remarks", "doubtful")
+"""Texts by the numbers of runs."""
+STORED_FIELDS = (
+    "name",
+    "design",
+    "parameters",
+    "of",
+    "units",
+    "options",
+    "base",
+    "mark",
+    "analysis",
+    "seconds",
+    "message",
+)
+
+
+def study_to_xarray(study: Study) -> xarray.Dataset:
+    """See `Study.to_xarray`."""
+    import xarray as xr
+
+    dims: tuple[str, ...] = study.parameters if study.axes else (RUN_DIMENSION,)
+    curve = any(x.ndim > 1 for x in study.values.values())
+    coords: dict[str, Any] = {TIME_DIMENSION: (TIME_DIMENSION, study.t, {"units": "s"})} if curve else {}
+    if study.axes:
+        coords |= {name: (name, axis) for name, axis in zip(study.parameters, study.axes, strict=True)}
+    else:
+        coords |= {name: (RUN_DIMENSION, study.points[:, k]) for k, name in enumerate(study.parameters)}
+    data: dict[str, Any] = {}
+    for name, unit in zip(study.of, study.units, strict=True):
+        x = study[name]
+        data[name] = ((*dims, TIME_DIMENSION) if x.ndim > len(dims) else dims, x, {"units": unit} if unit else {})
+    data["status"] = (dims, study.status.reshape(study.shape), {"comment": "0 still to be done, 1 done, 2 failed"})
+    data["doubtful"] = (dims, _doubtful_flags(study).reshape(study.shape), DOUBTFUL_ATTRIBUTES)
+    return xr.Dataset(data, coords, attrs=_dataset_attributes(study))
+
+
+def _doubtful_flags(study: Study) -> np.ndarray:
+    """Which runs are doubtful, (runs,) of 0 and 1."""
+    out = np.zeros(len(study), np.int8)
+    out[list(study.doubtful)] = 1
+    return out
+
+
+def _dataset_attributes(study: Study) -> dict[str, str]:
+    from .. import __version__
+
+    return {"title": study.name, "source": f"flyball {__version__}", "comment": f"study, {study.design}"}
+
+
+def save_study(study: Study, path: str | os.PathLike) -> None:
+    """Write it to one NetCDF file: beside the file that may be there, which it then replaces."""
+    write_file(path, sealed_file_bytes(lambda file: _write_study(study, file)))
+
+
+def _write_study(study: Study, file: Any) -> None:
+    texts = {k: getattr(study, k) for k in STORED_FIELDS}
+    texts["options"] = {k: _option_data(x) for k, x in study.options.items()}
+    texts |= {k: getattr(study, k) for k in TEXTS_BY_RUN}
+    file.attrs.update(_dataset_attributes(study) | {"Conventions": "CF-1.11"})
+    file.dimensions[RUN_DIMENSION], file.dimensions[TIME_DIMENSION] = len(study), len(study.t)
+    file.create_variable(TIME_DIMENSION, (TIME_DIMENSION,), data=study.t).attrs["units"] = "s"
+    for k, name in enumerate(study.parameters):
+        file.create_variable(
+            variable_name(f"parameter {name}"), (RUN_DIMENSION,), data=np.ascontiguousarray(study.points[:, k])
+        )
+    for (name, x), unit in zip(study.values.items(), study.units, strict=True):
+        made = file.create_variable(
+            variable_name(name), (RUN_DIMENSION, TIME_DIMENSION)[: x.ndim], data=np.ascontiguousarray(x)
+        )
+        made.attrs["units"] = unit or "1"
+    file.create_variable("status", (RUN_DIMENSION,), data=study.status)
+    file.create_variable("doubtful", (RUN_DIMENSION,), data=_doubtful_flags(study)).attrs.update(DOUBTFUL_ATTRIBUTES)
+    group = file.create_group(OWN_GROUP)
+    group.attrs["study"] = STUDY_FORMAT
+    group.create_variable("study", (), dtype=text_type(), data=np.array(json.dumps(texts), object))
+    for k, axis in enumerate(study.axes):
+        group.dimensions[f"n_{k}"] = len(axis)
+        group.create_variable(f"axis_{k}", (f"n_{k}",), data=axis)
+
+
+def _option_data(x: Any) -> Any:
+    return dataclasses.asdict(x) if dataclasses.is_dataclass(x) and not isinstance(x, type) else x
+
+
+def variable_name(name: str) -> str:
+    """A name that a variable of a file may have."""
+    return name.replace("/", SLASH_SUBSTITUTE)
+
+
+NOT_RUN, DONE, FAILED = 0, 1, 2
+STATUS_TEXTS, DOUBTFUL_TEXT = ("still to be done", "done", "failed"), "done, but doubtful"
+TIME_OPTIONS = {"motion": "outputs", "kinematics": "times"}  # analysis -> the option that its output times are
+MAX_TEXTS = 6  # reasons in a text
+NOT_SALTELLI = "only the runs of design='saltelli' tell indices; this is a study of design={!r}"
 
 
 @dataclass(repr=False)
@@ -104,14 +323,14 @@ class Study:
     @property
     def words(self) -> np.ndarray:
         """How each run is, (runs,) of str: done; done, but doubtful; failed; or still to be done."""
-        out = np.array(WORDS, object)[self.status]
-        out[list(self.doubtful)] = DOUBTFUL
+        out = np.array(STATUS_TEXTS, object)[self.status]
+        out[list(self.doubtful)] = DOUBTFUL_TEXT
         return out.astype(str)
 
     @property
     def complete(self) -> bool:
         """Whether no run is still to be done."""
-        return bool((self.status != WAITING).all())
+        return bool((self.status != NOT_RUN).all())
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -157,8 +376,8 @@ class Study:
         """
         told = {k: x for k, x in self.options.items() if x not in (None, ()) and k != "about"}
         told["parameters"] = {**self.options["parameters"], **self.at(run)}
-        if self.analysis in TIMES:
-            told[TIMES[self.analysis]] = self.t.copy()
+        if self.analysis in TIME_OPTIONS:
+            told[TIME_OPTIONS[self.analysis]] = self.t.copy()
         if "about" in self.options and self.options["about"] is not None:
             told = {k: told[k] for k in ("t", "parameters")}
         return told | ({} if self.start is None else {"start": self.start})
@@ -187,7 +406,7 @@ class Study:
             If too few samples are left.
         """
         if self.design != "saltelli":
-            raise ModelError(NO_CROSS.format(self.design))
+            raise ModelError(NOT_SALTELLI.format(self.design))
         names = of or tuple(name for name in self.of if self.values[name].ndim == 1)
         if curves := [name for name in names if self[name].ndim > 1]:
             raise ModelError(f"{curves[0]} is a curve; ask for end({curves[0]}), or max, min, mean, rms of it")
@@ -207,30 +426,30 @@ class Study:
         told += [f"{n} {what}" for n, what in ((failed, "failed"), (left, "still to be done")) if n]
         out.append(("runs", ", ".join(told) + (f"; {self.message}" if self.message else "")))
         for k, name in enumerate(self.parameters):
-            out.append((name, f"{span(self.points[:, k])} (in the model {self.base[name]:.6g})"))
+            out.append((name, f"{range_text(self.points[:, k])} (in the model {self.base[name]:.6g})"))
         for name, unit in zip(self.of, self.units, strict=True):
             y = self.values[name][self.done]
             none = int((~np.isfinite(y)).sum()) if y.ndim == 1 else 0  # curves are none where a motion ended before
             missed = [f"{none} of {len(y)} runs have no number"] if none else []
             y = y[np.isfinite(y)]
             if len(y):
-                text = f"{span(y)} {unit.replace('*', ' ')}".rstrip()
+                text = f"{range_text(y)} {unit.replace('*', ' ')}".rstrip()
                 missed.insert(0, f"{text}, mean {y.mean():.6g}, standard deviation {y.std():.3g}")
             if missed:
                 out.append((name, "; ".join(missed)))
         if any(name.startswith(("mean(", "rms(")) for name in self.of):
             out.append(("mean, rms", "over time by the trapezoidal rule between the output times"))
         remarks = {k: text for k, text in self.remarks.items() if text != self.doubtful.get(k)}
-        out += self._listed("failed", self.reasons, "reasons")
-        out += self._listed("doubtful", self.doubtful, "doubtful")
-        return out + self._listed("remark", remarks, "remarks")
+        out += self._text_lines("failed", self.reasons, "reasons")
+        out += self._text_lines("doubtful", self.doubtful, "doubtful")
+        return out + self._text_lines("remark", remarks, "remarks")
 
-    def _listed(self, label: str, texts: dict[int, str], name: str) -> list[tuple[str, str]]:
-        told = self._told_of(texts)
-        out = [(label, text) for text in told[:TOLD]]
-        return out + ([(label, f"and {len(told) - TOLD} others: study.{name}")] if len(told) > TOLD else [])
+    def _text_lines(self, label: str, texts: dict[int, str], name: str) -> list[tuple[str, str]]:
+        told = self._distinct_texts(texts)
+        out = [(label, text) for text in told[:MAX_TEXTS]]
+        return out + ([(label, f"and {len(told) - MAX_TEXTS} others: study.{name}")] if len(told) > MAX_TEXTS else [])
 
-    def _told_of(self, texts: dict[int, str]) -> list[str]:
+    def _distinct_texts(self, texts: dict[int, str]) -> list[str]:
         """Each text once, with the first run that has it and how many there are."""
         first: dict[str, int] = {}
         count: dict[str, int] = {}
@@ -253,7 +472,7 @@ class Study:
             "points": {name: self.points[:, k].tolist() for k, name in enumerate(self.parameters)},
             "t": self.t.tolist(),
             "units": dict(zip(self.of, self.units, strict=True)),
-            "values": {name: plain(x) for name, x in self.values.items()},
+            "values": {name: json_numbers(x) for name, x in self.values.items()},
             "status": self.status.tolist(),
             "reasons": {str(k): text for k, text in self.reasons.items()},
             "remarks": {str(k): text for k, text in self.remarks.items()},
@@ -263,7 +482,7 @@ class Study:
 
     def to_xarray(self) -> xarray.Dataset:
         """A labelled dataset: of a grid by the parameters, else by runs with the parameters as coordinates."""
-        return to_xarray(self)
+        return study_to_xarray(self)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """A table with a row for each run: parameters, and the quantities that are one number.
@@ -274,18 +493,18 @@ class Study:
 
         columns = {name: self.points[:, k] for k, name in enumerate(self.parameters)}
         columns |= {name: x for name, x in self.values.items() if x.ndim == 1}
-        frame = pd.DataFrame(columns, index=pd.RangeIndex(len(self), name=RUN))
+        frame = pd.DataFrame(columns, index=pd.RangeIndex(len(self), name=RUN_DIMENSION))
         frame.attrs["units"] = dict(zip(self.of, self.units, strict=True))
         frame.attrs["doubtful"] = sorted(self.doubtful)
         return frame
 
     def to_csv(self, path: str | os.PathLike) -> None:
         """The table of `to_dataframe`; numbers are written exactly."""
-        write(path, self.to_dataframe().to_csv(), TABLE)
+        write_file(path, self.to_dataframe().to_csv(), TABLE)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write it as one NetCDF file (.nc); ``flyball.load_study`` reads it back. A path in .csv: as by `to_csv`."""
-        if ending(path, (*RESULT, *TABLE)) in TABLE:
+        if file_extension(path, (*RESULT, *TABLE)) in TABLE:
             self.to_csv(path)
         else:
             save_study(self, path)
@@ -297,25 +516,25 @@ class Study:
         more, what half and nine tenths of the runs stay within. Axes are logarithmic where values are spread so.
         Returns the Matplotlib figure, or writes it to ``path``.
         """
-        from ..view.study import study
+        from ..view.study_plots import study
 
         return study(self, of, path)
 
     def histogram(self, *of: str, path: str | os.PathLike | None = None) -> Any:
         """How often values of quantities occur; returns the Matplotlib figure, or writes it to ``path``."""
-        from ..view.study import histogram
+        from ..view.study_plots import histogram
 
         return histogram(self, of, path)
 
     def scatter(self, *of: str, path: str | os.PathLike | None = None) -> Any:
         """Quantities over each parameter, a point for each run; returns the figure, or writes it to ``path``."""
-        from ..view.study import scatter
+        from ..view.study_plots import scatter
 
         return scatter(self, of, path)
 
     def surface(self, of: str, x: str, y: str, path: str | os.PathLike | None = None) -> Any:
         """A quantity over two parameters as colours, the mean over others; the figure, or written to ``path``."""
-        from ..view.study import surface
+        from ..view.study_plots import surface
 
         return surface(self, of, x, y, path)
 
@@ -323,3 +542,88 @@ class Study:
         lines = self.lines()
         width = max(16, *(len(a) for a, _ in lines))
         return "\n".join(f"{a:<{width}} {b}" for a, b in lines)
+
+
+STUDY_FILE_REMEDY = "give a file that a study with file= or Study.save wrote"
+
+
+def study_fingerprint(
+    model: Model,
+    points: np.ndarray,
+    options: Mapping[str, Any],
+    quantities: Sequence[tuple[str, Callable | None]],
+    times: np.ndarray,
+) -> str:
+    """Hash of all that a study is asked: two with the same one have the same runs."""
+    from .. import __version__
+
+    digest = hashlib.sha256(f"{__version__}\n{dumps(model)}".encode())
+    digest.update(repr(points.shape).encode() + points.tobytes() + times.tobytes())
+    for title, function in quantities:
+        digest.update(f"{title}\n".encode())
+        if (code := getattr(function, "__code__", None)) is not None:
+            digest.update(
+                code.co_code + repr((code.co_names, [x for x in code.co_consts if not hasattr(x, "co_code")])).encode()
+            )
+    for name, x in sorted(options.items()):
+        if isinstance(x, Result):
+            digest.update(x.final[1].tobytes() + repr(x.final[0]).encode())
+        elif name not in ("outputs", "progress"):
+            digest.update(f"{name}={x!r}\n".encode())
+    return digest.hexdigest()
+
+
+def load_study_file(path: str | os.PathLike, mark: str | None = None) -> Study:
+    """Read a study from its file. With ``mark``: to go on with that study.
+
+    Raises
+    ------
+    ModelError
+        If the file is damaged, is no study, or is of another one.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise ModelError(f"there is no file {os.fspath(path)!r}; {STUDY_FILE_REMEDY}")
+    try:
+        whole = is_sealed(path)
+    except OSError as error:
+        raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror or error}") from None
+    if not whole:
+        what = "is damaged: what it holds does not fit the checksum at its end" if whole is False else "is no study"
+        raise ModelError(f"{path} {what}; {STUDY_FILE_REMEDY}")
+    found = _read_study(path)
+    if mark is not None and found.mark != mark:
+        raise ModelError(
+            f"{path} is of another study than this: model, values, quantities, options or the version of flyball are "
+            f"not the same. Give another file, or remove that one"
+        )
+    return found
+
+
+def _read_study(path: Path) -> Study:
+    import h5netcdf
+
+    with h5netcdf.File(path, "r") as file:
+        group = file.groups.get(OWN_GROUP)
+        kind = group.attrs.get("study") if group is not None else None
+        if kind is None:
+            if group is not None and "format" in group.attrs:
+                raise ModelError(f"{path} is a result, no study: read it with flyball.load_result")
+            raise ModelError(f"{path} is no study; {STUDY_FILE_REMEDY}")
+        if int(kind) > STUDY_FORMAT:
+            raise ModelError(f"{path} was written by a later version of flyball than this")
+        text = group.variables["study"][()]
+        told = json.loads(text.decode() if isinstance(text, bytes) else str(text))
+        names = told["parameters"]
+        columns = [file.variables[variable_name(f"parameter {name}")][...] for name in names]
+        values = {name: np.ascontiguousarray(file.variables[variable_name(name)][...]) for name in told["of"]}
+        axes = [group.variables[f"axis_{k}"][...] for k in range(len(names)) if f"axis_{k}" in group.variables]
+        status = np.ascontiguousarray(file.variables["status"][...]).astype(np.int8)
+        t = np.ascontiguousarray(file.variables[TIME_DIMENSION][...])
+    for name in ("parameters", "of", "units"):
+        told[name] = tuple(told[name])
+    for name in TEXTS_BY_RUN:  # files of earlier versions have fewer
+        told[name] = {int(k): x for k, x in told.get(name, {}).items()}
+    if (status == NOT_RUN).any() and not told["message"]:
+        told["message"] = "it ended before all runs were done"
+    return Study(points=np.column_stack(columns), axes=tuple(axes), t=t, values=values, status=status, **told)

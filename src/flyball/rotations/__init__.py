@@ -9,14 +9,40 @@ take ``axes="body"`` for components along B, ``axes="base"`` for components alon
 
 from __future__ import annotations
 
-from .continuous import unwrap
-from .euler_angles import (
+from .conversions import (
+    EXTRINSIC,
+    INTRINSIC,
+    angular_distance,
+    apply,
+    axis_angle,
     bryant,
+    cayley,
+    compose,
+    distance_to_singular,
     euler,
+    from_axis_angle,
     from_bryant,
+    from_cayley,
     from_euler,
+    from_gibbs,
+    from_matrix,
+    from_modified_rodrigues,
+    from_rotation_vector,
+    gibbs,
+    inverse,
+    is_singular,
+    matrix,
+    modified_rodrigues,
+    nearest,
+    quaternion,
+    random,
+    relative,
+    rotation_vector,
+    singular_angles,
+    slerp,
+    unwrap,
 )
-from .euler_kinematics import (
+from .kinematic_matrices import (
     euler_accelerations,
     euler_angular_acceleration,
     euler_angular_velocity,
@@ -24,34 +50,15 @@ from .euler_kinematics import (
     euler_H_inverse,
     euler_H_rate,
     euler_rates,
-)
-from .quaternion_kinematics import (
+    left_jacobian,
+    left_jacobian_inverse,
+    left_jacobian_rate,
     quaternion_accelerations,
     quaternion_angular_acceleration,
     quaternion_angular_velocity,
     quaternion_G,
     quaternion_rates,
     quaternion_T,
-)
-from .quaternions import (
-    angular_distance,
-    apply,
-    compose,
-    from_matrix,
-    inverse,
-    matrix,
-    nearest,
-    quaternion,
-    random,
-    relative,
-    slerp,
-)
-from .sequences import EXTRINSIC, INTRINSIC, singular_angles
-from .singular import distance_to_singular, is_singular
-from .vector_kinematics import (
-    left_jacobian,
-    left_jacobian_inverse,
-    left_jacobian_rate,
     right_jacobian,
     right_jacobian_inverse,
     right_jacobian_rate,
@@ -59,18 +66,6 @@ from .vector_kinematics import (
     rotation_vector_angular_acceleration,
     rotation_vector_angular_velocity,
     rotation_vector_rates,
-)
-from .vectors import (
-    axis_angle,
-    cayley,
-    from_axis_angle,
-    from_cayley,
-    from_gibbs,
-    from_modified_rodrigues,
-    from_rotation_vector,
-    gibbs,
-    modified_rodrigues,
-    rotation_vector,
 )
 
 __all__ = [

@@ -1,8 +1,8 @@
-"""In which coordinates equations are written, and where the mechanism starts: without compiled code where that can be.
+"""The choice of coordinates for symbolic equations, and the initial state in them.
 
-Which joints become coordinates is the choice of `analysis.motion.layer`. What that asks of the compiled engine, whether
-inertia moves along every coordinate and whether friction knows its reactions, is asked of the traced equations at the
-position that is drawn, and of the engine only where the answer there is no.
+The rule is that of a simulation. Whether inertia acts along every coordinate and whether friction knows its
+reactions is decided by the traced equations in the reference configuration; the compiled engine is asked only if
+the answer is no.
 """
 
 from __future__ import annotations
@@ -13,28 +13,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis.assemble import assemble
-from ..analysis.assembly.start import Assembly
-from ..analysis.compiled import Compiled, compiled
-from ..analysis.motion.layer import THIN, known
-from ..analysis.motion.start import begin
+from ..assembly.assemble import assemble
+from ..assembly.assembled_state import Assembly
+from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
 from ..errors import AnalysisError
-from ..graph.values import evaluated
+from ..expression_graph.evaluation import evaluate_array
+from ..expression_graph.tracing import object_tables, trace_equations
 from ..model.model import Model
-from ..tables.spanning import spanning
-from ..tracing.trace import plain, traced
+from ..simulation.initial_state import THIN_INERTIA, find_initial_state, refuse_unknown_coordinates
+from ..tables.coordinate_choice import spanning_joints
 
-RANK = 1e-6  # of the largest singular value of the constraints' Jacobian, above which rows surely are independent
+RANK_TOLERANCE = (
+    1e-6  # of the largest singular value of the constraints' Jacobian, above which rows surely are independent
+)
 
 
-class Chosen(NamedTuple):
+class CoordinateChoice(NamedTuple):
     """Coordinates of equations: names of the tree joints, and which they are and why."""
 
     tree: tuple[str, ...]
     why: str
 
 
-def chosen(model: Model, parameters: Mapping[str, float] | None, wish: str) -> Chosen:
+def choose_coordinates(model: Model, parameters: Mapping[str, float] | None, wish: str) -> CoordinateChoice:
     """Coordinates as wished; ``auto``: those of joints, wherever friction allows it.
 
     Raises
@@ -44,43 +45,43 @@ def chosen(model: Model, parameters: Mapping[str, float] | None, wish: str) -> C
     AnalysisError
         If friction follows reactions that redundancy leaves undetermined, for joint coordinates.
     """
-    known(wish)
-    tree = spanning(model) if wish != "absolute" else ()
-    if not _clear(compiled(model, parameters=parameters, tree=tree), wish):
-        return _engine_s(model, parameters, wish)
+    refuse_unknown_coordinates(wish)
+    tree = spanning_joints(model) if wish != "absolute" else ()
+    if not _is_regular(compile_mechanism(model, parameters=parameters, tree=tree), wish):
+        return _engine_choice(model, parameters, wish)
     if wish == "absolute":
-        return Chosen((), "absolute: as asked for")
+        return CoordinateChoice((), "absolute: as asked for")
     if not tree:
-        return Chosen((), "absolute: no joint can be a tree joint")
-    return Chosen(tree, _told(model, wish, tree))
+        return CoordinateChoice((), "absolute: no joint can be a tree joint")
+    return CoordinateChoice(tree, _description(model, wish, tree))
 
 
-def _told(model: Model, wish: str, tree: Sequence[str]) -> str:
+def _description(model: Model, wish: str, tree: Sequence[str]) -> str:
     cut = [j.name for j in model.joints if j.name not in tree]
     more = f"; rows remain for {', '.join(cut[:8])}" if cut else ""
     more += f" and {len(cut) - 8} more" if len(cut) > 8 else ""
     return f"joint: {'as asked for' if wish == 'joint' else 'these make the fewest equations'}{more}"
 
 
-def _clear(c: Compiled, wish: str) -> bool:
+def _is_regular(c: CompiledMechanism, wish: str) -> bool:
     """Whether, as drawn, inertia moves along all velocities and rows leave no reaction open that a friction follows."""
     s, S = c.structure, c.values.system
     light, loaded = S.scales.semidefinite != 0.0, bool(s.loads) and wish != "absolute"
     if not light and not loaded:
         return True
-    T = traced(s, plain(S))
+    T = trace_equations(s, object_tables(S))
     state = (([T.t], [0.0]), (T.q, c.values.q), (T.v, c.values.v), (T.z, c.z))
     at = {x.data.name: float(np.real(y)) for xs, ys in state for x, y in zip(xs, ys, strict=True)}
-    G, sizes = np.asarray(evaluated(T.G, at), float) * c.sizes, c.sizes
+    G, sizes = np.asarray(evaluate_array(T.G, at), float) * c.sizes, c.sizes
     if loaded and not _independent(G):
         return False
     if not light:
         return True
-    M = np.asarray(evaluated(T.M, at), float) * sizes * sizes[:, None]
+    M = np.asarray(evaluate_array(T.M, at), float) * sizes * sizes[:, None]
     if not s.tree:  # joints' coordinates must have inertia of their own, bodies only where the rows let them go
-        Z = _free(G)
+        Z = _null_space_of_rows(G)
         M = Z.T @ M @ Z
-    return not len(M) or bool(np.linalg.eigvalsh(M)[0] > THIN * S.bodies.mass.sum() * c.values.length**2)
+    return not len(M) or bool(np.linalg.eigvalsh(M)[0] > THIN_INERTIA * S.bodies.mass.sum() * c.values.length**2)
 
 
 def _independent(G: np.ndarray) -> bool:
@@ -89,30 +90,30 @@ def _independent(G: np.ndarray) -> bool:
     if len(G) > G.shape[1]:
         return False
     w = np.linalg.svd(G, compute_uv=False)
-    return bool(w[-1] > RANK * w[0])
+    return bool(w[-1] > RANK_TOLERANCE * w[0])
 
 
-def _free(G: np.ndarray) -> np.ndarray:
+def _null_space_of_rows(G: np.ndarray) -> np.ndarray:
     """What the rows leave free, (nv, freedoms)."""
     if not len(G):
         return np.eye(G.shape[1])
     _, w, V = np.linalg.svd(G)
-    return V[int((w > RANK * w[0]).sum()) :].T
+    return V[int((w > RANK_TOLERANCE * w[0]).sum()) :].T
 
 
-def _engine_s(model: Model, parameters: Mapping[str, float] | None, wish: str) -> Chosen:
+def _engine_choice(model: Model, parameters: Mapping[str, float] | None, wish: str) -> CoordinateChoice:
     """The choice that a motion makes."""
     try:
-        start = begin(model, 0.0, parameters, None, "joint" if wish == "auto" else wish)
+        start = find_initial_state(model, 0.0, parameters, None, "joint" if wish == "auto" else wish)
     except AnalysisError as error:  # friction that follows loads which joint coordinates do not know
         if wish != "auto":
             raise
-        return Chosen((), f"absolute: {str(error).partition(': ')[2]}")
+        return CoordinateChoice((), f"absolute: {str(error).partition(': ')[2]}")
     tree = tuple(start.assembly.compiled.structure.tree)
-    return Chosen(tree, start.coordinates if not tree or wish == "joint" else _told(model, wish, tree))
+    return CoordinateChoice(tree, start.coordinates if not tree or wish == "joint" else _description(model, wish, tree))
 
 
-def started(model: Model, parameters: Mapping[str, float] | None, tree: tuple[str, ...]) -> Assembly:
+def initial_assembly(model: Model, parameters: Mapping[str, float] | None, tree: tuple[str, ...]) -> Assembly:
     """Where the mechanism starts, as described and assembled, in coordinates that are chosen.
 
     Raises
@@ -123,6 +124,6 @@ def started(model: Model, parameters: Mapping[str, float] | None, tree: tuple[st
     a = assemble(model, parameters=parameters)
     if not tree:
         return a
-    c = compiled(model, parameters=parameters, tree=tree)
+    c = compile_mechanism(model, parameters=parameters, tree=tree)
     q, v = c.take(a.compiled, a.t, a.q, a.v)
     return replace(a, compiled=c, q=q, v=v)

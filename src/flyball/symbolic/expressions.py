@@ -1,31 +1,113 @@
-"""Expressions of a mechanism: one, a vector or a matrix; shown, differentiated, evaluated."""
+"""Expressions of a mechanism, a scalar, vector or matrix: displayed, differentiated, evaluated.
+
+`SymbolTable` gives an expression its symbols by name.
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import ModelError
-from ..graph.derivative import jacobian, replaced
-from ..graph.function import Opaque
-from ..graph.node import Node
-from ..graph.operations import SYMBOL
-from ..graph.printers import latex, text
-from ..graph.simplify.arctangents import Algebra, signed
-from ..graph.simplify.cost import length
-from ..graph.simplify.simplify import simplified
-from ..graph.values import evaluate, evaluated, reached
-from .listed import LINE, MOST, TOO_LONG, count, listed
+from ..expression_graph.evaluation import evaluate, evaluate_array, jacobian, nodes_in_order, substitute
+from ..expression_graph.graph import SYMBOL, Graph, Node, OpaqueFunction
+from ..expression_graph.printers import latex, text
+from ..expression_graph.printers.sympy import SympyPrinter
+from ..expression_graph.simplification.arctangents import ArctangentSubstitution, without_absolute_values
+from ..expression_graph.simplification.common_subexpressions import simplified_with_symbols
+from ..expression_graph.simplification.reading_cost import symbol_count
+from ..expression_graph.simplification.simplify import simplified
+from ..model.messages import listing, suggest
 
-if TYPE_CHECKING:
-    from .home import Home
+MAX_LETTERS = 6000  # that are printed
+LINE_WIDTH = 100  # letters of a line
+MAX_OPERATIONS = 4000  # operations from which on nothing is tried
+TOO_LONG = "too long to read: {} operations; .at(values) evaluates it, and export() of the equations writes code"
 
-READ = 400  # operations up to which expressions are simplified to be shown
-WIDE = 160  # letters of a line up to which a matrix is printed as such
+
+def node_count(nodes: Sequence[Any]) -> int:
+    """Operations, each once."""
+    return sum(bool(x.args) for x in nodes_in_order(nodes))
+
+
+def formula_lines(rows: Sequence[tuple[str, Any]], units: Sequence[Sequence[Node]] = ()) -> list[str]:
+    """Lines ``name = formula``, and what stands for what under ``where``; none if they are too long to be read."""
+    if node_count([x for _, x in rows]) > MAX_OPERATIONS:
+        return []
+    rest, definitions = simplified_with_symbols([x for _, x in rows], units)
+    if symbol_count([*rest, *(y for _, y in definitions)]) > MAX_LETTERS / 2:
+        return []
+    lines = [f"{name} = {text.text(x)}" if name else text.text(x) for (name, _), x in zip(rows, rest, strict=True)]
+    lines += ["where", *(f"{text.text(w)} = {text.text(y)}" for w, y in definitions)] if definitions else []
+    found = [line for whole in lines for line in _broken(whole)]
+    return found if sum(map(len, found)) <= MAX_LETTERS else []
+
+
+def _broken(line: str) -> list[str]:
+    first, *others = text.broken_lines(line, LINE_WIDTH)
+    return [first, *(f"    {x}" for x in others)]
+
+
+class SymbolTable:
+    """Symbols by name, and what is made of expressions of them."""
+
+    graph: Graph
+
+    @property
+    def title(self) -> str:
+        """Whose expressions they are, for messages."""
+        raise NotImplementedError
+
+    @property
+    def named(self) -> dict[str, Node]:
+        """Every symbol by its name."""
+        raise NotImplementedError
+
+    @property
+    def units(self) -> Sequence[Sequence[Node]]:
+        """Symbols of each quaternion: their squares add up to one."""
+        return ()
+
+    @cached_property
+    def printer(self) -> SympyPrinter:
+        """The one that makes SymPy expressions; it knows which node a SymPy symbol stands for."""
+        return SympyPrinter()
+
+    def symbol(self, x: Any) -> Node:
+        """The node of a symbol, by its name, or as an expression that is one.
+
+        Raises
+        ------
+        ModelError
+            If there is none of that name.
+        """
+        x = getattr(x, "nodes", x)
+        x = x[()] if getattr(x, "shape", None) == () else x
+        if isinstance(x, Node) and x.op == SYMBOL:
+            return x
+        named = self.named
+        if not isinstance(x, str) or x not in named:
+            raise ModelError(f"{self.title} has no symbol {x!r}{suggest(str(x), named)}; {listing(list(named))}")
+        return named[x]
+
+    def checked(self, values: Mapping[str, Any], requested: Mapping[str, Node]) -> dict[str, Any]:
+        """Values of symbols, refused by name where wrong or missing."""
+        named = self.named
+        for name in values:
+            if name not in named:
+                raise ModelError(f"{self.title} has no symbol {name!r}{suggest(str(name), named)}")
+        lacking = [k for k, x in requested.items() if x.moving and k not in values]
+        if lacking:
+            raise ModelError(f"no value is given for {', '.join(lacking)}")
+        return dict(values)
+
+
+MAX_READ = 400  # operations up to which expressions are simplified to be shown
+MAX_WIDTH = 160  # letters of a line up to which a matrix is printed as such
 
 
 class Expressions:
@@ -47,13 +129,13 @@ class Expressions:
 
     def __init__(
         self,
-        home: Home,
+        symbol_table: SymbolTable,
         nodes: Any,
         rows: Sequence[str] = (),
         columns: Sequence[str] = (),
         unit: str = "",
     ) -> None:
-        self.home = home
+        self.symbol_table = symbol_table
         if isinstance(nodes, np.ndarray):
             self.nodes = nodes
         else:
@@ -69,12 +151,12 @@ class Expressions:
     @property
     def symbols(self) -> dict[str, Node]:
         """The symbols in it, by name, in the order in which they were made."""
-        return {x.data.name: x for x in reached(self.list()) if x.op == SYMBOL}
+        return {x.data.name: x for x in nodes_in_order(self.list()) if x.op == SYMBOL}
 
     @property
     def operations(self) -> int:
         """Operations that evaluate it, each counted once."""
-        return count(self.list())
+        return node_count(self.list())
 
     def list(self) -> list[Any]:
         """All entries, row by row."""
@@ -101,10 +183,10 @@ class Expressions:
         ModelError
             If a name is unknown, or the value of a symbol is missing.
         """
-        known = self.home.checked(values, self.symbols)
+        known = self.symbol_table.checked(values, self.symbols)
         if not self.shape:
             return np.asarray(evaluate(self.list(), known)[0])
-        return evaluated(self.nodes, known) if self.nodes.size else np.zeros(self.shape)
+        return evaluate_array(self.nodes, known) if self.nodes.size else np.zeros(self.shape)
 
     def __float__(self) -> float:
         if self.shape:
@@ -121,31 +203,31 @@ class Expressions:
         ImportError
             If SymPy is not installed (extra ``symbolic``).
         """
-        printer = self.home.printer
+        printer = self.symbol_table.printer
         shown = self._read.nodes
         return printer(shown if self.shape else shown[()])
 
     def simplified(self) -> Expressions:
         """The same in a form that is shorter to read, as far as that is found quickly; equal in value."""
-        made = simplified(self.nodes.reshape(-1), units=self.home.units)
-        return Expressions(self.home, made.reshape(self.shape), self.rows, self.columns, self.unit)
+        made = simplified(self.nodes.reshape(-1), units=self.symbol_table.units)
+        return Expressions(self.symbol_table, made.reshape(self.shape), self.rows, self.columns, self.unit)
 
     @cached_property
     def _read(self) -> Expressions:
         """What is shown: simplified if it is short enough to be read, sines of arctangents as algebra."""
-        if self.operations > MOST or not self.nodes.size:
+        if self.operations > MAX_OPERATIONS or not self.nodes.size:
             return self
-        plain = self.simplified() if self.operations <= READ else self
+        plain = self.simplified() if self.operations <= MAX_READ else self
         flat = self.list()
-        if not any(x.op == "atan2" for x in reached(flat)):
+        if not any(x.op == "atan2" for x in nodes_in_order(flat)):
             return plain
-        made = Algebra()(flat)
-        if count(made) > READ:
+        made = ArctangentSubstitution()(flat)
+        if node_count(made) > MAX_READ:
             return plain
         out = np.empty(self.shape, object)
-        out.ravel()[:] = signed(simplified(made, units=self.home.units))
-        way = Expressions(self.home, out, self.rows, self.columns, self.unit)
-        return min(way, plain, key=lambda x: length(x.list()))
+        out.ravel()[:] = without_absolute_values(simplified(made, units=self.symbol_table.units))
+        way = Expressions(self.symbol_table, out, self.rows, self.columns, self.unit)
+        return min(way, plain, key=lambda x: symbol_count(x.list()))
 
     @property
     def readable(self) -> Sequence[Any]:
@@ -166,15 +248,15 @@ class Expressions:
         return latex.matrix(shown if len(self.shape) > 1 else shown[:, None])
 
     def _repr_latex_(self) -> str | None:
-        return f"$\\displaystyle {self.latex()}$" if self.operations <= READ else None
+        return f"$\\displaystyle {self.latex()}$" if self.operations <= MAX_READ else None
 
     def __str__(self) -> str:
-        if self.operations > MOST:
+        if self.operations > MAX_OPERATIONS:
             return self._refused
         if not self.nodes.size:
             return "none" if len(self.shape) == 1 else f"no entries: {self.shape[0]} x {self.shape[1]}"
         shown = self._read
-        if length(shown.list()) > LINE:
+        if symbol_count(shown.list()) > LINE_WIDTH:
             return self._parted
         if len(self.shape) < 2:
             names = (self.rows or tuple(map(str, range(self.shape[0])))) if self.shape else ("",)
@@ -185,7 +267,7 @@ class Expressions:
             made = "\n".join(f"{n:{wide}}{x}" for n, x in zip(names, texts, strict=True))
         else:
             made = text.matrix(shown.nodes)
-        return made if max(map(len, made.split("\n"))) <= WIDE else self._parted
+        return made if max(map(len, made.split("\n"))) <= MAX_WIDTH else self._parted
 
     @property
     def _refused(self) -> str:
@@ -196,7 +278,7 @@ class Expressions:
         """Entry by entry, what recurs by a name."""
         labels = [", ".join(x) for x in itertools.product(*self._names())]
         rows = [(a, x) for a, x in zip(labels, self.readable, strict=True) if x != 0.0]
-        return "\n".join(listed(rows, self.home.units)) or self._refused
+        return "\n".join(formula_lines(rows, self.symbol_table.units)) or self._refused
 
     def _names(self) -> Sequence[tuple[str, ...]]:
         """Names of rows and columns, or numbers."""
@@ -229,18 +311,18 @@ class Expressions:
         return self._new(made, self.rows, columns)
 
     def _derived(self, by: Sequence[Any]) -> np.ndarray:
-        symbols = [self.home.symbol(x) for x in by]
+        symbols = [self.symbol_table.symbol(x) for x in by]
         try:
             return jacobian(self.list(), symbols).reshape(*self.shape, len(symbols))
-        except Opaque as error:
+        except OpaqueFunction as error:
             raise ModelError(f"{error}; give the law as a text, or its values as a table") from None
 
     def replaced(self, values: Mapping[str, Any]) -> Expressions:
         """With numbers or other expressions in place of symbols."""
-        home = self.home
+        home = self.symbol_table
         new = [(home.symbol(name), _node(x)) for name, x in values.items()]
         out = np.empty(self.shape, object)
-        out.ravel()[:] = replaced(self.list(), new)
+        out.ravel()[:] = substitute(self.list(), new)
         return self._new(out, self.rows, self.columns)
 
     # -- arithmetic
@@ -294,7 +376,7 @@ class Expressions:
         if wrong:
             raise ModelError(f"there is no entry {wrong[0]!r}; there are {', '.join(self.rows + self.columns)}")
         made = self.nodes[at]
-        return self._new(made, *_labels(self, at))
+        return self._new(made, *_remaining_labels(self, at))
 
     def __len__(self) -> int:
         return len(self.nodes)
@@ -303,14 +385,14 @@ class Expressions:
         return (self[k] for k in range(len(self)))
 
     def _new(self, nodes: Any, rows: Sequence[str] = (), columns: Sequence[str] = ()) -> Expressions:
-        return Expressions(self.home, nodes, rows, columns)
+        return Expressions(self.symbol_table, nodes, rows, columns)
 
 
 def _node(x: Any) -> Any:
     return (x.nodes if x.shape else x.nodes[()]) if isinstance(x, Expressions) else x
 
 
-def _labels(x: Expressions, at: tuple[Any, ...]) -> list[tuple[str, ...]]:
+def _remaining_labels(x: Expressions, at: tuple[Any, ...]) -> list[tuple[str, ...]]:
     """Names of what is left of rows and columns."""
     out = []
     for n, names in enumerate((x.rows, x.columns)):

@@ -1,14 +1,14 @@
-"""Lagrange's route: the equations of motion from the energies, to be compared with Newton's and Euler's.
+"""Lagrange's equations: the equations of motion from the energies, to compare with the Newton-Euler equations.
 
-In quasi-velocities v, qdot = T v, with the kinetic energy K(q, v), the potential V(q), the generalised forces Q of all
-that has no potential, and the constraints' G^T lam:
+In quasi-velocities v, qdot = T v, with the kinetic energy K(q, v), the potential V(q), the generalised forces Q
+of all elements without a potential, and the constraints' G^T lam:
 
     d/dt dK/dv + w x dK/dw - T^T dK/dq + T^T dV/dq = Q + G^T lam
 
-(Hamel 1904; Boltzmann 1902). The second term stands for every body or joint that turns about a point, whose angular
-velocity w is along its own axes; where all velocities are rates of coordinates it is not there, T is the identity,
-and these are Lagrange's equations of the second kind, with constraints those of the first kind. Without constraints
-they are the ones without multipliers.
+(Hamel 1904; Boltzmann 1902). The second term stands for every body or joint that rotates about a point, whose
+angular velocity w is in its own axes. Where all velocities are rates of coordinates it vanishes, T is the
+identity, and these are Lagrange's equations of the second kind, with constraints those of the first kind. Without
+constraints they equal the equations without multipliers.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..equations.tree import quaternion_at
-from ..graph.arrays import objects
-from ..graph.derivative import jacobian
+from ..engine.kinematics import quaternion_at
+from ..expression_graph.evaluation import jacobian
+from ..expression_graph.graph import object_vector
 from ..math.vec import cross
-from .document.forces import along
 from .expressions import Expressions
+from .named_equations import generalised_forces
 
 if TYPE_CHECKING:
     from .equations import Equations
@@ -65,9 +65,9 @@ class Lagrange:
     @cached_property
     def forces(self) -> Expressions:
         """Q along the velocities, (nv,) [N, N m]."""
-        x = self.equations.formulated
-        total = objects([0.0] * len(x.traced.v))
-        own = along(x)[-len(x.traced.structure.forces) :] if x.traced.structure.forces else []
+        x = self.equations.named_equations
+        total = object_vector([0.0] * len(x.traced.v))
+        own = generalised_forces(x)[-len(x.traced.structure.forces) :] if x.traced.structure.forces else []
         for e, (_, f) in zip(x.traced.structure.forces, own, strict=True):
             if not e.conservative():
                 total = total + f
@@ -76,23 +76,23 @@ class Lagrange:
     @cached_property
     def momenta(self) -> Expressions:
         """dK/dv, (nv,)."""
-        return self._vector(self._by(self.kinetic, self.equations.formulated.traced.v))
+        return self._vector(self._by(self.kinetic, self.equations.named_equations.traced.v))
 
     @cached_property
     def M(self) -> Expressions:
         """Mass matrix, (nv, nv)."""
         v = self.equations.v
-        made = jacobian(self.momenta.list(), self.equations.formulated.traced.v)
+        made = jacobian(self.momenta.list(), self.equations.named_equations.traced.v)
         return Expressions(self.equations, made, v.rows, v.rows)
 
     @cached_property
     def f(self) -> Expressions:
         """All that is neither M vdot nor G^T lam, on the right-hand side, (nv,)."""
-        x = self.equations.formulated.traced
-        rates = x.T @ objects(x.v)
+        x = self.equations.named_equations.traced
+        rates = x.T @ object_vector(x.v)
         moved = jacobian(self.momenta.list(), x.q) @ rates
         energy = self.kinetic - self.potential
-        driving = x.T.T @ objects(self._by(energy, x.q))
+        driving = x.T.T @ object_vector(self._by(energy, x.q))
         return self._vector(driving - moved - self._turned() + self.forces.nodes)
 
     @property
@@ -103,8 +103,8 @@ class Lagrange:
 
     def _turned(self) -> np.ndarray:
         """W x dK/dw of all that turns about a point."""
-        x = self.equations.formulated.traced
-        out = objects([0.0] * len(x.v))
+        x = self.equations.named_equations.traced
+        out = object_vector([0.0] * len(x.v))
         p = self.momenta.list()
         for b in range(len(x.system.tree.parent)):
             _, at = quaternion_at(x.system, b)
@@ -116,7 +116,7 @@ class Lagrange:
         return jacobian(energy.list(), symbols)[0].tolist()
 
     def _vector(self, nodes: Any) -> Expressions:
-        made = nodes if isinstance(nodes, np.ndarray) else objects(nodes)
+        made = nodes if isinstance(nodes, np.ndarray) else object_vector(nodes)
         return Expressions(self.equations, made, self.equations.v.rows)
 
     def __repr__(self) -> str:

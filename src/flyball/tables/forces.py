@@ -6,53 +6,53 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..compiler.by_address import CodeTable, code_table
+from ..compiler.kernels import CodeTable, code_table
 from ..constraints.blocks import DISTANCE, turning
 from ..errors import ModelError
 from ..forces import BRANCHES, EFFORTS, INPUTS, SIGNATURES, WRENCHES
-from ..model.carried import carried
-from ..model.controller import Controller
+from ..model.contact_point import Touch
+from ..model.controller import Controller, Sensor
 from ..model.element import LawOf, fields_with
 from ..model.event import Event
-from ..model.examine import Curve, measured
 from ..model.force import CoordinateForce, Force
-from ..model.sensor import Sensor
-from ..model.touch import Touch
-from .specs import Structure, frame
-from .system import FORCE_BY_ADDRESS, SLIDING, Forces
-from .terms import coordinate_frames, coordinate_term, measured_term
+from ..model.quantities import Curve, measured_quantity, transmitted_force
+from .constraint_rows import coordinate_frames, coordinate_term, measured_term
+from .structure_definition import Structure, frame_index
+from .table_definitions import FORCE_BY_ADDRESS, SLIDING, Forces
 
 
-def measured_quantities(s: Structure, watched: Mapping[str, Event | Controller]) -> None:
+def measure_quantities(s: Structure, names_in_use: Mapping[str, Event | Controller]) -> None:
     """Number every quantity that a force acts along or that a law names; the slots in which laws find them.
 
-    ``watched``: names in expressions of events and controllers, curves such as A.angle among them, and whose they are.
+    ``names_in_use``: names in expressions of events and controllers, curves such as A.angle among them, and whose they are.
     """
     for e in (*s.model.forces, *s.model.limits):
         if isinstance(e, CoordinateForce):
-            _along(s, e)
+            _acting_quantity(s, e)
     sensors = [x for x in s.model.sensors if isinstance(x, Sensor)]
     own = {x.name for x in s.controls}
-    curves = sorted(name for name in watched if "." in name and name not in own and not carried(s.model, name))
+    curves = sorted(
+        name for name in names_in_use if "." in name and name not in own and not transmitted_force(s.model, name)
+    )
     if not sensors and not curves:
         return
-    named = _names(s) | set(watched)
+    named = _names_in_laws(s) | set(names_in_use)
     found = {}
     for sensor in sensors:
         if sensor.name in named and (what := s.model.measured(sensor)) is not None:
-            found[sensor.name] = _sensed(s, sensor, *what[:2]), what[2]
+            found[sensor.name] = _sensed_quantity(s, sensor, *what[:2]), what[2]
     for name in curves:
-        if (what := measured(s.model, Curve(watched[name].title, name))) is not None:
-            found[name] = _sensed(s, watched[name], *what[:2]), what[2]
+        if (what := measured_quantity(s.model, Curve(names_in_use[name].title, name))) is not None:
+            found[name] = _sensed_quantity(s, names_in_use[name], *what[:2]), what[2]
     values = len(s.measured)
     s.slots = {name: m + (values if order else 0) for name, (m, order) in found.items()}
 
 
-def _names(s: Structure) -> set[str]:
+def _names_in_laws(s: Structure) -> set[str]:
     """Names that some law uses."""
     out: set[str] = set()
     for e in [*s.model.acting(), *s.model.drivers]:
-        for field, of in _laws(e).items():
+        for field, of in _law_fields(e).items():
             value = getattr(e, field)
             for law in value if isinstance(value, tuple) else (value,):
                 if law is not None and not isinstance(law, float):
@@ -60,11 +60,11 @@ def _names(s: Structure) -> set[str]:
     return out
 
 
-def _laws(e) -> dict[str, LawOf]:
+def _law_fields(e) -> dict[str, LawOf]:
     return {"law": LawOf(None)} if e.category == "drivers" else fields_with(e.__class__, LawOf)
 
 
-def _along(s: Structure, e: CoordinateForce) -> int:
+def _acting_quantity(s: Structure, e: CoordinateForce) -> int:
     """The quantity that a force acts along."""
     text = e.coordinate_text() or f"{e.name}:length"
     if text in s.measured:
@@ -74,33 +74,33 @@ def _along(s: Structure, e: CoordinateForce) -> int:
         term = coordinate_term(s, one, e, m, measured=True)
         term.index, term.switch = k, None if e.coordinate_text() else ""
     for a, b, formula in e.path():
-        measured_term(s, m, frame(s, e, a), frame(s, e, b), formula, 1.0, e)
+        measured_term(s, m, frame_index(s, e, a), frame_index(s, e, b), formula, 1.0, e)
     return m
 
 
-def _sensed(s: Structure, e: Sensor | Event | Controller, kind: str, text: str) -> int:
+def _sensed_quantity(s: Structure, e: Sensor | Event | Controller, kind: str, text: str) -> int:
     """The quantity that a sensor measures, or that an event names."""
     force = s.model[text] if kind == "force" else None
     if isinstance(force, CoordinateForce):
-        return _along(s, force)
+        return _acting_quantity(s, force)
     key = f"{text}:length" if force is not None else f"{text}:{kind}" if kind == "spin" else text
     if key in s.measured:
         return s.measured[key]
     m = s.measured[key] = len(s.measured)
     if force is not None:
-        measured_term(s, m, frame(s, force, "F"), frame(s, force, "M"), DISTANCE, 1.0, force)
+        measured_term(s, m, frame_index(s, force, "F"), frame_index(s, force, "M"), DISTANCE, 1.0, force)
     elif kind == "spin":
         # about an axis of the world: that of ground seen from the body, reversed
         owner, _, axis = text.partition(".")
-        measured_term(s, m, frame(s, s.model[owner], "M"), 0, turning(axis), -1.0, e)
+        measured_term(s, m, frame_index(s, s.model[owner], "M"), 0, turning(axis), -1.0, e)
     else:
         coordinate_term(s, text, e, m, measured=True)
     return m
 
 
-def forces(s: Structure) -> None:
+def fill_force_table(s: Structure) -> None:
     """Force table, sorted by kind."""
-    acting = [(f, formulas_of(type(f))) for f in s.model.acting() if _acts(s, f)]
+    acting = [(f, user_formulas(type(f))) for f in s.model.acting() if _acts(s, f)]
     acting.sort(key=lambda x: FORCE_BY_ADDRESS if x[1] is not None else x[0].kind)
     s.forces, s.force_code = [f for f, _ in acting], [x for _, x in acting]
     none = np.full(len(s.forces), -1, np.int64)
@@ -109,7 +109,7 @@ def forces(s: Structure) -> None:
         table.kind[k] = e.kind if s.force_code[k] is None else FORCE_BY_ADDRESS
         table.family[k] = isinstance(e, CoordinateForce)
         if isinstance(e, CoordinateForce):
-            table.F[k] = _along(s, e)
+            table.F[k] = _acting_quantity(s, e)
             if hasattr(e, "load"):
                 table.M[k] = _axis_frame(s, e)
                 table.load[k] = 2 * len(s.measured) + len(s.loads)
@@ -121,14 +121,14 @@ def forces(s: Structure) -> None:
             table.family[k] = SLIDING
             s.loads.append(e)
         else:
-            table.F[k], table.M[k] = frame(s, e, "F") if "F" in e.ends() else 0, frame(s, e, "M")
+            table.F[k], table.M[k] = frame_index(s, e, "F") if "F" in e.ends() else 0, frame_index(s, e, "M")
         _compile_laws(s, e, table.laws[k])
         if not e.conservative() and e.name not in s.model.aside:
             table.work[k] = s.state(f"{e.name}.work")
     s.tables["forces"] = table
 
 
-def formulas_of(cls: type[Force]) -> CodeTable | None:
+def user_formulas(cls: type[Force]) -> CodeTable | None:
     """The formulas of a class that is not flyball's own, by address; None where it has those of a built-in element.
 
     Raises

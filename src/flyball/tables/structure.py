@@ -1,25 +1,188 @@
-"""Mechanism -> integers: who touches whom, which row, which entry goes where. Numbers come later (``values``).
+"""Mechanism -> integers: incidence of bodies and rows, matrix patterns, laws. Numbers come later (`values`).
 
-Everything that a change of a parameter leaves alone is decided here, once: bodies here, rows and measured quantities
-in ``terms``, forces in ``forces``, patterns of matrices in ``patterns``.
+Everything that a change of a parameter leaves alone is decided here, once: bodies in `forest`, rows and
+measured quantities in `constraint_rows`, forces in tables/forces.py, and the sparsity patterns of the Jacobian
+and of the matrix that is factored in this module.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..errors import ModelError
 from ..model.body import Initial
 from ..model.model import Model
-from . import controllers, events, forces, patterns, reads, switches, terms
-from .branches import Branches, settle
-from .forest import body_table
-from .points import single
-from .specs import FrameSpec, Structure
+from ..numerics.sparse_factorisation import analyse_ldl
+from . import constraint_rows, forces, law_inputs
+from .constraint_rows import term_from_side_M
+from .forest import body_table, point_masses
+from .law_inputs import NonsmoothPoints, force_reading_entries, resolve_columns
+from .structure_definition import FrameSpec, Structure, integer_table
+from .table_definitions import (
+    COUPLED,
+    SCHUR,
+    Blocks,
+    LoadTerms,
+    MassEntries,
+    Pairs,
+    Segments,
+    SensorDrivers,
+    Terms,
+    Tree,
+)
 
-MOST = 8  # structures of one mechanism that are kept
+
+def set_patterns(s: Structure, solved: bool = True) -> None:
+    """Entries of G, of the matrix that is factored (if something is ``solved``), and who adds to them."""
+    tree = s.tables["tree"]
+    parents = tree.parent.tolist()
+    ways = [tree_paths(parents, s.frames[t.F].body, s.frames[t.M].body) for t in s.terms]
+    touched = _row_bodies(s, ways)
+    at, row_start, column, blocks = _jacobian_entries(tree, touched, len(s.rows))
+    terms: list[tuple] = []
+    segments: list[tuple] = []
+    for t, (on_F, on_M) in zip(s.terms, ways, strict=True):
+        first = len(segments)
+        segments += [(b, 1, at[t.row, b]) for b in on_M]
+        segments += [(b, -1, at[t.row, b]) for b in on_F]
+        terms.append((t.row, t.F, t.M, first, len(segments), t.hint))
+    following = [
+        (k, m, at[k, b], at[len(s.rows) + m, b], tree.nv[b])
+        for k, r in enumerate(s.rows)
+        for m in r.sensors
+        for b in sorted(touched[len(s.rows) + m])
+    ]
+    loads = [(2 * len(s.measured) + k, n) for k, e in enumerate(s.loads) for n in _load_terms(s, e)]
+    loads += force_reading_entries(s)
+    s.tables |= {
+        "terms": integer_table(Terms, terms),
+        "segments": integer_table(Segments, segments),
+        "row_start": np.array(row_start, np.int64),
+        "column": np.array(column, np.int64),
+        "blocks": integer_table(Blocks, blocks),
+        "sensor_drivers": integer_table(SensorDrivers, following),
+        "load_terms": integer_table(LoadTerms, loads),
+    }
+    solver = s.tables["sizes"].solver
+    if not solved:
+        _no_matrix(s)
+    elif solver == SCHUR:
+        _schur_pattern(s)
+    elif solver == COUPLED:
+        _coupled_pattern(s, parents)
+    else:
+        _no_matrix(s)
+
+
+def _load_terms(s: Structure, e: Any) -> list[int]:
+    """Terms whose reactions are a load; -1 for the multiplier of the row that presses two sides together."""
+    return [term_from_side_M(s, k) for k in s.terms_of.get(e.joint, [])] if hasattr(e, "joint") else [-1]
+
+
+def _row_bodies(s: Structure, paths: list[tuple[list[int], list[int]]]) -> list[set[int]]:
+    """Bodies that each row, then each measured quantity, depends on."""
+    touched: list[set[int]] = [set() for _ in range(len(s.rows) + len(s.measured))]
+    for t, (on_F, on_M) in zip(s.terms, paths, strict=True):
+        touched[t.row].update(on_F, on_M)
+    for k, r in enumerate(s.rows):
+        for m in r.sensors:
+            touched[k] |= touched[len(s.rows) + m]
+        if not touched[k] and not s.tree_joints:  # where a forest is rigid between two bodies, the row is redundant
+            raise ModelError(f"{r.element.title} restrains nothing that can move")
+    return touched
+
+
+def _jacobian_entries(
+    tree: Tree, touched: list[set[int]], rows: int
+) -> tuple[dict[tuple[int, int], int], list[int], list[int], list[tuple]]:
+    """Where each (row, body) begins in G; first entries of rows; velocities of entries; blocks of the rows."""
+    blocks: list[tuple] = []
+    row_start, at = [0], {}
+    column: list[int] = []
+    for k, bodies in enumerate(touched):
+        for b in sorted(bodies):
+            at[k, b] = len(column)
+            if k < rows:
+                blocks.append((b, len(column), k))
+            column.extend(range(tree.v[b], tree.v[b] + tree.nv[b]))
+        row_start.append(len(column))
+    return at, row_start, column, blocks
+
+
+def tree_paths(parents: list[int], F: int, M: int) -> tuple[list[int], list[int]]:
+    """Bodies that one of two hangs on and the other does not, themselves included, parents first: of F, of M."""
+    on_F: list[int] = []
+    on_M: list[int] = []
+    while F != M:  # parents have smaller numbers
+        if F > M:
+            on_F.append(F)
+            F = parents[F]
+        else:
+            on_M.append(M)
+            M = parents[M]
+    return on_F[::-1], on_M[::-1]
+
+
+def _schur_pattern(s: Structure) -> None:
+    """S = G M^-1 G^T: for each body, every pair of its rows."""
+    order = np.argsort(s.tables["blocks"].body, kind="stable")
+    blocks = Blocks(*(x[order] for x in s.tables["blocks"]))
+    first, count = np.unique(blocks.body, return_index=True, return_counts=True)[1:]
+    one, other = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for n in np.unique(count).tolist():  # bodies with as many rows have the same pairs
+        i, j = np.tril_indices(n)
+        starts = first[count == n, None]
+        one.append((starts + i).ravel())
+        other.append((starts + j).ravel())
+    a, b = np.concatenate(one), np.concatenate(other)
+    s.ldl, place = analyse_ldl(len(s.rows), blocks.row[a], blocks.row[b])
+    table = Pairs(blocks.entry[a], blocks.entry[b], s.tables["tree"].nv[blocks.body[a]], place[: len(a)])
+    order = np.argsort(blocks.body[a], kind="stable")
+    order = order[np.argsort(table.place[order], kind="stable")]
+    s.tables["pairs"] = Pairs(*(x[order] for x in table))
+    s.tables["mass_entries"] = integer_table(MassEntries, [])
+
+
+def _coupled_pattern(s: Structure, parents: list[int]) -> None:
+    """[M G^T; G -delta]: entries of M in the order in which ``mass_entries`` makes them, then those of G.
+
+    What couples a prescribed velocity to others goes to an entry behind the matrix that nobody reads: it is no unknown.
+    """
+    tree = s.tables["tree"]
+    own = [range(v0, v0 + n) for v0, n in zip(tree.v.tolist(), tree.nv.tolist(), strict=True)]
+    entries = []
+    for b in range(len(own)):
+        for k in own[b]:
+            a = b
+            while a >= 0:
+                entries += [(k, i) for i in own[a] if i <= k]
+                a = parents[a]
+    row_start, nv = s.tables["row_start"][: len(s.rows) + 1], s.nv
+    column = s.tables["column"][: row_start[-1]]
+    rows = np.repeat(np.arange(len(s.rows)), np.diff(row_start)) + nv
+    row_of_M, column_of_M = np.array(entries, np.int64).reshape(-1, 2).T
+    i, j = np.r_[row_of_M, rows], np.r_[column_of_M, column]
+    unknown = np.ones(nv + len(s.rows), bool)
+    unknown[tree.v[tree.law >= 0]] = False
+    counted = (unknown[i] & unknown[j]) | (i == j)
+    s.ldl, found = analyse_ldl(nv + len(s.rows), i[counted], j[counted])
+    place = np.full(len(i), len(s.ldl.Ai))
+    place[counted] = found[: counted.sum()]
+    n, e = len(entries), np.arange(len(column))
+    s.tables["mass_entries"] = MassEntries(*map(np.ascontiguousarray, (row_of_M, column_of_M, place[:n])))
+    s.tables["pairs"] = Pairs(e, e, np.ones_like(e), place[n:].copy())
+
+
+def _no_matrix(s: Structure) -> None:
+    """No rows on a forest of tree joints: sweeps over articulated bodies need no matrix."""
+    s.ldl, _ = analyse_ldl(0, np.zeros(0, int), np.zeros(0, int))
+    s.tables["pairs"], s.tables["mass_entries"] = integer_table(Pairs, []), integer_table(MassEntries, [])
+
+
+MAX_STRUCTURES = 8  # structures of one mechanism that are kept
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,10 +216,10 @@ class Choices:
     switches: bool = False
 
 
-PLAIN = Choices()
+DEFAULT_CHOICES = Choices()
 
 
-def structure(model: Model, choices: Choices = PLAIN) -> Structure:
+def structure(model: Model, choices: Choices = DEFAULT_CHOICES) -> Structure:
     """The tables of a mechanism, decided once for each of its snapshots and shared by all who ask: not to be changed.
 
     Raises
@@ -65,20 +228,20 @@ def structure(model: Model, choices: Choices = PLAIN) -> Structure:
         If there are no bodies.
     """
     model = model.snapshot()
-    key = choices, single(model)
-    found = model.kept.get("structure", key, MOST, lambda: _decided(model, choices))
-    if outdated(found):
+    key = choices, point_masses(model)
+    found = model.kept.get("structure", key, MAX_STRUCTURES, lambda: _built(model, choices))
+    if is_outdated(found):
         model.kept.drop("structure", key)
-        found = model.kept.get("structure", key, MOST, lambda: _decided(model, choices))
+        found = model.kept.get("structure", key, MAX_STRUCTURES, lambda: _built(model, choices))
     return found
 
 
-def outdated(s: Structure) -> bool:
+def is_outdated(s: Structure) -> bool:
     """Whether a Python function that it was made of is no longer what it was: a law, or a formula of a user's class."""
     return any(f.native.stale for f in s.functions) or any(x.stale for x in s.code_tables)
 
 
-def _decided(model: Model, choices: Choices) -> Structure:
+def _built(model: Model, choices: Choices) -> Structure:
     if not model.bodies and not model.bulk:
         raise ModelError(f"{model.name!r} has no bodies; add at least one")
     c = choices
@@ -87,31 +250,33 @@ def _decided(model: Model, choices: Choices) -> Structure:
     for table in model.tables:
         s.table_at[table.name] = len(s.const)
         s.const += table.data()
-    controllers.states(s)
+    law_inputs.add_controller_states(s)
     body_table(s)
     s.frames.append(FrameSpec(-1, None, "world"))
     if c.switches:
-        s.branches = Branches(s)
+        s.branches = NonsmoothPoints(s)
         s.branches.quantities()
-        switches.quantities(s)
-        events.quantities(s)
-    forces.measured_quantities(s, {**controllers.names(model), **(events.names(model) if c.switches else {})})
-    controllers.slots(s)
+        constraint_rows.measure_switches(s)
+        constraint_rows.measure_released_rows(s)
+    forces.measure_quantities(
+        s, {**law_inputs.controller_names(model), **(constraint_rows.event_names(model) if c.switches else {})}
+    )
+    law_inputs.add_controller_slots(s)
     if c.switches:
-        reads.quantities(s)
-    terms.rows(s, c.holds)
+        law_inputs.number_force_readings(s)
+    constraint_rows.add_constraint_rows(s, c.holds)
     if c.switches:
-        switches.rows(s)
-    forces.forces(s)
-    controllers.table(s)
+        constraint_rows.add_switch_rows(s)
+    forces.fill_force_table(s)
+    law_inputs.add_controller_laws(s)
     if c.switches:
-        events.guards(s)
-    switches.table(s)
+        constraint_rows.add_event_guards(s)
+    constraint_rows.fill_switch_tables(s)
     for e in s.loads:
         if (joint := getattr(e, "joint", "")) in s.tree_joints:
             raise ModelError(f"{e.title} needs the reaction of {joint!r}, which must then be rows, not a tree joint")
-    terms.sort(s)
-    patterns.patterns(s, c.solved)
-    settle(s)
+    constraint_rows.sort_terms(s)
+    set_patterns(s, c.solved)
+    resolve_columns(s)
     s.tables["code"] = np.array(s.code or [0], np.int64)
     return s

@@ -1,8 +1,11 @@
-"""Structure + parameter values -> floats: the System's tables and the drawn state.
+"""Structure and parameter values -> floats: the tables of `System`, and the reference state.
 
-Runs again for every change of a parameter; nothing is compiled and no description is validated here. Parameters may be
-complex: all tables are then complex, and of a small imaginary part of one parameter their imaginary parts are its
-multiple by the exact derivatives (a complex step). What is chosen is chosen by real parts.
+Runs again for every change of a parameter; nothing is compiled and no description is validated here. Parameters
+may be complex: all tables are then complex, and for a small imaginary part of one parameter their imaginary
+parts are its multiple by the exact derivatives (complex step). Decisions use real parts.
+
+Typical length and rate of the mechanism are computed here too: what lengths and rates are compared with. They
+do not depend on the duration of a simulation.
 """
 
 from __future__ import annotations
@@ -14,27 +17,51 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.by_address import addresses
+from ..compiler.kernels import table_addresses
 from ..errors import ModelError
 from ..math.scalar import real_parts, sqrt
+from ..math.vec import inner_product
 from ..model.body import GROUND
-from ..model.coupling import Coupling
-from ..model.joint import Joint
-from ..model.kept import Kept, bits
-from . import switches
-from .afresh import Afresh
-from .coordinates import BodyState, free_velocities, positions
-from .hinges import tree_frames
-from .masses import mass_table
-from .numbers import Numbers, kind_of, numbers
-from .points import check_centred
-from .poses import Poses
-from .specs import Structure, TermSpec
-from .system import FLAT, Frames, Scales, SwitchNumbers, System, blank
-from .tempo import tempo
+from ..model.expressions import number
+from ..model.joint import Coupling, Joint
+from ..model.model import Model
+from ..model.snapshot import ResultCache, exact_key
+from . import constraint_rows
+from .element_numbers import ElementNumbers, element_numbers, number_type
+from .forest import check_centred
+from .mass_properties import mass_table
+from .reference_configuration import BodyState, Poses, Refresh, free_velocities, positions, tree_frames
+from .structure_definition import Structure, TermSpec
+from .table_definitions import FLAT, Frames, Scales, SwitchNumbers, System, zero_table
+
+DEFAULT_RATE = 1.0  # [1/s]: where neither gravity nor any speed tells
+
+
+def characteristic_rate(given: ElementNumbers, model: Model, gravity: np.ndarray, length: Any) -> Any:
+    """A rate of the mechanism's own [1/s]: of half swings of a pendulum as long as it, sqrt(g / length) / pi.
+
+    Without gravity: of the fastest body or coordinate at the start, per length, or turning; a second, where all rests.
+    """
+    if (g := _norm(gravity)).real > 0.0:
+        return np.sqrt(g / length) / np.pi
+    moving = [d for name, d in given.bodies.items() if name != GROUND]
+    speeds = [x for d in moving for x in (_norm(d.v) / length, _norm(d.w))]
+    for e in model.initial:
+        if (rate := getattr(given.of.get(e.name), "rate", None)) is not None:
+            unit = model.unit(e.name, e)
+            size = _norm(np.array([number(rate, given.env, f"{unit}/s", f"rate of {e.title}"), 0.0, 0.0]))
+            speeds.append(size / length if unit == "m" else size)
+    fastest = max(speeds, key=lambda x: x.real, default=0.0)
+    return fastest if fastest.real > 0.0 else DEFAULT_RATE
+
+
+def _norm(x: np.ndarray) -> Any:
+    """Length of a vector (3,); zero of what is zero, where a root has no derivative."""
+    return np.sqrt(inner_product(x, x)) if real_parts(x).any() else 0.0
+
 
 NO_LENGTH = 1e-13  # of coordinates: a distance that is their rounding
-MOST = 4  # sets of values of one structure that are kept
+MAX_VALUES = 4  # sets of values of one structure that are kept
 REGULARISATION = 1e-9
 
 
@@ -46,10 +73,12 @@ class Values:
     system: System
     q: np.ndarray
     v: np.ndarray
-    given: Numbers
+    given: ElementNumbers
     length: float  # a typical length of the mechanism [m]
     poses: Poses  # where frames are when it is drawn
-    kept: Kept = field(default_factory=Kept, init=False)  # where motions of it start; a changed copy has its own
+    kept: ResultCache = field(
+        default_factory=ResultCache, init=False
+    )  # where motions of it start; a changed copy has its own
     alike: Values | None = field(default=None, init=False, repr=False)  # see `unforced`
 
     @property
@@ -88,7 +117,7 @@ class Values:
         """In another process code has other addresses."""
         vars(self).update(state)
         self.system = self.system._replace(
-            force_code=addresses(self.structure.force_code), term_code=addresses(self.structure.term_code)
+            force_code=table_addresses(self.structure.force_code), term_code=table_addresses(self.structure.term_code)
         )
 
 
@@ -105,95 +134,99 @@ def values(
     holds : mapping, optional
         Values of the coordinates that are held (see ``structure``).
     """
-    return values_of(s, numbers(s.model, parameters), holds)
+    return values_of(s, element_numbers(s.model, parameters), holds)
 
 
-def values_of(s: Structure, n: Numbers, holds: Mapping[str, complex] | None = None) -> Values:
+def values_of(s: Structure, n: ElementNumbers, holds: Mapping[str, complex] | None = None) -> Values:
     """The same from the numbers of its elements."""
-    if n.dtype is not float or (holds and kind_of(holds.values()) is not float):
-        return _filled(s, n, holds or {})
-    return s.kept.get("values", (n.key, bits(holds or {})), MOST, lambda: _filled(s, n, holds or {}))
+    if n.dtype is not float or (holds and number_type(holds.values()) is not float):
+        return _fill(s, n, holds or {})
+    return s.kept.get("values", (n.key, exact_key(holds or {})), MAX_VALUES, lambda: _fill(s, n, holds or {}))
 
 
-def _filled(s: Structure, given: Numbers, holds: Mapping[str, Any]) -> Values:
+def _fill(s: Structure, given: ElementNumbers, holds: Mapping[str, Any]) -> Values:
     """All tables; where some were filled in before, only the rows that depend on what is different now."""
     if holds:
-        return _refilled(s, given, holds, Afresh())
+        return _fill_all(s, given, holds, Refresh())
     first = s.kept.known("filled first")
-    new = Afresh.since(first, given, s.model)
-    x = _forced(s, given, new) if new.only_acts and given.dtype is float else None
-    x = x or _refilled(s, given, holds, new)
+    new = Refresh.since(first, given, s.model)
+    x = _fill_forces(s, given, new) if new.forces_only and given.dtype is float else None
+    x = x or _fill_all(s, given, holds, new)
     if first is None and given.dtype is float:
         s.kept.get("filled first", None, 1, lambda: x)
     return x
 
 
-def _forced(s: Structure, given: Numbers, new: Afresh) -> Values | None:
+def _fill_forces(s: Structure, given: ElementNumbers, refresh: Refresh) -> Values | None:
     """The values where forces and controllers alone have other numbers; None if bodies or frames are moved by these."""
-    base, pose = new.base, Poses(s, given)
+    base, pose = refresh.base, Poses(s, given)
     assert base is not None
     S, dtype = base.system, base.system.const.dtype
-    frames = _frames(s, pose, new.table("frames", S.frames, dtype), new)
+    frames = _frames(s, pose, refresh.table("frames", S.frames, dtype), refresh)
     const, curve_at = _constants(s, given.of, given.env, dtype)
-    terms = _term_parameters(s, pose, {}, curve_at, new.table("term_parameters", S.term_parameters, dtype), new)
+    terms = _term_parameters(s, pose, {}, curve_at, refresh.table("term_parameters", S.term_parameters, dtype), refresh)
     gravity = np.array(s.model.gravity_vector(given.env), dtype)
     same = *zip(frames, S.frames, strict=True), (terms, S.term_parameters), (gravity, S.gravity)
     if any(a.tobytes() != b.tobytes() for a, b in same):
         return None
-    forces = _force_parameters(s, pose, new.table("force_parameters", S.force_parameters, dtype), new)
-    of_switches = new.table("switch_numbers", S.switch_numbers, dtype)
-    switches.numbers(s, given.of, of_switches, new.asks, pose.apart)
+    forces = _force_parameters(s, pose, refresh.table("force_parameters", S.force_parameters, dtype), refresh)
+    of_switches = refresh.table("switch_numbers", S.switch_numbers, dtype)
+    constraint_rows.fill_switch_numbers(s, given.of, of_switches, refresh.asks, pose.apart)
     S = S._replace(force_parameters=forces, const=const, switch_numbers=of_switches)
     x = Values(s, S, base.q, base.v, given, base.length, pose)
     x.alike = base
     return x
 
 
-def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afresh) -> Values:
+def _fill_all(s: Structure, given: ElementNumbers, holds: Mapping[str, Any], refresh: Refresh) -> Values:
     model, env, numbers, bodies = s.model, given.env, given.of, given.bodies
-    dtype = kind_of([*given.env.values(), *holds.values()]) if holds else given.dtype
+    dtype = number_type([*given.env.values(), *holds.values()]) if holds else given.dtype
     pose = Poses(s, given)
-    frames = _frames(s, pose, new.table("frames", blank(Frames, len(s.frames), dtype), dtype), new)
+    frames = _frames(s, pose, refresh.table("frames", zero_table(Frames, len(s.frames), dtype), dtype), refresh)
     length = _length(s, frames.position, bodies)
-    _check_points(s, frames.position, length, new)
-    table = mass_table(s, bodies, frames.position, length, new)
-    tree_frames(s, pose, numbers, table, new)
+    _check_points(s, frames.position, length, refresh)
+    table = mass_table(s, bodies, frames.position, length, refresh)
+    tree_frames(s, pose, numbers, table, refresh)
     const, curve_at = _constants(s, numbers, env, dtype)
-    terms = new.table("term_parameters", np.zeros((len(s.terms), 8), dtype), dtype)
-    terms = _term_parameters(s, pose, holds, curve_at, terms, new)
-    forces = _force_parameters(s, pose, new.table("force_parameters", np.zeros((len(s.forces), 16), dtype), dtype), new)
-    of_switches = new.table("switch_numbers", blank(SwitchNumbers, len(s.switches), dtype), dtype)
-    switches.numbers(s, numbers, of_switches, new.asks, pose.apart)
+    terms = refresh.table("term_parameters", np.zeros((len(s.terms), 8), dtype), dtype)
+    terms = _term_parameters(s, pose, holds, curve_at, terms, refresh)
+    forces = _force_parameters(
+        s, pose, refresh.table("force_parameters", np.zeros((len(s.forces), 16), dtype), dtype), refresh
+    )
+    of_switches = refresh.table("switch_numbers", zero_table(SwitchNumbers, len(s.switches), dtype), dtype)
+    constraint_rows.fill_switch_numbers(s, numbers, of_switches, refresh.asks, pose.apart)
     semidefinite = float((table.excess_inertia != 0.0).any() or (table.excess_mass != 0.0).any())
     gravity = model.gravity_vector(env)
-    pace = tempo(given, model, gravity, length)
+    pace = characteristic_rate(given, model, gravity, length)
     scales = np.array([REGULARISATION, semidefinite, length, pace], dtype).view(Scales)
     system = System(  # type: ignore[misc]
         **s.tables,
         bodies=table, frames=frames, term_parameters=terms, force_parameters=forces, switch_numbers=of_switches,
-        force_code=addresses(s.force_code), term_code=addresses(s.term_code), const=const,
+        force_code=table_addresses(s.force_code), term_code=table_addresses(s.term_code), const=const,
         gravity=np.array([*gravity], dtype),
         scales=scales, units=np.array(_units(s, length), dtype),
         ldl=s.ldl, flat=np.zeros(FLAT, np.int64),
     )  # fmt: skip
-    x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, float(length.real), pose)
+    x = Values(
+        s, system, refresh.state("q", s.nq, dtype), refresh.state("v", s.nv, dtype), given, float(length.real), pose
+    )
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
-    x.q[:], x.v[:] = positions(x, drawn, new=new), free_velocities(x, drawn, new=new)
+    x.q[:], x.v[:] = positions(x, drawn, refresh=refresh), free_velocities(x, drawn, refresh=refresh)
     return x
 
 
-def _frames(s: Structure, pose: Poses, table: Frames, new: Afresh) -> Frames:
-    for k in new.rows(s, "frames"):
+def _frames(s: Structure, pose: Poses, table: Frames, refresh: Refresh) -> Frames:
+    for k in refresh.rows(s, "frames"):
         row = pose.row(s.frames[k])
         table.position[k], table.rotation[k] = row[:3], row[3:]
     return table
 
 
-def _check_points(s: Structure, places: np.ndarray, length: Any, new: Afresh) -> None:
+def _check_points(s: Structure, places: np.ndarray, length: Any, refresh: Refresh) -> None:
     """Refuse ends that miss the centre of a point mass with these numbers."""
     single = {s.place[name]: name for name in s.points}
     for f, way in zip(s.frames, places, strict=True) if single else ():
-        if f.body in single and new.asks(f.element):
+        if f.body in single and refresh.asks(f.element):
             check_centred(s.model, single[f.body], f.element, way, length)
 
 
@@ -206,21 +239,21 @@ def _length(s: Structure, places: np.ndarray, bodies: Mapping[str, SimpleNamespa
     if not moving:
         return 1.0
     centres, on_body = np.array([b.c for b in moving]), s.tables["frame_body"] >= 0
-    if (length := _reach(places[on_body], places[~on_body], centres)).real > 0.0:
+    if (length := _extent(places[on_body], places[~on_body], centres)).real > 0.0:
         return length
     spin = [np.trace(b.inertia) / b.mass for b in moving if b.mass.real > 0.0]
     length = np.sqrt(max(spin, key=lambda x: x.real, default=0.0))
     return length if length.real > 0.0 else 1.0
 
 
-def _reach(on_bodies: np.ndarray, on_ground: np.ndarray, centres: np.ndarray) -> Any:
+def _extent(on_bodies: np.ndarray, on_ground: np.ndarray, centres: np.ndarray) -> Any:
     """The same by places alone, (..., k, 3) each; 0 where they are all one."""
     places = np.concatenate([on_ground, centres], axis=-2)
     nothing = NO_LENGTH * np.abs(real_parts(places)).max(axis=(-2, -1), initial=0.0)[..., None]
-    first = _longest(np.concatenate([on_bodies, centres - centres.mean(axis=-2, keepdims=True)], axis=-2))
+    first = _longest_vector(np.concatenate([on_bodies, centres - centres.mean(axis=-2, keepdims=True)], axis=-2))
     if (real_parts(first) > nothing).all():
         return first[..., 0][()]
-    other = _longest(places - places.mean(axis=-2, keepdims=True))
+    other = _longest_vector(places - places.mean(axis=-2, keepdims=True))
     other = np.where(real_parts(other) > nothing, other, 0.0)
     return np.where(real_parts(first) > nothing, first, other)[..., 0][()]
 
@@ -231,10 +264,10 @@ def _units(s: Structure, length: Any) -> list[Any]:
     return [length if m in metric else 1.0 for m in range(len(s.measured))]
 
 
-def _longest(ways: np.ndarray) -> np.ndarray:
+def _longest_vector(vectors: np.ndarray) -> np.ndarray:
     """Length (..., 1) of the longest of some ways (..., k, 3)."""
-    at = np.argmax((real_parts(ways) ** 2).sum(axis=-1), axis=-1)
-    longest = np.take_along_axis(ways, at[..., None, None], axis=-2)[..., 0, :]
+    at = np.argmax((real_parts(vectors) ** 2).sum(axis=-1), axis=-1)
+    longest = np.take_along_axis(vectors, at[..., None, None], axis=-2)[..., 0, :]
     return sqrt((longest**2).sum(axis=-1, keepdims=True))
 
 
@@ -257,13 +290,13 @@ def _term_parameters(
     holds: Mapping[str, Any],
     curve_at: Mapping[str, int],
     x: np.ndarray,
-    new: Afresh,
+    refresh: Refresh,
 ) -> np.ndarray:
     """Parameters of the terms: axes from the declaration, constants from the numbers."""
     numbers = pose.numbers
     factors = {c.name: np.array(c.factors(numbers[c.name], s.model, pose.axis)) for c in s.model.couplings}
     factors = {name: f / f[0] for name, f in factors.items()}
-    for k in new.rows(s, "terms"):
+    for k in refresh.rows(s, "terms"):
         t = s.terms[k]
         x[k] = t.formula.par
         x[k, 7] = t.sign * t.formula.par[7]
@@ -280,12 +313,12 @@ def _term_parameters(
             x[k, 7] *= e.weight(n, t.what, *pose.ends(e))
         elif isinstance(e, Coupling):
             x[k, 7] *= factors[e.name][t.index]
-            x[k, 6] = _coupled(e, n, t, pose)
+            x[k, 6] = _coupling_constant(e, n, t, pose)
         elif t.owner is not None:
             if t.switch is not None and (weights := e.switch_weights(n, t.switch)):
                 x[k, 7] *= weights[t.index]
             held = t.sign * (holds.get(e.name, 0.0) - _offset(t, numbers))
-            x[k, 6] = _coupled(e, n, t, pose) if hasattr(e, "total") else held
+            x[k, 6] = _coupling_constant(e, n, t, pose) if hasattr(e, "total") else held
     return x
 
 
@@ -294,7 +327,7 @@ def _offset(t: TermSpec, numbers: Mapping) -> float:
     return t.owner.offset(numbers[t.owner.name], t.what) if isinstance(t.owner, Joint) else 0.0
 
 
-def _coupled(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
+def _coupling_constant(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
     """What a coupled coordinate is compared with: what it is as drawn, unless the sum is given."""
     total = e.total(n)
     if total is None:
@@ -303,8 +336,8 @@ def _coupled(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
     return t.sign * (share - _offset(t, pose.numbers))
 
 
-def _force_parameters(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
-    for k in new.rows(s, "forces"):
+def _force_parameters(s: Structure, pose: Poses, x: np.ndarray, refresh: Refresh) -> np.ndarray:
+    for k in refresh.rows(s, "forces"):
         e = s.forces[k]
         par = e.parameters(pose.numbers[e.name], pose.apart(e))
         if len(par) > x.shape[1]:

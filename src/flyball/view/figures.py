@@ -1,4 +1,4 @@
-"""Which curves tell most of a motion, and which of them share an axis: for pictures and for the report alike."""
+"""Figures as data: curves grouped into panels by unit, independent of the drawing library."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .recording import Channel, Figure, Panel
 if TYPE_CHECKING:
     from ..results.result import Result
 
-MOST = 12  # curves in one panel
-SPREAD = 15.0  # height of a panel over the least that a curve in it varies by, at most
-LEVEL = 2e-3  # a curve that varies less than this part of its own size is a straight line anyway
-WORTH = 1e-3  # work that is less than this part of the energies need not be shown
-CLOSE = 0.006  # curves that are nearer than this part of the panel's height hide one another
-LABELS = {
+MAX_PANEL_CURVES = 12  # curves in one panel
+MAX_HEIGHT_RATIO = 15.0  # height of a panel over the least that a curve in it varies by, at most
+FLAT_PART = 2e-3  # a curve that varies less than this part of its own size is a straight line anyway
+MIN_WORK_PART = 1e-3  # work that is less than this part of the energies need not be shown
+HIDING_PART = 0.006  # curves that are nearer than this part of the panel's height hide one another
+UNIT_LABELS = {
     "J": "energy",
     "N": "force",
     "N*m": "torque",
@@ -32,7 +32,7 @@ LABELS = {
 }
 
 
-def figures(result: Result) -> list[Figure]:
+def standard_figures(result: Result) -> list[Figure]:
     """Energies with their balance, coordinates, positions, reactions, what drivers and forces do, sensors, controllers.
 
     Those that have nothing to show are left out; of many parts evenly chosen ones are shown.
@@ -49,12 +49,12 @@ def energies(result: Result) -> Figure:
     e = result.energy
     curves = [Channel(k, "J", np.asarray(getattr(e, k))) for k in ("kinetic", "potential", "total")]
     work = np.asarray(sum(e.work.values(), np.zeros(len(result.t))))
-    if np.ptp(work) > WORTH * max(float(np.ptp(c.values)) for c in curves):
+    if np.ptp(work) > MIN_WORK_PART * max(float(np.ptp(c.values)) for c in curves):
         curves.append(Channel("work put in", "J", work))
     note = f"largest deviation {e.drift:.2g} J"
     balance = Panel("balance", (Channel("balance", "J", np.asarray(e.balance)),), note)
     panel = Panel("energy", tuple(curves))
-    parts = [panel] if _comparable(curves[:2]) else spread(panel)
+    parts = [panel] if _comparable(curves[:2]) else split_panel(panel)
     return Figure("energy", "Energy", (*parts, balance))
 
 
@@ -62,14 +62,14 @@ def coordinates(result: Result) -> Figure | None:
     """Relative coordinates of the joints; those that hardly vary beside others in a panel of their own."""
     every = [(e, what, c.unit) for e in result.model.joints for what, c in e.coordinates.items()]
     units = dict.fromkeys(unit for _, _, unit in every)
-    chosen = [c for unit in units for c in some([c for c in every if c[2] == unit])]
+    chosen = [c for unit in units for c in evenly_chosen([c for c in every if c[2] == unit])]
     known = {e.name: result[e.name].channels() for e, _, _ in chosen}
     curves = [
         Channel(f"{e.name}.{what}", unit, np.asarray(known[e.name][what][1]))
         for e, what, unit in chosen
         if what in known[e.name]
     ]
-    parts = [p for panel in panels(curves) for p in spread(panel)]
+    parts = [p for panel in panels_by_unit(curves) for p in split_panel(panel)]
     return Figure("coordinates", "Joint coordinates", tuple(parts)) if parts else None
 
 
@@ -77,17 +77,17 @@ def positions(result: Result) -> Figure | None:
     """Centres of mass of spatial bodies, axis by axis."""
     if result.planar:
         return None
-    every = movers(result)
-    bodies = some(every)
+    every = moving_bodies(result)
+    bodies = evenly_chosen(every)
     points = {name: centre(result, name) for name in bodies}
     parts = [Panel(axis, tuple(Channel(k, "m", p[:, i]) for k, p in points.items())) for i, axis in enumerate("xyz")]
-    return Figure("positions", "Centres of mass", tuple(parts), few(len(bodies), len(every), "bodies"))
+    return Figure("positions", "Centres of mass", tuple(parts), count_note(len(bodies), len(every), "bodies"))
 
 
 def reactions(result: Result) -> Figure | None:
     """Sizes of the joints' reaction forces, and of their torques where they carry any."""
     sizes: dict[str, list[Channel]] = {"N": [], "N*m": []}
-    joints = some(result.model.joints)
+    joints = evenly_chosen(result.model.joints)
     for e in joints:
         view = result[e.name]
         name = f"{e.name}*" if view.undetermined else e.name
@@ -97,10 +97,10 @@ def reactions(result: Result) -> Figure | None:
     force, torque = (max((float(np.nanmax(c.values, initial=0.0)) for c in x), default=0.0) for x in sizes.values())
     least = 1e-9 * max(torque, force * result.values.length)  # below, rounding errors
     sizes["N*m"] = [c for c in sizes["N*m"] if np.nanmax(c.values, initial=0.0) > least]
-    parts = [Panel(f"|{LABELS[unit]}|", tuple(curves)) for unit, curves in sizes.items() if curves]
+    parts = [Panel(f"|{UNIT_LABELS[unit]}|", tuple(curves)) for unit, curves in sizes.items() if curves]
     if not parts:
         return None
-    notes = [few(len(joints), len(result.model.joints), "joints")]
+    notes = [count_note(len(joints), len(result.model.joints), "joints")]
     if any(c.name.endswith("*") for p in parts for c in p.curves):
         notes.append("* redundancy leaves some components undetermined")
     return Figure("reactions", "Joint reactions", tuple(parts), "; ".join(n for n in notes if n))
@@ -112,7 +112,7 @@ def actuation(result: Result) -> Figure | None:
     for e in (*result.model.drivers, *result.model.couplings, *result.model.forces, *result.model.limits):
         channels = result[e.name].channels()
         curves += [Channel(f"{e.name}.{k}", u, np.asarray(v)) for k, (u, v) in channels.items() if u in ("N", "N*m")]
-    parts = panels(curves)
+    parts = panels_by_unit(curves)
     return Figure("actuation", "Drivers and forces", tuple(parts)) if parts else None
 
 
@@ -124,42 +124,44 @@ def sensors(result: Result) -> Figure | None:
         for k, (unit, values) in channels.items():
             name = e.name if len(channels) == 1 else f"{e.name}.{k}"
             curves.append(Channel(name, unit, np.asarray(values)))
-    parts = [p for panel in panels(curves) for p in spread(panel)]
+    parts = [p for panel in panels_by_unit(curves) for p in split_panel(panel)]
     return Figure("sensors", "Sensors", tuple(parts)) if parts else None
 
 
 def controllers(result: Result) -> Figure | None:
     """What controllers say; before it what they are to follow, and what follows it."""
     every = result.model.controllers
-    chosen, parts = some(every), []
+    chosen, parts = evenly_chosen(every), []
 
     def curves(e: Any, names: Sequence[str]) -> list[Channel]:
         return [Channel(f"{e.name}.{k}", *result[e.name].quantity(k)) for k in names]
 
     for e in chosen:
-        parts += [p for panel in panels(curves(e, e.compared)) for p in spread(panel)]
+        parts += [p for panel in panels_by_unit(curves(e, e.compared)) for p in split_panel(panel)]
     said = [c for e in chosen for c in curves(e, e.output_names)]
-    parts += [p for panel in panels(said) for p in spread(panel)]
-    note = few(len(chosen), len(every), "controllers")
+    parts += [p for panel in panels_by_unit(said) for p in split_panel(panel)]
+    note = count_note(len(chosen), len(every), "controllers")
     return Figure("controllers", "Controllers", tuple(parts), note) if parts else None
 
 
-def panels(curves: Sequence[Channel], most: int = MOST) -> list[Panel]:
+def panels_by_unit(curves: Sequence[Channel], most: int = MAX_PANEL_CURVES) -> list[Panel]:
     """One panel for each unit; its first curves where there are too many."""
     groups: dict[str, list[Channel]] = {}
     for c in curves:
         groups.setdefault(c.unit, []).append(c)
-    return [Panel(label(g), tuple(g[:most]), few(min(most, len(g)), len(g), "curves")) for g in groups.values()]
+    return [
+        Panel(panel_label(g), tuple(g[:most]), count_note(min(most, len(g)), len(g), "curves")) for g in groups.values()
+    ]
 
 
-def label(curves: Sequence[Channel]) -> str:
+def panel_label(curves: Sequence[Channel]) -> str:
     """What an axis shows: what all its curves are called, else what their unit measures."""
     names = {c.name.rpartition(".")[2] for c in curves}
     own = names.pop() if len(names) == 1 and all("." in c.name for c in curves) else ""
-    return own if len(own) > 2 else LABELS.get(curves[0].unit, own)
+    return own if len(own) > 2 else UNIT_LABELS.get(curves[0].unit, own)
 
 
-def spread(panel: Panel) -> list[Panel]:
+def split_panel(panel: Panel) -> list[Panel]:
     """The panel; or several, where a curve would be all but a straight line beside others."""
     groups: list[list[Channel]] = []
     for c in panel.curves:
@@ -177,18 +179,18 @@ def _comparable(curves: Sequence[Channel]) -> bool:
     if not finite:
         return True
     low, high = min(v.min() for v in finite), max(v.max() for v in finite)
-    least = [max(LEVEL * np.abs(v).max(), 1e-9 * max(abs(low), abs(high))) for v in finite]
+    least = [max(FLAT_PART * np.abs(v).max(), 1e-9 * max(abs(low), abs(high))) for v in finite]
     spans = [s for v, at_least in zip(finite, least, strict=True) if (s := np.ptp(v)) > at_least]
-    return not spans or bool(high - low <= SPREAD * min(spans))
+    return not spans or bool(high - low <= MAX_HEIGHT_RATIO * min(spans))
 
 
-def hidden(curves: Sequence[np.ndarray]) -> list[int]:
+def hidden_counts(curves: Sequence[np.ndarray]) -> list[int]:
     """For each curve, how many earlier ones it would hide: drawn dashed it lets them show."""
     finite = [v[np.isfinite(v)] for v in curves]
     values = np.concatenate([*finite, np.zeros(0)])
     if not len(values):
         return [0] * len(curves)
-    near = max(CLOSE * float(np.ptp(values)), 1e-12 * float(np.abs(values).max()), 1e-300)
+    near = max(HIDING_PART * float(np.ptp(values)), 1e-12 * float(np.abs(values).max()), 1e-300)
     out = []
     for k, v in enumerate(curves):
         gaps = [np.abs(v - earlier) for earlier in curves[:k]]
@@ -196,10 +198,10 @@ def hidden(curves: Sequence[np.ndarray]) -> list[int]:
     return out
 
 
-def movers(result: Result) -> list[str]:
+def moving_bodies(result: Result) -> list[str]:
     """Names of all bodies; where there are sets only, those of their members."""
     names = [b.name for b in result.model.bodies]
-    return names or [f"{name}[{k}]" for name, own in result.bulk.items() for k in some(range(len(own)))]
+    return names or [f"{name}[{k}]" for name, own in result.bulk.items() for k in evenly_chosen(range(len(own)))]
 
 
 def contacts(result: Result) -> Figure | None:
@@ -227,12 +229,12 @@ def centre(result: Result, name: str) -> np.ndarray:
     return np.stack([np.broadcast_to(c, len(result.t)) for c in p], axis=1)
 
 
-def few(shown: int, there: int, what: str) -> str:
+def count_note(shown: int, there: int, what: str) -> str:
     """What to say where not all are shown."""
     return f"{shown} of {there} {what}" if shown < there else ""
 
 
-def some(parts: Sequence[Any], most: int = MOST) -> list[Any]:
+def evenly_chosen(parts: Sequence[Any], most: int = MAX_PANEL_CURVES) -> list[Any]:
     """Evenly chosen parts, first and last among them."""
     if len(parts) <= most:
         return list(parts)

@@ -1,19 +1,262 @@
-"""The animation page: one recording as one self-contained HTML document that needs no network."""
+"""The animation page: a recording packed into one self-contained HTML document that needs no network.
+
+The payload is a JSON header, then one block of numbers. Poses, points and curves are float32, times float64,
+corners of triangles integers. Arrays lie column by column with their bytes shuffled (all first bytes, then all
+second bytes, ...), which makes smooth motions much smaller once compressed. Equal arrays are stored once.
+
+Poses of many bodies and contact forces are small whole numbers. Positions are steps of a grid; orientations are
+rotation vectors, steps of 2 pi / 65535; forces are square roots of what they are of the largest one. Poses are
+written as differences from the time before, modulo the width of the integer: a body at rest costs nothing once
+compressed. The page undoes it: `packed.js`, `touches.js`.
+"""
 
 from __future__ import annotations
 
 import base64
 import gzip
 import html
+import json
 import re
+import struct
+from collections.abc import Iterable
+from dataclasses import asdict
 from functools import cache
+from importlib.resources import files
+from typing import Any
 
-from .payload import payload
-from .recording import Recording
-from .static_files import filled, static
+import numpy as np
+
+from .recording import Channel, RecordedContacts, RecordedSet, Recording, Shape, check_recording, half_extent
+
+
+def fill_template(template: str, parts: dict[str, str]) -> str:
+    """The template with its marks replaced, once: what is put in is not looked at again."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts.get(match[1], match[0]), template)
+
+
+@cache
+def static(name: str) -> str:
+    """The text of a file in ``static/``."""
+    return files(__package__).joinpath("static", name).read_text(encoding="utf-8")
+
+
+POSITION_STEP = 1e-3  # step of positions over the size of a body: less than a pixel
+RANGE_16_BIT, RANGE_32_BIT = 2**16, 2**32
+NOT_DRAWN = 0  # in x: this body is not drawn
+
+
+def pack_positions(p: np.ndarray, size: float) -> tuple[np.ndarray, dict[str, object]]:
+    """Differences of positions (n, m, 3) on a grid that is fine for bodies of a size, and what undoes them.
+
+    Returns whole numbers, time by time, x of all, then y, then z; and ``low``, ``step``, ``type``.
+    """
+    gone = ~np.isfinite(p).all(axis=2)
+    inside = p[~gone]
+    low = inside.min(axis=0) if len(inside) else np.zeros(3)
+    extent = float((inside.max(axis=0) - low).max()) if len(inside) else 0.0
+    step = max(POSITION_STEP * size, extent / (RANGE_32_BIT - 3.0))
+    kind = "u2" if extent / step < RANGE_16_BIT - 2.0 else "u4"
+    grid = np.rint(np.where(gone[:, :, None], 0.0, p - low) / step) + 1.0
+    grid[gone] = NOT_DRAWN
+    about = {"low": [float(x) for x in low - step], "step": step}
+    return _time_differences(grid.astype(np.int64), RANGE_32_BIT if kind == "u4" else RANGE_16_BIT), about | {
+        "type": kind
+    }
+
+
+def pack_orientations(q: np.ndarray) -> np.ndarray:
+    """Differences of rotation vectors of quaternions (n, m, 4), as `pack_positions` has them."""
+    q = np.where(np.isfinite(q).all(axis=2)[:, :, None], q, (1.0, 0.0, 0.0, 0.0))
+    q = q * np.where(q[:, :, :1] < 0.0, -1.0, 1.0)
+    sine = np.sqrt((q[:, :, 1:] ** 2).sum(axis=2))
+    angle = 2.0 * np.arctan2(sine, q[:, :, 0])
+    per = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0)
+    turn = q[:, :, 1:] * per[:, :, None]
+    return _time_differences(np.rint(turn * ((RANGE_16_BIT - 1) / (2.0 * np.pi))).astype(np.int64), RANGE_16_BIT)
+
+
+def _time_differences(grid: np.ndarray, width: int) -> np.ndarray:
+    """What each time adds to the one before, components of all bodies one after the other."""
+    change = np.diff(grid, axis=0, prepend=np.zeros_like(grid[:1])) % width
+    return change.transpose(0, 2, 1).reshape(-1)
+
+
+def pack_forces(force: np.ndarray) -> tuple[np.ndarray, float]:
+    """Forces (k, 3) as whole numbers 0 to 65534, the square roots of their parts of the largest, and that [N]."""
+    force = np.where(np.isfinite(force), force, 0.0)
+    largest = float(np.abs(force).max(initial=0.0))
+    part = np.sign(force) * np.sqrt(np.abs(force) / largest) if largest > 0.0 else force
+    return np.rint(32767.0 * (part + 1.0)).astype(np.int64), largest
+
+
+ALIGNMENT = 8
+
+
+class _NumberBlock:
+    """Numbers put one after the other; each ``add`` returns where they went."""
+
+    def __init__(self) -> None:
+        self.parts: list[bytes] = []
+        self.length = 0
+        self.known: dict[bytes, dict[str, object]] = {}
+
+    def add(self, values: np.ndarray, kind: str = "f4") -> dict[str, object]:
+        columns = np.ascontiguousarray(np.asarray(values).astype(f"<{kind}").T).reshape(-1)
+        shuffled = columns.view(np.uint8).reshape(-1, columns.itemsize).T.tobytes()
+        if shuffled not in self.known:
+            padded = shuffled + bytes(-len(shuffled) % ALIGNMENT)
+            self.known[shuffled] = {"at": self.length, "count": columns.size, "type": kind}
+            self.parts.append(padded)
+            self.length += len(padded)
+        reference = self.known[shuffled]
+        return reference if reference["type"] == kind else reference | {"count": columns.size, "type": kind}
+
+
+def pack_recording(recording: Recording) -> bytes:
+    """Pack a recording for the page.
+
+    Parameters
+    ----------
+    recording : Recording
+        The motion; it is checked first.
+
+    Returns
+    -------
+    bytes
+        Length of the header (uint32, little-endian), header (UTF-8 JSON), padding to 8 bytes, numbers.
+    """
+    check_recording(recording)
+    block = _NumberBlock()
+    header = {
+        "name": recording.name,
+        "planar": bool(recording.planar),
+        "size": float(recording.size),
+        "notes": {str(term): str(text) for term, text in recording.notes.items()},
+        "shown": list(recording.shown),
+        "show": list(recording.show),
+        "facts": {part: list(lines) for part, lines in recording.facts.items()},
+        "down": _float_list(recording.down),
+        "t": block.add(recording.t, "f8"),
+        "bodies": [
+            {
+                "name": b.name,
+                "color": b.color,
+                "opacity": float(b.opacity),
+                "shapes": [_shape_data(s, block) for s in b.shapes],
+            }
+            | {"p": block.add(b.p), "q": block.add(_sign_continuous(b.q))}
+            for b in recording.bodies
+        ],
+        "sets": [_set_data(many, block) for many in recording.sets],
+        "contacts": None if recording.contacts is None else _contact_data(recording.contacts, block),
+        "lines": [
+            {"name": line.name, "kind": line.kind, "radius": _optional_float(line.radius)}
+            | {"points": [block.add(p) for p in line.points]}
+            | {"rest": None if line.rest is None else block.add(line.rest)}
+            for line in recording.lines
+        ],
+        "joints": [_attached_data(j, "kind", "mate", "reach", "size", "scale", "axis") for j in recording.joints],
+        "curves": [
+            {"name": c.name, "body": c.body, "closed": bool(c.closed), "points": block.add(c.points)}
+            for c in recording.curves
+        ],
+        "arrows": [_attached_data(a, "group", "what") | {"vector": block.add(a.vector)} for a in recording.arrows],
+        "frames": [_attached_data(f, "of") for f in recording.frames],
+        "paths": [_attached_data(p) for p in recording.paths],
+        "marks": [asdict(m) | {"t": float(m.t)} for m in recording.marks],
+        "modes": [asdict(mode) for mode in recording.modes],
+        "channels": _channel_data(recording.channels, block),
+        "figures": [
+            {"name": f.name, "title": f.title, "note": f.note}
+            | {
+                "panels": [
+                    {"label": p.label, "note": p.note, "curves": _channel_data(p.curves, block)} for p in f.panels
+                ]
+            }
+            for f in recording.figures
+        ],
+    }
+    text = json.dumps(header, allow_nan=False, separators=(",", ":")).encode()
+    head = struct.pack("<I", len(text)) + text
+    return head + bytes(-len(head) % ALIGNMENT) + b"".join(block.parts)
+
+
+def _optional_float(value: float | None) -> float | None:
+    return None if value is None else float(value)
+
+
+def _float_list(values: Iterable[float]) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _attached_data(thing: Any, *more: str) -> dict[str, object]:
+    """Something that rides on a body: name, body, place, and further fields."""
+    out: dict[str, object] = {"name": thing.name, "body": thing.body, "position": _float_list(thing.position)}
+    if hasattr(thing, "quaternion"):
+        out["quaternion"] = _float_list(thing.quaternion)
+    for name in more:
+        value = getattr(thing, name)
+        out[name] = _float_list(value) if isinstance(value, (tuple, list)) else value
+    return out
+
+
+def _channel_data(channels: Iterable[Channel], block: _NumberBlock) -> list[dict[str, object]]:
+    return [{"name": c.name, "unit": c.unit, "values": block.add(c.values)} for c in channels]
+
+
+def _shape_data(shape: Shape, block: _NumberBlock) -> dict[str, object]:
+    out: dict[str, object] = {
+        "kind": shape.kind,
+        "size": _float_list(shape.size),
+        "position": _float_list(shape.position),
+    }
+    out |= {"quaternion": _float_list(shape.quaternion), "outline": [_float_list(point) for point in shape.outline]}
+    out["hole"] = bool(shape.hole)
+    if shape.vertices is not None and shape.triangles is not None:
+        kind = "u2" if len(shape.vertices) <= 65_535 else "u4"
+        return out | {"vertices": block.add(shape.vertices), "triangles": block.add(shape.triangles, kind)}
+    return out
+
+
+def _set_data(many: RecordedSet, block: _NumberBlock) -> dict[str, object]:
+    """A set of bodies: its poses as `packing` has them."""
+    size = min((half_extent(shape) for shape in many.shapes), default=1.0)
+    size *= 1.0 if many.scale is None else float(np.min(many.scale, initial=np.inf))
+    p, about = pack_positions(np.asarray(many.p, float), size)
+    kind = str(about.pop("type"))
+    out: dict[str, object] = {"name": many.name, "colors": list(many.colors), "count": int(np.shape(many.p)[1])}
+    out |= {"shapes": [_shape_data(s, block) for s in many.shapes], "p": block.add(p, kind)} | about
+    out["q"] = block.add(pack_orientations(np.asarray(many.q, float)), "u2")
+    return out | {"scale": None if many.scale is None else block.add(many.scale)}
+
+
+def _contact_data(contacts: RecordedContacts, block: _NumberBlock) -> dict[str, object]:
+    """Contact forces, each component by itself."""
+    point = np.asarray(contacts.point, float)
+    low = point.min(axis=0, initial=np.inf) if len(point) else np.zeros(3)
+    step = float((point - low).max(initial=0.0)) / 65_535 or 1.0
+    force, largest = pack_forces(np.asarray(contacts.force, float))
+    return {
+        "begin": block.add(contacts.begin, "u4"),
+        "point": block.add(np.rint((point - low) / step).astype(np.int64), "u2"),
+        "low": _float_list(low),
+        "step": step,
+        "force": block.add(force, "u2"),
+        "largest": largest,
+        "state": block.add(contacts.state, "u1"),
+    }
+
+
+def _sign_continuous(q: np.ndarray) -> np.ndarray:
+    """Flip signs so that neighbouring quaternions never point apart."""
+    q = np.asarray(q, float)
+    apart = np.einsum("ij,ij->i", q[1:], q[:-1]) < 0
+    signs = np.where(np.cumsum(apart) % 2, -1.0, 1.0)
+    return q * np.concatenate([[1.0], signs])[:, None]
+
 
 # The player's modules, each after those it imports.
-MODULES = (
+PLAYER_MODULES = (
     "data",
     "format",
     "theme",
@@ -56,7 +299,7 @@ MODULES = (
 )
 
 
-def page(recording: Recording) -> str:
+def animation_page(recording: Recording) -> str:
     """Write a recording as a web page with the moving mechanism, linked plots and a summary.
 
     Parameters
@@ -75,10 +318,10 @@ def page(recording: Recording) -> str:
     ValueError
         If the recording is not complete and consistent; the message names the guilty element.
     """
-    return document(recording, f"<h1>{html.escape(recording.name)}</h1>")
+    return player_page(recording, f"<h1>{html.escape(recording.name)}</h1>")
 
 
-def document(recording: Recording, heading: str, before: str = "", after: str = "") -> str:
+def player_page(recording: Recording, heading: str, before: str = "", after: str = "") -> str:
     """Put a recording and its player into a page.
 
     Parameters
@@ -90,37 +333,59 @@ def document(recording: Recording, heading: str, before: str = "", after: str = 
         Markup before and after the player.
     """
     title = html.escape(recording.name)
-    stage = filled(static("player.html"), {"heading": heading, "title": title})
+    stage = fill_template(static("player.html"), {"heading": heading, "title": title})
     parts = {
         "title": title,
         "licences": static("licences.txt").replace("--", "- -"),
         "style": static("uplot.min.css") + static("page.css"),
         "content": before + stage + after,
-        "player": _player(),
-        "recording": _packed(payload(recording)),
+        "player": _player_script(),
+        "recording": _compressed(pack_recording(recording)),
         "boot": static("boot.js"),
     }
-    return filled(static("page.html"), parts)
+    return fill_template(static("page.html"), parts)
 
 
-def _packed(data: bytes) -> str:
+def _compressed(data: bytes) -> str:
     # level 9 would take twice the time, for very many bodies ten times, and save less than a hundredth
     return base64.b64encode(gzip.compress(data, 6, mtime=0)).decode()
 
 
 @cache
-def _player() -> str:
+def _player_script() -> str:
     """The libraries and the player as one gzipped script."""
-    modules = "\n".join(_scoped(name, static(f"player/{name}.js")) for name in MODULES)
+    modules = "\n".join(_module_as_function(name, static(f"player/{name}.js")) for name in PLAYER_MODULES)
     head = '"use strict";\nconst THREE = LIB, uPlot = LIB.uPlot;\n'
     script = f"{static('libraries.min.js')}\n(() => {{\n{head}{modules}\nwindow.startPlayer = $main.start;\n}})();\n"
-    return _packed(script.encode())
+    return _compressed(script.encode())
 
 
-def _scoped(name: str, module: str) -> str:
+def _module_as_function(name: str, module: str) -> str:
     """A module as a function of its own that returns what it exports; only its named imports are understood."""
     exported = ", ".join(re.findall(r"^export (?:class|const|function) (\w+)", module, flags=re.M))
     body = re.sub(r'^import (\{[^}]*\}) from "\./(\w+)\.js";', r"const \1 = $\2;", module, flags=re.M)
     body = re.sub(r"^import .*;\n", "", body, flags=re.M)
     body = re.sub(r"^export ", "", body, flags=re.M)
     return f"const ${name} = (() => {{\n{body}\nreturn {{ {exported} }};\n}})();"
+
+
+def notebook_iframe(document: str, height: int = 660) -> str:
+    """Wrap an HTML document for ``_repr_html_``.
+
+    Parameters
+    ----------
+    document : str
+        A self-contained HTML document.
+    height : int
+        Height of the frame [px].
+
+    Returns
+    -------
+    str
+        An ``iframe`` that carries the document in itself, so that it survives saving and exporting the notebook; the
+        document runs its scripts but reaches nothing outside the frame.
+    """
+    style = f"width:100%;height:{int(height)}px;border:0"
+    return (
+        f'<iframe srcdoc="{html.escape(document)}" sandbox="allow-scripts" title="Animation" style="{style}"></iframe>'
+    )

@@ -1,8 +1,8 @@
-"""The neutral recording of a motion: the one thing that every picture, page and player reads.
+"""The recording of a motion that every picture, page and player reads, and the check that it is consistent.
 
-A recording holds no physics: times, poses of bodies, lines through moving points, things that ride on bodies, vectors
-and named curves. World axes are right-handed; a planar recording lies in z = 0 with y up, a spatial one has z up.
-What rides on a body (``"ground"`` too) is given in the axes of that body, from its origin.
+A recording holds no physics: times, poses of bodies, lines through moving points, things that ride on bodies,
+vectors and named curves. World axes are right-handed; a planar recording lies in z = 0 with y up, a spatial one
+has z up. What rides on a body (``"ground"`` too) is given in the axes of that body, from its origin.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-Three = tuple[float, float, float]
-Four = tuple[float, float, float, float]
-UNTURNED = (1.0, 0.0, 0.0, 0.0)
+Vector3 = tuple[float, float, float]
+Quaternion4 = tuple[float, float, float, float]
+NO_ROTATION = (1.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -30,15 +30,15 @@ class Shape:
 
     kind: str
     size: tuple[float, ...]
-    position: Three = (0.0, 0.0, 0.0)
-    quaternion: Four = UNTURNED
+    position: Vector3 = (0.0, 0.0, 0.0)
+    quaternion: Quaternion4 = NO_ROTATION
     outline: tuple[tuple[float, float], ...] = ()
     vertices: np.ndarray | None = None
     triangles: np.ndarray | None = None
     hole: bool = False
 
 
-def extent(shape: Shape) -> float:
+def half_extent(shape: Shape) -> float:
     """About half the largest length of a shape [m]."""
     if shape.kind == "mesh":
         return 0.5 * float(np.ptp(np.asarray(shape.vertices), axis=0).max(initial=0.0))
@@ -137,9 +137,9 @@ class RecordedJoint:
     name: str
     kind: str
     body: str
-    position: Three
-    axis: Three
-    quaternion: Four = UNTURNED
+    position: Vector3
+    axis: Vector3
+    quaternion: Quaternion4 = NO_ROTATION
     mate: str | None = None
     reach: tuple[float, float, float, float, float, float] | None = None
     size: tuple[float, ...] = ()
@@ -153,8 +153,8 @@ class RecordedFrame:
     name: str
     of: str
     body: str
-    position: Three
-    quaternion: Four
+    position: Vector3
+    quaternion: Quaternion4
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class RecordedArrow:
     group: str
     what: str
     body: str
-    position: Three
+    position: Vector3
     vector: np.ndarray
 
 
@@ -179,7 +179,7 @@ class RecordedPath:
 
     name: str
     body: str
-    position: Three = (0.0, 0.0, 0.0)
+    position: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -285,17 +285,17 @@ class Recording:
     arrows: tuple[RecordedArrow, ...] = ()
     frames: tuple[RecordedFrame, ...] = ()
     paths: tuple[RecordedPath, ...] = ()
-    show: tuple[str, ...] = ()  # what is switched on when the page opens: see `SHOW`
+    show: tuple[str, ...] = ()  # what is switched on when the page opens: see `SHOW_OPTIONS`
     facts: dict[str, tuple[str, ...]] = field(default_factory=dict)  # part -> lines about it, for its card
     figures: tuple[Figure, ...] = ()  # of a report
-    down: Three = (0.0, 0.0, 0.0)  # direction of gravity, or zero
+    down: Vector3 = (0.0, 0.0, 0.0)  # direction of gravity, or zero
     modes: tuple[RecordedMode, ...] = ()  # to choose from, in place of one motion
     sets: tuple[RecordedSet, ...] = ()
     contacts: RecordedContacts | None = None
     marks: tuple[Mark, ...] = ()  # of what happened at instants
 
 
-SHOW = {
+SHOW_OPTIONS = {
     "reactions": "reaction forces of joints",
     "elements": "forces of springs, motors and drivers",
     "loads": "given forces",
@@ -308,3 +308,126 @@ SHOW = {
     "grid": "ground grid",
 }
 """What can be switched on and off in a page, and what it is."""
+
+
+SHAPE_SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "cone": 2, "ellipsoid": 3, "plate": 1, "mesh": 0}
+LINE_KINDS = ("spring", "damper", "link", "rope", "arrow")
+ARROW_GROUPS = ("reaction", "element", "load")
+
+
+def check_recording(recording: Recording) -> None:
+    """Refuse a recording that a view cannot show.
+
+    Raises
+    ------
+    ValueError
+        If times, shapes of arrays, kinds or references to bodies are wrong.
+    """
+    t = np.asarray(recording.t)
+    if t.ndim != 1 or t.size == 0:
+        raise ValueError(f"recording {recording.name!r}: t needs at least one time, got shape {t.shape}")
+    if not np.isfinite(t).all() or (np.diff(t) < 0).any():
+        raise ValueError(f"recording {recording.name!r}: times must be finite and must not decrease")
+    if not (np.isfinite(recording.size) and recording.size > 0):
+        raise ValueError(f"recording {recording.name!r}: size must be a positive length, got {recording.size}")
+    for body in recording.bodies:
+        _check_shape(f"body {body.name!r}: p", body.p, (t.size, 3))
+        _check_shape(f"body {body.name!r}: q", body.q, (t.size, 4))
+        for shape in body.shapes:
+            _check_solid(body.name, shape)
+    for many in recording.sets:
+        _check_set(many, t.size)
+    if recording.contacts is not None:
+        _check_contacts(recording.contacts, t.size)
+    for line in recording.lines:
+        _check_line(line, t.size)
+    for arrow in recording.arrows:
+        _check_kind(f"arrow {arrow.name!r}", arrow.group, ARROW_GROUPS)
+        _check_kind(f"arrow {arrow.name!r}", arrow.what, ("force", "moment"))
+        _check_shape(f"arrow {arrow.name!r}: vector", arrow.vector, (t.size, 3))
+    for channel in _all_channels(recording):
+        _check_shape(f"channel {channel.name!r}: values", channel.values, (t.size,))
+    for mode in recording.modes:
+        if not t[0] <= mode.begin < mode.end <= t[-1]:
+            raise ValueError(f"mode {mode.name!r}: from {mode.begin} to {mode.end} is no stretch of the recorded times")
+    for mark in recording.marks:
+        if not np.isfinite(mark.t):
+            raise ValueError(f"mark {mark.text!r}: its time is {mark.t}")
+    for name in recording.show:
+        _check_kind(f"recording {recording.name!r}: show", name, tuple(SHOW_OPTIONS))
+    _check_riders(recording)
+
+
+def _all_channels(recording: Recording) -> list[Channel]:
+    panels = [panel for figure in recording.figures for panel in figure.panels]
+    return [*recording.channels, *(c for panel in panels for c in panel.curves)]
+
+
+def _check_shape(what: str, values: np.ndarray, shape: tuple[int, ...]) -> None:
+    if np.shape(values) != shape:
+        raise ValueError(f"{what} must have shape {shape}, one row for each time, got {np.shape(values)}")
+
+
+def _check_kind(what: str, kind: str, known: tuple[str, ...]) -> None:
+    if kind not in known:
+        raise ValueError(f"{what}: unknown kind {kind!r}, known are {', '.join(known)}")
+
+
+def _check_line(line: RecordedLine, n: int) -> None:
+    _check_kind(f"line {line.name!r}", line.kind, LINE_KINDS)
+    if len(line.points) < 2 or (len(line.points) > 2 and line.kind != "rope"):
+        wanted = "two or more points" if line.kind == "rope" else "two points"
+        raise ValueError(f"line {line.name!r}: a {line.kind} takes {wanted}, got {len(line.points)}")
+    for k, p in enumerate(line.points):
+        _check_shape(f"line {line.name!r}: point {k}", p, (n, 3))
+    if line.rest is not None:
+        _check_shape(f"line {line.name!r}: rest", line.rest, (n,))
+
+
+def _check_set(many: RecordedSet, n: int) -> None:
+    m = np.shape(many.p)[1] if np.ndim(many.p) == 3 else 0
+    for what, width in (("p", 3), ("q", 4)):
+        _check_shape(f"set {many.name!r}: {what}", getattr(many, what), (n, m, width))
+    if many.scale is not None and (np.shape(many.scale) != (m,) or not (np.asarray(many.scale) > 0).all()):
+        raise ValueError(f"set {many.name!r}: scale must be {m} positive numbers")
+    if not many.shapes:
+        raise ValueError(f"set {many.name!r}: it has no shape to draw")
+    for shape in many.shapes:
+        _check_solid(many.name, shape)
+
+
+def _check_contacts(contacts: RecordedContacts, n: int) -> None:
+    begin, k = np.asarray(contacts.begin), len(contacts.point)
+    if begin.shape != (n + 1,) or begin[0] != 0 or begin[-1] != k or (np.diff(begin) < 0).any():
+        raise ValueError(f"contacts: begin must ascend from 0 to {k} in {n + 1} steps")
+    for what, shape in (("point", (k, 3)), ("force", (k, 3)), ("state", (k,))):
+        _check_shape(f"contacts: {what}", getattr(contacts, what), shape)
+
+
+def _check_solid(body: str, shape: Shape) -> None:
+    _check_kind(f"shape of body {body!r}", shape.kind, tuple(SHAPE_SIZES))
+    if len(shape.size) != SHAPE_SIZES[shape.kind] or min(shape.size, default=0) < 0:
+        raise ValueError(f"body {body!r}: a {shape.kind} takes {SHAPE_SIZES[shape.kind]} lengths, got {shape.size}")
+    if shape.kind == "plate" and len(shape.outline) < 3:
+        raise ValueError(f"body {body!r}: a plate's outline needs three points at least, got {len(shape.outline)}")
+    if shape.kind == "mesh":
+        v, t = np.asarray(shape.vertices), np.asarray(shape.triangles)
+        if v.ndim != 2 or t.ndim != 2 or v.shape[1] != 3 or t.shape[1] != 3:
+            raise ValueError(f"body {body!r}: a mesh takes vertices (k, 3) and triangles (m, 3)")
+        if not np.isfinite(v).all() or t.min(initial=0) < 0 or t.max(initial=-1) >= len(v):
+            rule = f"its vertices must be finite and its triangles name those {len(v)}"
+            raise ValueError(f"body {body!r}: a mesh that cannot be drawn: {rule}")
+
+
+def _check_riders(recording: Recording) -> None:
+    """Whatever rides on a body names one that is there."""
+    names = [b.name for b in recording.bodies] + [s.name for s in recording.sets]
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise ValueError(f"recording {recording.name!r}: two bodies are named {sorted(twice)[0]!r}")
+    known = {*(body.name for body in recording.bodies), "ground"}
+    for what in ("joints", "curves", "arrows", "frames", "paths"):
+        for rider in getattr(recording, what):
+            if rider.body not in known:
+                rider_is = f"{what.removesuffix('s')} {rider.name!r}"
+                raise ValueError(f"{rider_is} rides on body {rider.body!r}, which the recording does not have")

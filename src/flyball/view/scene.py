@@ -1,52 +1,59 @@
-"""What a recording shows besides bodies of a mechanism: sets of bodies, what stands on ground, contact forces."""
+"""The scene around bodies: sets of bodies, ground, contact forces, and arrows of reactions, elements and loads."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..model.body import frame_of
 from ..model.element import resolve
+from ..model.force import BodyForce, CoordinateForce
 from ..model.geometry import matrix_to_quaternion
-from ..model.ground import frame_of
 from ..model.shapes import Plane
-from .looks import given_shape
-from .places import three
-from .recording import RecordedBody, RecordedContacts, RecordedSet, Shape, extent
+from .body_shapes import shape_from_solid
+from .figures import evenly_chosen
+from .recording import RecordedArrow, RecordedBody, RecordedContacts, RecordedSet, Shape, half_extent
+from .symbols import AttachedFrame, AttachedFrames, coordinate_axis, coordinate_frames_of, float_triple, is_rotational
 
 if TYPE_CHECKING:
     from ..results.contacts import Contacts
     from ..results.result import Result
 
-ARROWS = 300_000  # contact forces in a recording, at most
-LEVEL = 0.999  # a plane whose normal is as near to up as this is the ground that every picture has
-GLASS = 0.15  # opacity of walls without end
-WIDER = 0.06  # by which a plane reaches over what moves on it, as part of the extent of that
+
+MAX_CONTACT_ARROWS = 300_000  # contact forces in a recording, at most
+LEVEL_COSINE = 0.999  # a plane whose normal is as near to up as this is the ground that every picture has
+WALL_OPACITY = 0.15  # opacity of walls without end
+PLANE_MARGIN = 0.06  # by which a plane reaches over what moves on it, as part of the extent of that
 
 
-def crowds(result: Result, every: np.ndarray) -> tuple[RecordedSet, ...]:
+def recorded_sets(result: Result, every: np.ndarray) -> tuple[RecordedSet, ...]:
     """Sets of bodies over the recorded times."""
     out = []
-    env = _environment(result)
+    env = _parameter_values(result)
     for name, bulk in result.bulk.items():
         e = result.model[name]
-        shapes = tuple(given_shape(s, resolve(s, env)) for s in e.shapes())
+        shapes = tuple(shape_from_solid(s, resolve(s, env)) for s in e.shapes())
         scale = None if e.scale is None else e.sizes()
         colors = (e.color,) if e.color else ()
         out.append(RecordedSet(name, shapes, bulk.origin[every], bulk.quaternion[every], colors, scale))
     return tuple(out)
 
 
-def _environment(result: Result) -> dict[str, float]:
+def _parameter_values(result: Result) -> dict[str, float]:
     return dict(zip(result.model.parameters, np.real(result.values.system.const).tolist(), strict=False))
 
 
-def grounds(result: Result, every: np.ndarray, moving: tuple[RecordedBody | RecordedSet, ...]) -> list[RecordedBody]:
+def ground_bodies(
+    result: Result, every: np.ndarray, moving: tuple[RecordedBody | RecordedSet, ...]
+) -> list[RecordedBody]:
     """What stands on ground; planes without end reach as far as things move."""
-    env, out = _environment(result), []
+    env, out = _parameter_values(result), []
     points = np.concatenate([np.zeros((0, 3)), *(np.asarray(b.p).reshape(-1, 3) for b in moving)])
     points = points[np.isfinite(points).all(axis=1)]
-    reach = max((extent(s) for b in moving for s in b.shapes), default=0.5)
+    reach = max((half_extent(s) for b in moving for s in b.shapes), default=0.5)
     for e in result.model.ground:
         p, R = frame_of(e, resolve(e, env))
         turn = tuple(matrix_to_quaternion(R).tolist())
@@ -55,56 +62,58 @@ def grounds(result: Result, every: np.ndarray, moving: tuple[RecordedBody | Reco
         for s in e.shapes():
             n = resolve(s, env)
             if not isinstance(s, Plane) or n.extent is not None:
-                solid.append(given_shape(s, n))
+                solid.append(shape_from_solid(s, n))
                 continue
             local = (points - p) @ R
-            level = abs(float(s.pose(n)[1][:, 2] @ R.T @ _up(result)))
+            level = abs(float(s.pose(n)[1][:, 2] @ R.T @ _up_direction(result)))
             if result.planar:
-                solid.append(_line(s.pose(n), local, reach))
-            elif level < LEVEL:  # the page has a level ground of its own
-                (glass if level < 1.0 - LEVEL else solid).append(_patch(s.pose(n), local, reach))
+                solid.append(_ground_line(s.pose(n), local, reach))
+            elif level < LEVEL_COSINE:  # the page has a level ground of its own
+                (glass if level < 1.0 - LEVEL_COSINE else solid).append(_plane_patch(s.pose(n), local, reach))
         walls = f"{e.name} (walls)" if solid else e.name
-        for name, shapes, opacity in ((e.name, solid, 1.0), (walls, glass, GLASS)):
+        for name, shapes, opacity in ((e.name, solid, 1.0), (walls, glass, WALL_OPACITY)):
             if shapes:
                 pose = np.tile(p, (len(every), 1)), np.tile(turn, (len(every), 1))
                 out.append(RecordedBody(name, tuple(shapes), *pose, e.color or "#9aa6b3", opacity))
     return out
 
 
-def _up(result: Result) -> np.ndarray:
+def _up_direction(result: Result) -> np.ndarray:
     g = np.real(np.asarray(result.values.system.gravity))
     size = float(np.sqrt(g @ g))
     return -g / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
 
 
-def _patch(pose: tuple[np.ndarray, np.ndarray], points: np.ndarray, reach: float) -> Shape:
+def _plane_patch(pose: tuple[np.ndarray, np.ndarray], points: np.ndarray, reach: float) -> Shape:
     """The part of a plane over which points lie, as a slab; all in the frame of what it is part of."""
     p, R = pose
-    middle, edge = _span((points - p) @ R, reach)
+    middle, edge = _covering_box((points - p) @ R, reach)
     thick = 0.02 * float(edge.max())
     at = p + R @ np.array([middle[0], middle[1], -thick / 2])
-    return Shape("box", (float(edge[0]), float(edge[1]), thick), three(at), tuple(matrix_to_quaternion(R).tolist()))
+    return Shape(
+        "box", (float(edge[0]), float(edge[1]), thick), float_triple(at), tuple(matrix_to_quaternion(R).tolist())
+    )
 
 
-def _line(pose: tuple[np.ndarray, np.ndarray], points: np.ndarray, reach: float) -> Shape:
+def _ground_line(pose: tuple[np.ndarray, np.ndarray], points: np.ndarray, reach: float) -> Shape:
     """The same in the plane: a strip behind a line."""
     p, n = pose[0], pose[1][:, 2]
     R = np.column_stack([np.array([n[1], -n[0], 0.0]), n, np.array([0.0, 0.0, 1.0])])
-    middle, edge = _span((points - p) @ R, reach)
+    middle, edge = _covering_box((points - p) @ R, reach)
     thick = 0.02 * float(edge.max())
     at = p + R @ np.array([middle[0], -thick / 2, 0.0])
-    return Shape("box", (float(edge[0]), thick, thick), three(at), tuple(matrix_to_quaternion(R).tolist()))
+    return Shape("box", (float(edge[0]), thick, thick), float_triple(at), tuple(matrix_to_quaternion(R).tolist()))
 
 
-def _span(points: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+def _covering_box(points: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
     """Middle and edges of a box around points, with room for bodies that reach so far."""
     if not len(points):
         return np.zeros(3), np.full(3, 4.0 * reach)
     low, high = points.min(axis=0) - 1.5 * reach, points.max(axis=0) + 1.5 * reach
-    return (low + high) / 2.0, (high - low) * (1.0 + 2.0 * WIDER)
+    return (low + high) / 2.0, (high - low) * (1.0 + 2.0 * PLANE_MARGIN)
 
 
-def touches(result: Result, every: np.ndarray) -> tuple[RecordedContacts | None, str]:
+def contact_arrows(result: Result, every: np.ndarray) -> tuple[RecordedContacts | None, str]:
     """Contact forces at the recorded times, and what had to be left out, in words.
 
     Forces are those on what moves: of two bodies on the second one.
@@ -115,8 +124,8 @@ def touches(result: Result, every: np.ndarray) -> tuple[RecordedContacts | None,
     rows = contacts.taken(every)
     note = ""
     begin, pair, point, force, state = rows.begin, rows.pair, rows.point, rows.force, rows.state
-    if len(rows) > ARROWS:
-        begin, (pair, point, force, state) = largest(rows)
+    if len(rows) > MAX_CONTACT_ARROWS:
+        begin, (pair, point, force, state) = largest_contacts(rows)
         note = f"the largest {len(pair)} of {len(rows)} are shown"
     still = pair[:, 1] == contacts.sides.span("ground")[0] if "ground" in contacts.sides.names else np.zeros(0, bool)
     if len(still):
@@ -124,10 +133,121 @@ def touches(result: Result, every: np.ndarray) -> tuple[RecordedContacts | None,
     return RecordedContacts(begin, point, force, state), note
 
 
-def largest(rows: Contacts) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+def largest_contacts(rows: Contacts) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
     """Where times begin, and pairs, points, forces and states of the largest forces, as many as are shown."""
     size = (rows.force**2).sum(axis=1)
     kept = np.zeros(len(size), bool)
-    kept[np.argpartition(-size, ARROWS)[:ARROWS]] = True
+    kept[np.argpartition(-size, MAX_CONTACT_ARROWS)[:MAX_CONTACT_ARROWS]] = True
     begin = np.r_[0, np.cumsum(np.bincount(rows.when[kept], minlength=len(rows.t)))]
     return begin, tuple(a[kept] for a in (rows.pair, rows.point, rows.force, rows.state))
+
+
+MIN_ARROW_PART = 1e-5  # arrows that never reach this part of the largest of their kind cannot be seen and are left out
+MAX_ARROW_NUMBERS = 600_000  # in the arrows of a recording, at most
+
+
+def force_arrows(
+    result: Result, places: AttachedFrames, every: np.ndarray, instead: np.ndarray
+) -> tuple[RecordedArrow, ...]:
+    """Every arrow that can be seen; of a mechanism with very many parts those of evenly chosen ones.
+
+    Reactions are those on ``body_j`` at the joint's point there. What acts along a line, a spring for instance, acts
+    on both of its ends; ends on ground are left out. ``instead`` are times to take where there is no value at a time.
+    """
+    most = max(1, MAX_ARROW_NUMBERS // (3 * len(every)))
+    out = [
+        RecordedArrow(name, group, what, end.body, float_triple(end.p), _values_at(vector, every, instead))
+        for name, group, what, end, vector in _all_arrows(result, places, most)
+        if np.isfinite(vector).any()
+    ]
+    size = [float(np.nanmax(np.abs(a.vector), initial=0.0)) for a in out]
+    largest = {what: max((s for a, s in zip(out, size) if a.what == what), default=0.0) for what in ("force", "moment")}
+    seen = [k for k, a in enumerate(out) if size[k] > MIN_ARROW_PART * largest[a.what]]
+    rank = sorted(seen, key=lambda k: -size[k] / largest[out[k].what])
+    return tuple(out[k] for k in sorted(rank[:most]))
+
+
+def _values_at(vector: np.ndarray, every: np.ndarray, instead: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(vector[every]).all(axis=1)[:, None], vector[every], vector[instead])
+
+
+ArrowData = tuple[str, str, str, AttachedFrame, np.ndarray]
+
+
+def _all_arrows(result: Result, places: AttachedFrames, most: int) -> Iterator[ArrowData]:
+    for joint in evenly_chosen(result.model.joints, most):
+        M = places.end(joint.name, "M")
+        if M is not None:
+            force, torque = result[joint.name].reaction()
+            yield from _force_and_moment(joint.name, "reaction", M, force, torque)
+    for e in evenly_chosen([*result.model.forces, *result.model.limits], most):
+        yield from _element_arrows(result, places, e)
+    for driver in result.model.drivers:
+        yield from _coordinate_arrow(result, places, driver.name, driver.coordinate, result[driver.name].effort)
+
+
+def _force_and_moment(
+    name: str, group: str, end: AttachedFrame, force: np.ndarray, torque: np.ndarray
+) -> Iterator[ArrowData]:
+    for what, vector in (("force", force), ("moment", torque)):
+        if np.any(vector):
+            yield name, group, what, end, vector
+
+
+def _element_arrows(result: Result, places: AttachedFrames, e: Any) -> Iterator[ArrowData]:
+    """A force element's arrows, by what it acts on: a rope's points, a coordinate, or frames."""
+    view = result[e.name]
+    if places.end(e.name, "P0") is not None:
+        yield from _rope_arrows(places, e.name, view)
+        return
+    M = places.end(e.name, "M")
+    if M is None:
+        texts = e.along() if isinstance(e, CoordinateForce) else ()
+        effort = getattr(view, list(e.outputs)[2]) if texts else None
+        weights = e.switch_weights(result.values.numbers[e.name], "") if texts else ()
+        for text, weight in zip(texts, weights or (1.0,) * len(texts), strict=True):
+            yield from _coordinate_arrow(result, places, e.name, text, weight * effort)
+        return
+    force, torque = view.wrench
+    if isinstance(e, BodyForce):
+        yield from _force_and_moment(e.name, "load", M, force, torque)
+        return
+    F = places.end(e.name, "F")
+    if not M.grounded:
+        yield from _force_and_moment(e.name, "element", M, force, torque)
+    if F is not None and not F.grounded and (M.grounded or e.drawn in ("spring", "damper")):
+        yield from _force_and_moment(e.name, "element", F, -force, -torque)
+
+
+def _rope_arrows(places: AttachedFrames, name: str, view: Any) -> Iterator[ArrowData]:
+    """The rope pulls each of its points towards its neighbours."""
+    ends = rope_ends(places, name)
+    points = [places.track(end)[0] for end in ends]
+    steps = [b - a for a, b in pairwise(points)]
+    units = [d / np.maximum(np.sqrt((d * d).sum(axis=1)), 1e-300)[:, None] for d in steps]
+    nothing = np.zeros_like(points[0])
+    for k, end in enumerate(ends):
+        after = units[k] if k < len(units) else nothing
+        before = units[k - 1] if k > 0 else nothing
+        if not end.grounded:
+            yield name, "element", "force", end, view.tension[:, None] * (after - before)
+
+
+def rope_ends(places: AttachedFrames, name: str) -> list[AttachedFrame]:
+    """The frames P0, P1, ... of an element that runs over several points."""
+    out: list[AttachedFrame] = []
+    while (end := places.end(name, f"P{len(out)}")) is not None:
+        out.append(end)
+    return out
+
+
+def _coordinate_arrow(
+    result: Result, places: AttachedFrames, name: str, coordinate: str, effort: np.ndarray
+) -> Iterator[ArrowData]:
+    """An effort along a coordinate of a joint or a point: a force or moment on the second body."""
+    e = result.model[name]
+    owner, what = result.model.coordinate(coordinate, e)
+    base, end = coordinate_frames_of(e, owner, what, places)
+    if base is not None and end is not None:
+        kind = "moment" if is_rotational(owner, what) else "force"
+        yield name, "element", kind, end, effort[:, None] * coordinate_axis(owner, what, base, places)

@@ -8,11 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..element import Point, element
-from .form import Form
-from .outline import polygon
-from .rules import three_lengths
-from .solid import FINE, Solid
-from .surface import extrude
+from .geometry import ConvexPart, extrude, polygon_outline
+from .solid import RESOLUTION, Solid, three_lengths
 
 
 @element
@@ -36,20 +33,20 @@ class Box(Solid):
         x, y, z = n.edges
         return (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Itself."""
         half = np.array(n.edges) / 2
-        return (Form("BOX", tuple(half.tolist()), np.sqrt(half @ half)),)
+        return (ConvexPart("BOX", tuple(half.tolist()), np.sqrt(half @ half)),)
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """The outline of its corners: a rectangle, if it is not tilted out of the plane."""
-        return (polygon(self.mesh(n)[0]),)
+        return (polygon_outline(self.mesh(n)[0]),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """The edges."""
         return tuple(n.edges)
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """Twelve triangles."""
         x, y, z = n.edges
         return extrude(np.array([(-x, -y), (x, -y), (x, y), (-x, y)]) / 2, z)

@@ -10,10 +10,8 @@ import numpy as np
 
 from ..element import element
 from .cylinder import Cylinder
-from .form import Form
-from .outline import polygon
-from .solid import FINE
-from .surface import arc, lathe, on_axis
+from .geometry import ConvexPart, arc, lathe, polygon_outline, snapped_to_axis
+from .solid import RESOLUTION
 
 
 @element
@@ -31,17 +29,17 @@ class Capsule(Cylinder):
         across = rod * (3 * r**2 + length**2) / 12 + balls * (0.4 * r**2 + length**2 / 4 + 3 / 8 * length * r)
         return across, across, rod * r**2 / 2 + balls * 0.4 * r**2
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Itself."""
-        return (Form("CAPSULE", (n.radius, n.length / 2), n.radius + n.length / 2),)
+        return (ConvexPart("CAPSULE", (n.radius, n.length / 2), n.radius + n.length / 2),)
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """A segment and all within the radius of it."""
         p, R = self.pose(n)
-        return (polygon(np.array([p - R[:, 2] * n.length / 2, p + R[:, 2] * n.length / 2]), n.radius),)
+        return (polygon_outline(np.array([p - R[:, 2] * n.length / 2, p + R[:, 2] * n.length / 2]), n.radius),)
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """Two domes and the side between them."""
         r, h, quarter = n.radius, n.length / 2, max(fine // 4, 1)
         domes = arc((0, -h), r, -pi / 2, 0.0, quarter), arc((0, h), r, 0.0, pi / 2, quarter)
-        return lathe(on_axis(np.vstack(domes)), fine)
+        return lathe(snapped_to_axis(np.vstack(domes)), fine)

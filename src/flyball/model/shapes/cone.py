@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..element import Length, element, positive
-from .form import Form
-from .outline import around_axis
-from .solid import FINE, Solid
-from .surface import lathe
+from .geometry import ConvexPart, lathe, revolved_outline
+from .solid import RESOLUTION, Solid
 
 
 @element
@@ -40,18 +38,18 @@ class Cone(Solid):
         """A quarter of the height above the base."""
         return 0.0, 0.0, n.height / 4
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Itself."""
-        return (Form("CONE", (n.radius, n.height), np.maximum(n.radius, n.height)),)
+        return (ConvexPart("CONE", (n.radius, n.height), np.maximum(n.radius, n.height)),)
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """A circle, or a triangle from the side."""
-        return (around_axis(self, *self.pose(n), n.radius, [(n.radius, 0.0), (0.0, n.height)]),)
+        return (revolved_outline(self, *self.pose(n), n.radius, [(n.radius, 0.0), (0.0, n.height)]),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Radius and height."""
         return n.radius, n.height
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """Base and mantle."""
         return lathe(np.array([(0, 0), (n.radius, 0), (0, n.height)]), fine)

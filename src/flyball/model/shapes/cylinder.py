@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..element import Length, element, positive
-from .form import Form
-from .outline import around_axis
-from .solid import FINE, Solid
-from .surface import lathe
+from .geometry import ConvexPart, lathe, revolved_outline
+from .solid import RESOLUTION, Solid
 
 
 @element
@@ -36,21 +34,21 @@ class Cylinder(Solid):
         k = (3 * n.radius**2 + n.length**2) / 12
         return k, k, n.radius**2 / 2
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Itself."""
         r, h = self.size(n)[0], self.size(n)[-1] / 2
-        return (Form("CYLINDER", (r, h), np.hypot(r, h)),)
+        return (ConvexPart("CYLINDER", (r, h), np.hypot(r, h)),)
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """A circle, or a rectangle from the side."""
         r, h = self.size(n)[0], self.size(n)[-1] / 2
-        return (around_axis(self, *self.pose(n), r, [(r, -h), (r, h)]),)
+        return (revolved_outline(self, *self.pose(n), r, [(r, -h), (r, h)]),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Radius and length."""
         return n.radius, n.length
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """Two discs and the side."""
         r, h = n.radius, n.length / 2
         return lathe(np.array([(0, -h), (r, -h), (r, h), (0, h)]), fine)

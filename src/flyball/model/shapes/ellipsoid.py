@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..element import Point, element
-from .form import Form
-from .rules import three_lengths
-from .solid import FINE, Solid
-from .surface import arc, lathe, on_axis
+from .geometry import ConvexPart, arc, lathe, snapped_to_axis
+from .solid import RESOLUTION, Solid, three_lengths
 
 
 @element
@@ -36,15 +34,15 @@ class Ellipsoid(Solid):
         a, b, c = n.semi_axes
         return (b * b + c * c) / 5, (a * a + c * c) / 5, (a * a + b * b) / 5
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Itself."""
-        return (Form("ELLIPSOID", tuple(n.semi_axes), np.max(n.semi_axes)),)
+        return (ConvexPart("ELLIPSOID", tuple(n.semi_axes), np.max(n.semi_axes)),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """The semi-axes."""
         return tuple(n.semi_axes)
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """A ball, stretched."""
-        v, f = lathe(on_axis(arc((0, 0), 1.0, -pi / 2, pi / 2, fine // 2)), fine)
+        v, f = lathe(snapped_to_axis(arc((0, 0), 1.0, -pi / 2, pi / 2, fine // 2)), fine)
         return v * np.array(n.semi_axes), f

@@ -11,9 +11,9 @@ import numpy as np
 
 from ...errors import ModelError
 from ..element import Length, element, positive
-from .form import Form
-from .mesh import rows_of
-from .solid import FINE, Surface
+from .geometry import ConvexPart
+from .mesh import number_rows
+from .solid import RESOLUTION, Surface
 
 
 @element
@@ -30,7 +30,7 @@ class HeightField(Surface):
         Width of a cell along x and y; ``dy`` equals ``dx`` if not given.
     """
 
-    heights: Annotated[Any, rows_of(float)] = field(repr=False)
+    heights: Annotated[Any, number_rows(float)] = field(repr=False)
     dx: Length
     dy: Length | None = None
 
@@ -44,7 +44,7 @@ class HeightField(Surface):
             )
         super().check(n)
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Itself: the heights three a row, those of the first x first."""
         z = np.array(self.heights)
         rows = np.zeros(-(-z.size // 3) * 3)
@@ -52,13 +52,13 @@ class HeightField(Surface):
         v = self.surface(n)[0]
         reach = np.sqrt((v**2).sum(axis=1)).max()
         par = (float(z.shape[0]), float(z.shape[1]), n.dx, n.dx if n.dy is None else n.dy)
-        return (Form("FIELD", par, reach, vertex=rows.reshape(-1, 3)),)
+        return (ConvexPart("FIELD", par, reach, vertex=rows.reshape(-1, 3)),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Edges of the box around it."""
         return tuple(np.ptp(self.surface(n)[0], axis=0).tolist())
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """Two triangles a cell; it is open."""
         z = np.array(self.heights)
         i, j = np.indices(z.shape)

@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..element import element
-from .form import Form
-from .outline import ALONG, circle, polygon
-from .solid import FINE
+from .geometry import ALIGNMENT_TOLERANCE, ConvexPart, arc, circle_outline, lathe, polygon_outline, snapped_to_axis
+from .solid import RESOLUTION
 from .sphere import Sphere
-from .surface import arc, lathe, on_axis
 
 OUTLINE = 128  # corners of a circle's outline
 
@@ -35,18 +33,18 @@ class Hemisphere(Sphere):
         k = 83 / 320 * n.radius**2
         return k, k, 0.4 * n.radius**2
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Itself."""
-        return (Form("HEMISPHERE", (n.radius,), n.radius),)
+        return (ConvexPart("HEMISPHERE", (n.radius,), n.radius),)
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Seen along its axis a circle; else a polygon about half a circle, or about what is between."""
         p, R = self.pose(n)
-        if np.hypot(*R[:2, 2]) < ALONG:
-            return (circle(n.radius, p),)
-        return (polygon(p + self.surface(n, OUTLINE)[0] @ R.T),)
+        if np.hypot(*R[:2, 2]) < ALIGNMENT_TOLERANCE:
+            return (circle_outline(n.radius, p),)
+        return (polygon_outline(p + self.surface(n, OUTLINE)[0] @ R.T),)
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """The flat side and the dome."""
         dome = arc((0, 0), n.radius, 0.0, pi / 2, max(fine // 4, 1))
-        return lathe(on_axis(np.vstack([(0.0, 0.0), dome])), fine)
+        return lathe(snapped_to_axis(np.vstack([(0.0, 0.0), dome])), fine)

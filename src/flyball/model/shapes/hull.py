@@ -12,11 +12,9 @@ import numpy as np
 
 from ...errors import ModelError
 from ..element import Length, element, positive
-from .form import Form
-from .mesh import rows_of
-from .outline import polygon
-from .polyhedron import Integrals, flaws, integrals
-from .solid import FINE, Solid
+from .geometry import ConvexPart, Integrals, polygon_outline, polyhedron_integrals, surface_defects
+from .mesh import number_rows
+from .solid import RESOLUTION, Solid
 
 
 @element
@@ -31,7 +29,7 @@ class Hull(Solid):
         Length of one unit of the vertices: ``"1 mm"``.
     """
 
-    vertices: Annotated[Any, rows_of(float)] = field(repr=False)
+    vertices: Annotated[Any, number_rows(float)] = field(repr=False)
     scale: Length = 1.0
 
     def check(self, n: SimpleNamespace) -> None:
@@ -42,7 +40,7 @@ class Hull(Solid):
             raise ModelError(
                 f"{self.title}: vertices must be four or more points of three finite numbers, got {reprlib.repr(p)}"
             )
-        if flaws(*self._triangles):
+        if surface_defects(*self._triangles):
             raise ModelError(f"{self.title}: its vertices lie in one plane; give it a thickness")
         super().check(n)
 
@@ -67,7 +65,7 @@ class Hull(Solid):
 
     @cached_property
     def _integrals(self) -> Integrals:
-        return integrals(*self._triangles)
+        return polyhedron_integrals(*self._triangles)
 
     def volume(self, n: SimpleNamespace) -> Any:
         """By Gauss's theorem."""
@@ -81,20 +79,20 @@ class Hull(Solid):
         """By Gauss's theorem; its axes need not be principal ones."""
         return self._integrals.gyration * n.scale**2
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Itself."""
         v = self._triangles[0] * n.scale
-        return (Form("HULL", (0.0,), np.sqrt((v**2).sum(axis=1)).max(), vertex=v),)
+        return (ConvexPart("HULL", (0.0,), np.sqrt((v**2).sum(axis=1)).max(), vertex=v),)
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """The outline of its corners."""
-        return (polygon(self.mesh(n)[0]),)
+        return (polygon_outline(self.mesh(n)[0]),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Edges of the box around it."""
         return tuple((np.ptp(self._triangles[0], axis=0) * n.scale).tolist())
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """Its triangles."""
         v, f = self._triangles
         return v * n.scale, f

@@ -9,14 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...errors import ModelError
-from ...math.products import inner, product
+from ...math.vec import inner_product, matrix_product
 from ..element import Direction, Length, Point, element, positive
 from ..geometry import vector
-from .form import Form
-from .outline import ALONG, OBLIQUE, polygon
+from .geometry import ALIGNMENT_TOLERANCE, OBLIQUE_REMEDY, ConvexPart, arc, extrude, polygon_outline
 from .rod import ends
-from .solid import FINE, Solid
-from .surface import arc, extrude
+from .solid import RESOLUTION, Solid
 
 
 @element
@@ -58,11 +56,11 @@ class Link(Solid):
             z = np.array([1.0, 0, 0] if (x[:2].real ** 2).sum() < 1e-12 else [0, 0, 1.0])
         else:
             z = vector(n.normal, False, f"normal of {self.title}", direction=True)
-        z = z - inner(z, x) * x
-        if not inner(z, z).real > 1e-12:
+        z = z - inner_product(z, x) * x
+        if not inner_product(z, z).real > 1e-12:
             raise ModelError(f"{self.title}: its normal {tuple(n.normal)} points along the bar; it must point across")
-        z = z / np.sqrt(inner(z, z))
-        return p + product(R, middle), product(R, np.column_stack([x, np.cross(z, x), z]))
+        z = z / np.sqrt(inner_product(z, z))
+        return p + matrix_product(R, middle), matrix_product(R, np.column_stack([x, np.cross(z, x), z]))
 
     def volume(self, n: SimpleNamespace) -> Any:
         """V = (l w + pi r^2) t, with r = w / 2."""
@@ -81,27 +79,29 @@ class Link(Solid):
         z2 = n.thickness**2 / 12
         return y2 + z2, x2 + z2, x2 + y2
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """The bar between the centres of its ends, and a disc about either."""
         h, r, t = ends(self, n)[2] / 2, n.width / 2, n.thickness / 2
-        middle = Form("BOX", (h, r, t), np.sqrt(h * h + r * r + t * t))
-        return middle, *(Form("CYLINDER", (r, t), np.sqrt(r * r + t * t), np.array([x, 0.0, 0.0])) for x in (-h, h))
+        middle = ConvexPart("BOX", (h, r, t), np.sqrt(h * h + r * r + t * t))
+        return middle, *(
+            ConvexPart("CYLINDER", (r, t), np.sqrt(r * r + t * t), np.array([x, 0.0, 0.0])) for x in (-h, h)
+        )
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """A segment with round ends; what there is to see from the side."""
         p, R = self.pose(n)
-        flat = np.hypot(*R[:2, 2]) < ALONG
-        if not flat and np.sort(np.abs(R[2]))[1] < ALONG:  # from the side
-            return (polygon(self.mesh(n)[0]),)
+        flat = np.hypot(*R[:2, 2]) < ALIGNMENT_TOLERANCE
+        if not flat and np.sort(np.abs(R[2]))[1] < ALIGNMENT_TOLERANCE:  # from the side
+            return (polygon_outline(self.mesh(n)[0]),)
         if not flat:
-            raise ModelError(f"{self.title}: {OBLIQUE}")
-        return (polygon(np.array([p + s * R[:, 0] * ends(self, n)[2] / 2 for s in (-1.0, 1.0)]), n.width / 2),)
+            raise ModelError(f"{self.title}: {OBLIQUE_REMEDY}")
+        return (polygon_outline(np.array([p + s * R[:, 0] * ends(self, n)[2] / 2 for s in (-1.0, 1.0)]), n.width / 2),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Length between the ends' centres, width and thickness."""
         return ends(self, n)[2], n.width, n.thickness
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """The outline, extruded."""
         h, r, half = ends(self, n)[2] / 2, n.width / 2, max(fine // 2, 1)
         round_ends = arc((h, 0), r, -pi / 2, pi / 2, half), arc((-h, 0), r, pi / 2, 3 * pi / 2, half)

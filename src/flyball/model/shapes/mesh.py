@@ -18,14 +18,13 @@ from pydantic import BeforeValidator
 
 from ...errors import ModelError
 from ..element import Length, element, positive
-from .form import Form, surface_form
-from .polyhedron import Integrals, flaws, integrals, welded
-from .solid import FINE, Solid
+from .geometry import ConvexPart, Integrals, polyhedron_integrals, surface_defects, surface_part, weld_vertices
+from .solid import RESOLUTION, Solid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-KINDS = (".stl", ".obj", ".ply", ".off")
+MESH_FORMATS = (".stl", ".obj", ".ply", ".off")
 _FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
 
 
@@ -39,7 +38,7 @@ def paths_from(folder: str | os.PathLike | None) -> Iterator[None]:
         _FOLDER.reset(token)
 
 
-def folder() -> Path:
+def current_folder() -> Path:
     """The folder that relative paths are counted from."""
     return _FOLDER.get() or Path.cwd()
 
@@ -54,15 +53,15 @@ class Triangulation:
     @cached_property
     def flaws(self) -> str:
         """Why it has no inside, or nothing."""
-        return flaws(self.v, self.f)
+        return surface_defects(self.v, self.f)
 
     @cached_property
     def integrals(self) -> Integrals:
         """Volume, centre, inertia."""
-        return integrals(self.v, self.f)
+        return polyhedron_integrals(self.v, self.f)
 
 
-def rows_of(kind: type) -> Any:
+def number_rows(kind: type) -> Any:
     """Rows of plain numbers become tuples, quickly; what is none is left as it is, to be refused with all the rest."""
 
     def convert(value: Any) -> Any:
@@ -105,13 +104,13 @@ class Mesh(Solid):
     """
 
     path: Annotated[str | None, BeforeValidator(_text)] = None
-    vertices: Annotated[Any, rows_of(float)] = field(default=None, repr=False)
-    faces: Annotated[Any, rows_of(int)] = field(default=None, repr=False)
+    vertices: Annotated[Any, number_rows(float)] = field(default=None, repr=False)
+    faces: Annotated[Any, number_rows(int)] = field(default=None, repr=False)
     scale: Length = 1.0
 
     def __post_init__(self) -> None:
         """Remember the folder that a relative path is counted from."""
-        object.__setattr__(self, "_folder", folder())
+        object.__setattr__(self, "_folder", current_folder())
 
     def _key(self) -> tuple:
         return tuple(self.file if f.name == "path" else getattr(self, f.name) for f in fields(self))
@@ -176,7 +175,7 @@ class Mesh(Solid):
 
     @cached_property
     def _given(self) -> Triangulation:
-        return Triangulation(*welded(np.array(self.vertices, float), np.array(self.faces, int)))
+        return Triangulation(*weld_vertices(np.array(self.vertices, float), np.array(self.faces, int)))
 
     @property
     def triangulation(self) -> Triangulation:
@@ -191,7 +190,7 @@ class Mesh(Solid):
             return self._given
         try:
             stat = os.stat(self.file)
-            return read(self.file, stat.st_mtime_ns, stat.st_size)
+            return read_mesh(self.file, stat.st_mtime_ns, stat.st_size)
         except FileNotFoundError:
             folder = Path(self.file).parent
             there = [p.name for p in folder.iterdir()] if folder.is_dir() else []
@@ -224,7 +223,7 @@ class Mesh(Solid):
         """By Gauss's theorem; its axes need not be principal ones."""
         return self._integrals().gyration * n.scale**2
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Its surface, from which convex parts are made.
 
         Raises
@@ -232,11 +231,11 @@ class Mesh(Solid):
         ModelError
             If it is not closed.
         """
-        return (surface_form(self._closed(self.surface(n))),)
+        return (surface_part(self._closed(self.surface(n))),)
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """The outlines of its convex parts."""
-        return (surface_form(self._closed(self.mesh(n))),)
+        return (surface_part(self._closed(self.mesh(n))),)
 
     def _closed(self, surface: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         if flaw := self.triangulation.flaws:
@@ -250,13 +249,13 @@ class Mesh(Solid):
         """Edges of the box around it."""
         return tuple((np.ptp(self.triangulation.v, axis=0) * n.scale).tolist())
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """Its triangles."""
         return self.triangulation.v * n.scale, self.triangulation.f
 
 
 @lru_cache(maxsize=256)
-def read(file: str, *stamp: int) -> Triangulation:
+def read_mesh(file: str, *stamp: int) -> Triangulation:
     """The triangles of a file; ``stamp`` says which state of it, so that one that has changed is read again.
 
     Raises
@@ -265,8 +264,10 @@ def read(file: str, *stamp: int) -> Triangulation:
         If trimesh is not installed, or cannot read it.
     """
     kind = Path(file).suffix.lower()
-    if kind not in KINDS:
-        raise ModelError(f"{kind or 'a file without a suffix'} is no kind of mesh; export it as {', '.join(KINDS)}")
+    if kind not in MESH_FORMATS:
+        raise ModelError(
+            f"{kind or 'a file without a suffix'} is no kind of mesh; export it as {', '.join(MESH_FORMATS)}"
+        )
     try:
         import trimesh
     except ImportError:
@@ -278,4 +279,4 @@ def read(file: str, *stamp: int) -> Triangulation:
         raise ModelError(f"{file!r} cannot be read as {kind[1:].upper()}: {error}") from None
     if v.ndim != 2 or not np.isfinite(v).all():
         raise ModelError(f"{file!r} has vertices that are no points")
-    return Triangulation(*welded(v, f))
+    return Triangulation(*weld_vertices(v, f))

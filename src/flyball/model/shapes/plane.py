@@ -9,9 +9,8 @@ import numpy as np
 from ...errors import ModelError
 from ..element import Direction, Length, element, positive
 from ..geometry import triad, vector
-from .form import Form
-from .solid import FINE, Surface, point
-from .surface import extrude
+from .geometry import ConvexPart, extrude
+from .solid import RESOLUTION, Surface, spatial_point
 
 
 @element
@@ -39,18 +38,20 @@ class Plane(Surface):
         super().check(n)
 
     def _normal(self, n: SimpleNamespace) -> np.ndarray:
-        return vector(point(n.normal, f"normal of {self.title}"), False, f"normal of {self.title}", direction=True)
+        return vector(
+            spatial_point(n.normal, f"normal of {self.title}"), False, f"normal of {self.title}", direction=True
+        )
 
     def pose(self, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
         """Its frame, with z along the normal."""
         p, R = super().pose(n)
         return (p, R) if n.normal is None else (p, R @ triad(self._normal(n)))
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """The half-space below z = 0."""
-        return (Form("PLANE", (), np.inf),)
+        return (ConvexPart("PLANE", (), np.inf),)
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """The half-plane behind its normal, which lies in the plane of the mechanism."""
         p, R = self.pose(n)
         x, y, z = R[:, 2].tolist()
@@ -60,13 +61,13 @@ class Plane(Surface):
                 f"({x:g}, {y:g}, {z:g})"
             )
         axes = np.array([[-y, 0.0, x], [x, 0.0, y], [0.0, 1.0, 0.0]])  # y is the normal of the mechanism's plane
-        return (Form("PLANE", (), np.inf, np.array([p[0], p[1], 0.0]), axes),)
+        return (ConvexPart("PLANE", (), np.inf, np.array([p[0], p[1], 0.0]), axes),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Edge of the patch that is shown; 1 m where nothing says it."""
         return (1.0 if n.extent is None else n.extent,)
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """A patch, as a thin slab below the plane."""
         a = self.size(n)[0]
         v, f = extrude(np.array([(-a, -a), (a, -a), (a, a), (-a, a)]) / 2, a / 200)

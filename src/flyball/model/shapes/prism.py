@@ -9,9 +9,8 @@ import numpy as np
 
 from ...errors import ModelError
 from ..element import Length, Numbers, Unit, element, positive
-from .form import Form, surface_form
-from .solid import FINE, Solid
-from .surface import cross, extrude
+from .geometry import ConvexPart, extrude, planar_cross, surface_part
+from .solid import RESOLUTION, Solid
 
 Outline = Annotated[tuple[Numbers, ...], Unit("m")]
 
@@ -76,15 +75,15 @@ class Prism(Solid):
         """The thickness."""
         return (n.thickness,)
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Its surface: one convex part, or several."""
-        return (surface_form(self.surface(n)),)
+        return (surface_part(self.surface(n)),)
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """The outline of each part."""
-        return (surface_form(self.mesh(n)),)
+        return (surface_part(self.mesh(n)),)
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """The outline, extruded."""
         p = self._corners(n)
         return extrude(p if _moments(p)[0] > 0 else p[::-1], n.thickness)
@@ -98,7 +97,7 @@ def _moments(p: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray]:
     """
     a = p - p[0]
     b = np.roll(a, -1, axis=0)
-    A = cross(a, b) / 2
+    A = planar_cross(a, b) / 2
     area = A.sum()
     if area == 0.0:
         return area, p[0], np.zeros((2, 2))
@@ -115,8 +114,8 @@ def _crossing(p: np.ndarray) -> tuple[int, int] | None:
     for i in range(k - 1):
         a, b = p[i], q[i]
         c, d = p[i + 1 :], q[i + 1 :]
-        one, two = cross(b - a, c - a), cross(b - a, d - a)
-        three, four = cross(d - c, a - c), cross(d - c, b - c)
+        one, two = planar_cross(b - a, c - a), planar_cross(b - a, d - a)
+        three, four = planar_cross(d - c, a - c), planar_cross(d - c, b - c)
         hit = (one * two <= 0) & (three * four <= 0) & _overlap(a, b, c, d)
         hit[0] = _turns_back(a, b, d[0])  # the next side begins where this one ends
         if i == 0:
@@ -134,4 +133,4 @@ def _overlap(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.n
 
 def _turns_back(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
     """Whether the way a, b, c goes back on itself at b, or does not leave it."""
-    return bool(cross(b - a, c - b) == 0.0 and (b - a) @ (c - b) <= 0.0)
+    return bool(planar_cross(b - a, c - b) == 0.0 and (b - a) @ (c - b) <= 0.0)

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...errors import ModelError
-from ...math.products import product
+from ...math.vec import matrix_product
 from ..element import Length, Point, element, positive
 from ..geometry import triad
 from .cylinder import Cylinder
-from .solid import FINE, Solid, point
+from .solid import RESOLUTION, Solid, spatial_point
 
 ROUND = Cylinder(radius=1.0, length=1.0)  # for its formulas, which take the numbers from elsewhere
 
@@ -25,7 +25,7 @@ def ends(solid: Any, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray, Any]:
     ModelError
         If they are the same point.
     """
-    a, b = (point(getattr(n, k), f"{k} of {solid.title}") for k in ("start", "end"))
+    a, b = (spatial_point(getattr(n, k), f"{k} of {solid.title}") for k in ("start", "end"))
     length = np.sqrt(((b - a) ** 2).sum())
     if not length.real > 0.0:
         raise ModelError(f"{solid.title}: start and end are the same point, {tuple(a.tolist())}")
@@ -54,7 +54,7 @@ class Rod(Solid):
         """The middle, and axes with z along the bar; ``position`` and ``orientation`` move all of it."""
         p, R = super().pose(n)
         middle, axis, _ = ends(self, n)
-        return p + product(R, middle), product(R, triad(axis))
+        return p + matrix_product(R, middle), matrix_product(R, triad(axis))
 
     def _bar(self, n: SimpleNamespace) -> SimpleNamespace:
         return SimpleNamespace(radius=n.radius, length=ends(self, n)[2])
@@ -74,6 +74,6 @@ class Rod(Solid):
         """Radius and length."""
         return n.radius, ends(self, n)[2]
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """That of a cylinder."""
         return ROUND.surface(self._bar(n), fine)

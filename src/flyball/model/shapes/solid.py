@@ -1,4 +1,4 @@
-"""What every shape is: placed on a body, with a volume, a centre of mass, an inertia and a surface to draw."""
+"""What every shape declares: pose, volume, centre of mass, inertia, collision geometry, surface to draw."""
 
 from __future__ import annotations
 
@@ -11,18 +11,29 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...errors import ModelError
-from ...math.products import product
+from ...math.vec import matrix_product
 from ..element import Density, Element, Flag, Mass, Name, Point, positive
-from ..geometry import orientation_matrix, vector
-from ..orientation import Orientation
-from .form import Form
-from .surface import arc, lathe, on_axis
+from ..geometry import Orientation, orientation_matrix, vector
+from .geometry import ConvexPart, arc, lathe, snapped_to_axis
 
-FINE = 32  # corners of a circle in a picture
-MOST = 7  # parameters of a convex solid
+
+def three_lengths(solid: Solid, field: str, value: Any) -> None:
+    """Refuse anything but three lengths greater than zero."""
+    if len(value) != 3 or any(isinstance(x, tuple) or not x.real > 0 for x in value):
+        raise ModelError(f"{solid.title}: {field} must be three lengths greater than 0, got {value}")
+
+
+def smaller(solid: Solid, field: str, value: Any, other: str, limit: Any) -> None:
+    """Refuse a length that is not smaller than another."""
+    if not value.real < limit.real:
+        raise ModelError(f"{solid.title}: {field} is {value:g} m; it must be smaller than its {other}, {limit:g} m")
+
+
+RESOLUTION = 32  # corners of a circle in a picture
+MAX_PARAMETERS = 7  # parameters of a convex solid
 DIRECTIONS = tuple(d for d in itertools.product((-1.0, 0.0, 0.6, 1.0), repeat=3) if any(d))
 """Directions in which a support function is tried: along axes, in their planes, and others."""
-OTHERWISE = (
+CONTACT_REMEDY = (
     "give it contact=False, and the body shapes that can stand for it, such as Cylinder(..., looks=True, contact=True)"
 )
 
@@ -105,7 +116,7 @@ class Solid(Element):
         """Whether it may touch others."""
         return not (self.hole or self.looks) if self.contact is None else self.contact
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """What it is where it touches others in space: convex parts, in its own frame.
 
         Raises
@@ -113,9 +124,9 @@ class Solid(Element):
         ModelError
             If there is nothing like that.
         """
-        raise ModelError(f"{self.title}: {type(self).__name__} has no form that contact knows; {OTHERWISE}")
+        raise ModelError(f"{self.title}: {type(self).__name__} has no form that contact knows; {CONTACT_REMEDY}")
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """What it is where it touches others in a planar mechanism: convex parts of its outline, seen along z.
 
         They are in the body's reference frame, at z = 0.
@@ -125,7 +136,7 @@ class Solid(Element):
         ModelError
             If there is nothing like that.
         """
-        raise ModelError(f"{self.title}: {type(self).__name__} has no outline that contact knows; {OTHERWISE}")
+        raise ModelError(f"{self.title}: {type(self).__name__} has no outline that contact knows; {CONTACT_REMEDY}")
 
     def volume(self, n: SimpleNamespace) -> Any:
         """Volume [m^3]."""
@@ -146,7 +157,7 @@ class Solid(Element):
         """Numbers for drawing it [m]."""
         raise NotImplementedError
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """Vertices (k, 3) [m] in its own frame and triangles (m, 3), counter-clockwise seen from outside.
 
         ``fine`` is the number of corners of a circle; the surface is closed whatever it is.
@@ -155,7 +166,7 @@ class Solid(Element):
 
     def pose(self, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
         """Origin and axes of its own frame in the body's reference frame."""
-        return point(n.position, f"position of {self.title}"), orientation_matrix(
+        return spatial_point(n.position, f"position of {self.title}"), orientation_matrix(
             n.orientation, f"orientation of {self.title}"
         )
 
@@ -163,8 +174,8 @@ class Solid(Element):
         """Centre of mass [m] and inertia per unit mass [m^2] about it, in the body's reference frame."""
         p, R = self.pose(n)
         k = np.asarray(self.gyration(n))
-        inertia = product(product(R, np.diag(k) if k.ndim == 1 else k), R.T)
-        return p + product(R, np.asarray(self.centre(n))), inertia
+        inertia = matrix_product(matrix_product(R, np.diag(k) if k.ndim == 1 else k), R.T)
+        return p + matrix_product(R, np.asarray(self.centre(n))), inertia
 
     def mesh(self, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
         """Its surface for drawing: vertices (k, 3) [m] in the body's reference frame and triangles (m, 3)."""
@@ -189,7 +200,7 @@ class ConvexSolid(Solid):
         """Up to seven numbers for the support function; ``n`` has the fields in SI units."""
         return ()
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Itself, within a sphere about its bounding box.
 
         Raises
@@ -201,7 +212,7 @@ class ConvexSolid(Solid):
         for d in DIRECTIONS:
             self._point(par, d)
         box = np.array([[self._point(par, tuple(s * e))[k] for s in (-1.0, 1.0)] for k, e in enumerate(np.eye(3))])
-        return (Form("SOLID", (*par, 1.0), np.linalg.norm(np.abs(box).max(axis=1)), owner=type(self)),)
+        return (ConvexPart("SOLID", (*par, 1.0), np.linalg.norm(np.abs(box).max(axis=1)), owner=type(self)),)
 
     def volume(self, n: SimpleNamespace) -> Any:
         """Not known.
@@ -216,10 +227,10 @@ class ConvexSolid(Solid):
             f"inertia= of the body"
         )
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """Points that are farthest along directions all around."""
         par = self.par(n)
-        v, f = lathe(on_axis(arc((0, 0), 1.0, -np.pi / 2, np.pi / 2, fine // 2)), fine)
+        v, f = lathe(snapped_to_axis(arc((0, 0), 1.0, -np.pi / 2, np.pi / 2, fine // 2)), fine)
         return np.array([self._point(par, tuple(d)) for d in v.tolist()]), f
 
     def par(self, n: SimpleNamespace) -> tuple[float, ...]:
@@ -231,9 +242,9 @@ class ConvexSolid(Solid):
             If there are more.
         """
         par = tuple(float(np.real(x)) for x in self.parameters(n))
-        if len(par) > MOST:
-            raise ModelError(f"{self.title}: parameters() gives {len(par)} numbers; a shape has up to {MOST}")
-        return (*par, *(0.0,) * (MOST - len(par)))
+        if len(par) > MAX_PARAMETERS:
+            raise ModelError(f"{self.title}: parameters() gives {len(par)} numbers; a shape has up to {MAX_PARAMETERS}")
+        return (*par, *(0.0,) * (MAX_PARAMETERS - len(par)))
 
     def _point(self, par: tuple[float, ...], d: tuple[float, ...]) -> tuple[float, ...]:
         x: Any
@@ -265,6 +276,6 @@ class Surface(Solid):
         raise ModelError(f"{self.title}: it has no volume and so no mass; give mass= and inertia= of the body")
 
 
-def point(values: Any, what: str) -> np.ndarray:
+def spatial_point(values: Any, what: str) -> np.ndarray:
     """Three components of a point that is given by three, or by two in the plane z = 0."""
     return vector((*values, 0.0) if len(values) == 2 else values, False, what)

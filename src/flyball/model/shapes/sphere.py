@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..element import Length, element, positive
-from .form import Form
-from .outline import circle
-from .solid import FINE, Solid
-from .surface import arc, lathe, on_axis
+from .geometry import ConvexPart, arc, circle_outline, lathe, snapped_to_axis
+from .solid import RESOLUTION, Solid
 
 
 @element
@@ -35,18 +33,18 @@ class Sphere(Solid):
         k = 0.4 * n.radius**2
         return k, k, k
 
-    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """Itself."""
-        return (Form("SPHERE", (n.radius,), n.radius),)
+        return (ConvexPart("SPHERE", (n.radius,), n.radius),)
 
-    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+    def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
         """A circle."""
-        return (circle(n.radius, self.pose(n)[0]),)
+        return (circle_outline(n.radius, self.pose(n)[0]),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """The radius."""
         return (n.radius,)
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """Meridians and parallels."""
-        return lathe(on_axis(arc((0, 0), n.radius, -pi / 2, pi / 2, fine // 2)), fine)
+        return lathe(snapped_to_axis(arc((0, 0), n.radius, -pi / 2, pi / 2, fine // 2)), fine)

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..element import Length, element, positive
-from .rules import smaller
-from .solid import FINE, Solid
-from .surface import arc, lathe
+from .geometry import arc, lathe
+from .solid import RESOLUTION, Solid, smaller
 
 
 @element
@@ -40,7 +39,7 @@ class Torus(Solid):
         """Radius of the ring and of its section."""
         return n.radius, n.tube_radius
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """The section, turned about the axis."""
         steps = max(fine // 2, 3)
         return lathe(arc((n.radius, 0), n.tube_radius, 0.0, 2 * pi, steps)[:-1], fine, ring=True)

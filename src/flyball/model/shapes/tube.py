@@ -10,9 +10,8 @@ import numpy as np
 
 from ..element import Length, element, positive
 from .cylinder import Cylinder
-from .rules import smaller
-from .solid import FINE
-from .surface import lathe
+from .geometry import lathe
+from .solid import RESOLUTION, smaller
 
 
 @element
@@ -44,7 +43,7 @@ class Tube(Cylinder):
         """Outer radius, inner radius and length."""
         return n.radius, n.inner_radius, n.length
 
-    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
         """Two rings, the side and the bore."""
         a, b, h = n.inner_radius, n.radius, n.length / 2
         return lathe(np.array([(a, -h), (b, -h), (b, h), (a, h)]), fine, ring=True)

@@ -7,63 +7,82 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...constraints import blocks as building
-from ...graph.node import Node
-from ...graph.printers.latex import latex
-from ...graph.printers.spelling import spelt
-from ...graph.printers.text import text
-from ...graph.simplify.simplify import simplified
+from ...expression_graph.graph import Node
+from ...expression_graph.printers.formula_layout import latex_symbol
+from ...expression_graph.printers.latex import latex
+from ...expression_graph.printers.text import text
+from ...expression_graph.simplification.simplify import simplified
 from ...model.joint import Joint
-from .forces import along
-from .parts import Block, Cell, Display, Formula, Formulas, Listing, Matrix, Prose, Section, Tex
-from .words import between, meaning, moments, unit
+from ..named_equations import generalised_forces
+from .parts import (
+    Block,
+    Cell,
+    DataTable,
+    Display,
+    Formula,
+    Formulas,
+    Matrix,
+    Paragraph,
+    Section,
+    Tex,
+    connected_parts,
+    inertia_labels,
+    symbol_meaning,
+    unit_text,
+)
 
 if TYPE_CHECKING:
     from ..equations import Equations
 
 ZERO = Tex("0", "0")
-LARGE = 14  # velocities from which on rows of the equations of motion are not written out each
+LARGE_MATRIX = 14  # velocities from which on rows of the equations of motion are not written out each
 
 
-def bold(letter: str, plain: str = "") -> Tex:
+def bold(letter: str, plain_text: str = "") -> Tex:
     """A matrix or vector."""
     style = "boldsymbol" if letter.startswith("\\") else "mathbf"
-    return Tex(rf"\{style}{{{letter}}}", plain or letter.strip("\\"))
+    return Tex(rf"\{style}{{{letter}}}", plain_text or letter.strip("\\"))
 
 
-def label(x: Any) -> Tex:
+def symbol_label(x: Any) -> Tex:
     """A symbol as a label."""
-    return Tex(spelt(x.data), x.data.name)
+    return Tex(latex_symbol(x.data), x.data.name)
 
 
-def value(x: Any) -> Cell:
+def expression_cell(x: Any) -> Cell:
     """An expression in a cell."""
     return Tex(latex(x), text(x)) if isinstance(x, Node) and not x.known else f"{float(x):.6g}"
 
 
-def mechanism(eq: Equations) -> Section:
+def mechanism_tables(eq: Equations) -> Section:
     """Bodies with what they weigh, joints with what they are made of, forces, drivers."""
-    m, s = eq.model, eq.formulated.values.structure
-    S = eq.formulated.traced.system
-    out: list[Block] = [Prose(f"{'Planar' if m.planar else 'Spatial'} mechanism. Coordinates: {eq.coordinates}.")]
+    m, s = eq.model, eq.named_equations.values.structure
+    S = eq.named_equations.traced.system
+    out: list[Block] = [Paragraph(f"{'Planar' if m.planar else 'Spatial'} mechanism. Coordinates: {eq.coordinates}.")]
     names = ("J",) if m.planar else ("J_xx", "J_yy", "J_zz", "J_xy", "J_xz", "J_yz")
     rows = []
     for e in m.bodies:
         b = s.place[e.name]
-        weight = [S.bodies.mass[b], *moments(S.bodies.inertia[b], m.planar)]
+        weight = [S.bodies.mass[b], *inertia_labels(S.bodies.inertia[b], m.planar)]
         rows.append(
-            (e.name, *map(value, simplified(weight if e.name not in s.points else weight[:1] + [0.0] * len(names))))
+            (
+                e.name,
+                *map(
+                    expression_cell, simplified(weight if e.name not in s.points else weight[:1] + [0.0] * len(names))
+                ),
+            )
         )
     used = [k for k in range(len(names) + 2) if k < 2 or any(row[k] != "0" for row in rows)]
     head = ("body", "mass [kg]", *(f"{n} [kg m²]" for n in names))
-    out.append(Listing(tuple(head[k] for k in used), tuple(tuple(row[k] for k in used) for row in rows)))
-    joints = tuple((e.name, type(e).__name__, between(e), made_of(e)) for e in (*m.joints, *m.couplings))
-    out.append(Listing(("joint", "kind", "between", "building blocks"), joints))
-    acting = tuple((e.name, type(e).__name__, between(e)) for e in (*m.forces, *m.drivers))
-    out.append(Listing(("force or driver", "kind", "between"), acting))
-    return Section("mechanism", "Mechanism", [b for b in out if not isinstance(b, Listing) or b.rows])
+    out.append(DataTable(tuple(head[k] for k in used), tuple(tuple(row[k] for k in used) for row in rows)))
+    joints = tuple((e.name, type(e).__name__, connected_parts(e), joint_blocks(e)) for e in (*m.joints, *m.couplings))
+    out.append(DataTable(("joint", "kind", "between", "building blocks"), joints))
+    acting = tuple((e.name, type(e).__name__, connected_parts(e)) for e in (*m.forces, *m.drivers))
+    out.append(DataTable(("force or driver", "kind", "between"), acting))
+    return Section("mechanism", "Mechanism", [b for b in out if not isinstance(b, DataTable) or b.rows])
 
 
-BLOCKS = {
+BLOCK_NAMES = {
     "COMMON_POINT": "common point (BB1)",
     "PARALLEL_AXES": "parallel axes (BB2)",
     "STRAIGHT_LINE": "straight line (BB3)",
@@ -73,13 +92,13 @@ BLOCKS = {
 }
 
 
-def made_of(e: Any) -> str:
+def joint_blocks(e: Any) -> str:
     """Building blocks of a joint."""
     if not isinstance(e, Joint):
         return "relation of coordinates"
     rows = list(e.blocks)
     found = []
-    for name, called in BLOCKS.items():
+    for name, called in BLOCK_NAMES.items():
         block = list(getattr(building, name))
         at = next((k for k in range(len(rows)) if rows[k : k + len(block)] == block), None)
         if at is not None:
@@ -96,19 +115,21 @@ def symbols(used: list[Node]) -> Section:
     for x in used:
         if x.data.kind not in ("shared", "constant"):
             value = () if x.moving else (f"{x.value:.6g}",)
-            rows[x.moving].append((label(x), x.data.name, meaning(x.data), unit(x.data.unit), *value))
+            rows[x.moving].append(
+                (symbol_label(x), x.data.name, symbol_meaning(x.data), unit_text(x.data.unit), *value)
+            )
     head = ("symbol", "name", "meaning", "unit")
-    tables = [Listing((*head, "value [SI]"), tuple(rows[False])), Listing(head, tuple(rows[True]))]
+    tables = [DataTable((*head, "value [SI]"), tuple(rows[False])), DataTable(head, tuple(rows[True]))]
     return Section("symbols", "Symbols", [t for t in tables if t.rows])
 
 
 def coordinates(eq: Equations) -> Section:
     """Q, v and how they go together."""
-    T = eq.formulated.traced
+    T = eq.named_equations.traced
     out: list[Block] = []
     if T.q:
-        rows = tuple((Tex(str(k + 1), str(k + 1)), label(x), x.data.name) for k, x in enumerate(T.q))
-        out.append(Listing(("", "coordinate", "name"), rows))
+        rows = tuple((Tex(str(k + 1), str(k + 1)), symbol_label(x), x.data.name) for k, x in enumerate(T.q))
+        out.append(DataTable(("", "coordinate", "name"), rows))
     same = len(T.q) == len(T.v) and all(T.T[i, j] == (1.0 if i == j else 0.0) for i, j in np.ndindex(T.T.shape))
     out.append(
         Display(
@@ -119,13 +140,13 @@ def coordinates(eq: Equations) -> Section:
         )
     )
     if not same:
-        out.append(Matrix(bold("T"), T.T.copy(), tuple(map(label, T.q)), tuple(map(label, T.v))))
+        out.append(Matrix(bold("T"), T.T.copy(), tuple(map(symbol_label, T.q)), tuple(map(symbol_label, T.v))))
     return Section("coordinates", "Coordinates and velocities", out)
 
 
 def constraints(eq: Equations) -> list[Section]:
     """Rows of each joint, driver and coupling; the Jacobian."""
-    T, s = eq.formulated.traced, eq.formulated.values.structure
+    T, s = eq.named_equations.traced, eq.named_equations.values.structure
     if not T.lam:
         return []
     owners: dict[str, list[int]] = {}
@@ -142,15 +163,15 @@ def constraints(eq: Equations) -> list[Section]:
     ]
     for owner, rows in owners.items():
         e = s.model[owner]
-        what = made_of(e) if isinstance(e, Joint) else type(e).__name__.lower()
+        what = joint_blocks(e) if isinstance(e, Joint) else type(e).__name__.lower()
         formulas = []
         for k in rows:
             free = k < len(s.rows) and not s.rows[k].holonomic
             formulas += [] if free else [Formula(_of("g", k), T.g[k])]
         formulas += [Formula(_of(r"\nu", k), T.nu[k]) for k in rows if T.nu[k] != 0.0]
         formulas += [Formula(_of(r"\gamma", k), T.gamma[k]) for k in rows]
-        out.append(Formulas(f"{owner} ({between(e)})", formulas, what))
-    G = Matrix(bold("G"), T.G.copy(), tuple(map(label, T.lam)), tuple(map(label, T.v)))
+        out.append(Formulas(f"{owner} ({connected_parts(e)})", formulas, what))
+    G = Matrix(bold("G"), T.G.copy(), tuple(map(symbol_label, T.lam)), tuple(map(symbol_label, T.v)))
     return [Section("constraints", "Constraints", out), Section("jacobian", "Jacobian of the constraints", [G])]
 
 
@@ -158,47 +179,47 @@ def _of(letter: str, k: int) -> Tex:
     return Tex(f"{letter}_{{{k + 1}}}", f"{letter.strip(chr(92))}[{k + 1}]")
 
 
-def masses(eq: Equations) -> Section:
+def mass_matrix(eq: Equations) -> Section:
     """The mass matrix."""
-    T = eq.formulated.traced
-    names = tuple(map(label, T.v))
+    T = eq.named_equations.traced
+    names = tuple(map(symbol_label, T.v))
     return Section("mass", "Mass matrix", [Matrix(bold("M"), T.M.copy(), names, names, symmetric=True)])
 
 
 def forces(eq: Equations) -> Section:
     """Generalised forces: inertia, gravity, each element."""
-    T = eq.formulated.traced
+    T = eq.named_equations.traced
     out: list[Block] = []
-    for title, f in along(eq.formulated):
-        rows = [Formula(force(k, x), y) for k, (x, y) in enumerate(zip(T.v, f, strict=True)) if y != 0.0]
+    for title, f in generalised_forces(eq.named_equations):
+        rows = [Formula(velocity_force(k, x), y) for k, (x, y) in enumerate(zip(T.v, f, strict=True)) if y != 0.0]
         if rows:
             out.append(Formulas(title, rows))
     if not out:
-        out = [Prose("No force acts: f = 0.")]
+        out = [Paragraph("No force acts: f = 0.")]
     return Section("forces", "Forces along the velocities", out)
 
 
-def force(k: int, x: Node) -> Tex:
+def velocity_force(k: int, x: Node) -> Tex:
     """The force along a velocity."""
-    return Tex(rf"f_{{{k + 1}}} [{spelt(x.data)}]", f"f[{k + 1}], {x.data.name}")
+    return Tex(rf"f_{{{k + 1}}} [{latex_symbol(x.data)}]", f"f[{k + 1}], {x.data.name}")
 
 
-def motion(eq: Equations, acting: Section) -> Section:
+def equations_of_motion(eq: Equations, acting: Section) -> Section:
     """The equations of motion: as matrices, and row by row where these are few."""
-    x = eq.formulated
+    x = eq.named_equations
     T = x.traced
     closed = r" + \mathbf{G}^{\top} \boldsymbol{\lambda}" if T.lam else ""
     told = Tex(
         rf"\mathbf{{M}} \dot{{\mathbf{{v}}}} = \mathbf{{f}}{closed}", f"M vdot = f{' + G^T lam' if T.lam else ''}"
     )
     out: list[Block] = [Display(told)]
-    if len(T.v) <= LARGE:
+    if len(T.v) <= LARGE_MATRIX:
         by: dict[str, list[Formula]] = {}
         given = [f for b in acting.blocks if isinstance(b, Formulas) for f in b.formulas]
         for k, v in enumerate(T.v):
             before = [(T.M[k, j], a) for j, a in enumerate(x.vdot) if T.M[k, j] != 0.0]
             after = [(T.G[r, k], lam) for r, lam in enumerate(T.lam) if T.G[r, k] != 0.0]
-            parts = [f for f in given if f.left.plain == force(k, v).plain]
+            parts = [f for f in given if f.left.plain == velocity_force(k, v).plain]
             by.setdefault(v.data.element, []).append(Formula(ZERO, T.f[k], "", before, after, parts))
         out += [Formulas(owner, rows) for owner, rows in by.items()]
     return Section("motion", "Equations of motion", out)

@@ -1,26 +1,84 @@
-"""The document of a mechanism's equations."""
+"""The document of a mechanism's equations, simplified, with symbols for what has a meaning or recurs."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ...graph.node import Node, Symbol
-from ...graph.operations import SYMBOL
-from ...graph.printers.spelling import spelt
-from ...graph.simplify.cost import length
-from ...graph.simplify.shared import Definitions, shared
-from ...graph.simplify.simplify import simplified
-from ...graph.values import reached
-from ..quaternions import quaternions
+from ...expression_graph.evaluation import nodes_in_order
+from ...expression_graph.graph import MULTIPLY, NUMBER, SYMBOL, Node, Symbol
+from ...expression_graph.printers.formula_layout import latex_symbol
+from ...expression_graph.simplification.common_subexpressions import Definitions, extract_common_subexpressions
+from ...expression_graph.simplification.reading_cost import symbol_count
+from ...expression_graph.simplification.simplify import simplified
+from ..named_equations import quaternions
 from . import contents
-from .parted import shortened
 from .parts import Document, Formula, Formulas, Section, Tex
 
 if TYPE_CHECKING:
     from ..equations import Equations
 
-LONG = 400.0  # symbols in parts that are added up once more
-PARTS = (  # of the record of a body: place, letter, name, what
+
+FEW_OPERATIONS = 2500  # operations up to which everything is written out first
+BRIEF_COUNT = 4.0  # symbols below which a part has no name
+READABLE_COUNT = 900.0  # symbols of all equations together up to which that stays
+
+
+Candidate = tuple[Any, Symbol]
+
+
+def name_parts(nodes: Sequence[Any], candidates: Sequence[Candidate]) -> tuple[list[Any], Definitions, list[Candidate]]:
+    """Expressions with symbols for parts that have a meaning, what these stand for, and which candidates they are.
+
+    A part that is a number times something is named too where another multiple of it stands.
+    """
+    wanted: dict[int, tuple[float, Candidate]] = {}
+    for x, symbol in candidates:
+        if isinstance(x, Node) and x.op not in (NUMBER, SYMBOL):
+            scaled = x.op == MULTIPLY and x.args[0].op == NUMBER
+            inner = x.args[1] if scaled else x
+            if inner.op != SYMBOL and inner.index not in wanted:
+                wanted[inner.index] = (x.args[0].value if scaled else 1.0, (x, symbol))
+    made: dict[int, Node] = {}
+    definitions: Definitions = []
+    found: list[Candidate] = []
+    for x in nodes_in_order(nodes):
+        args = tuple(made.get(a.index, a) for a in x.args)
+        new = made[x.index] = x if args == x.args else x.graph.rebuilt(x, args)
+        if x.index in wanted:
+            c, candidate = wanted[x.index]
+            name = x.graph.symbol(candidate[1], None if x.moving else c * x.value)
+            definitions.append((name, c * new))
+            found.append(candidate)
+            made[x.index] = name / c
+    return [made.get(x.index, x) if isinstance(x, Node) else x for x in nodes], definitions, found
+
+
+def simplify_with_names(
+    nodes: Sequence[Any], units: Sequence[Sequence[Node]], candidates: Sequence[Candidate]
+) -> tuple[list[Any], Definitions]:
+    """Expressions made short, and parts with names: with these, or without, as is shorter."""
+    found: list[Any] | None = None
+    if len(nodes_in_order(nodes)) <= FEW_OPERATIONS or not candidates:
+        found = simplified(nodes, units=units)
+        if not candidates or symbol_count(found) <= READABLE_COUNT:
+            return found, []
+    left = list(candidates)
+    while True:
+        rest, meant, of = name_parts(nodes, left)
+        defined = simplified([y for _, y in meant], units=units)
+        brief = {x.index for (x, _), y in zip(of, defined, strict=True) if symbol_count([y]) < BRIEF_COUNT}
+        if not brief:
+            break
+        left = [c for c in left if not (isinstance(c[0], Node) and c[0].index in brief)]
+    other = simplified(rest, units=units)
+    if found is not None and len(nodes_in_order(found)) < len(nodes_in_order([*other, *defined])):
+        return found, []
+    return other, [(x, y) for (x, _), y in zip(meant, defined, strict=True)]
+
+
+LONG_EXPRESSION = 400.0  # symbols in parts that are added up once more
+KINEMATIC_PARTS = (  # of the record of a body: place, letter, name, what
     (3, 9, "R", "R"),
     (0, 3, "p", "p"),
     (12, 3, r"\omega", "omega"),
@@ -42,45 +100,47 @@ def document(eq: Equations) -> Document:
     Document
     """
     sections = [
-        contents.mechanism(eq),
+        contents.mechanism_tables(eq),
         contents.coordinates(eq),
         *contents.constraints(eq),
-        contents.masses(eq),
+        contents.mass_matrix(eq),
         acting := contents.forces(eq),
-        contents.motion(eq, acting),
+        contents.equations_of_motion(eq, acting),
         contents.energies(eq),
     ]
-    made = Document(eq.model.name, subtitle(eq), sections)
-    found, meant = shortened(made.expressions(), quaternions(eq.formulated), candidates(eq))
+    made = Document(eq.model.name, size_description(eq), sections)
+    found, meant = simplify_with_names(made.expressions(), quaternions(eq.named_equations), candidate_symbols(eq))
     made.put(found)
-    summed(made, quaternions(eq.formulated))
-    tidied(made)
+    as_sums(made, quaternions(eq.named_equations))
+    without_zeros(made)
     count = len(made.expressions())
-    found, letters = shared([*made.expressions(), *(y for _, y in meant)])
+    found, letters = extract_common_subexpressions([*made.expressions(), *(y for _, y in meant)])
     made.put(found[:count])
     meant = [(x, y) for (x, _), y in zip(meant, found[count:], strict=True)]
     later = []
     if meant:
-        later.append(Section("kinematics", "Kinematics of the bodies", kinematics(meant)))
+        later.append(Section("kinematics", "Kinematics of the bodies", kinematic_formulas(meant)))
     if letters:
-        later.append(Section("abbreviations", "Abbreviations", [Formulas("", defined(letters))]))
+        later.append(Section("abbreviations", "Abbreviations", [Formulas("", definition_formulas(letters))]))
     at = next(k for k, s in enumerate(sections) if s.name == "coordinates") + 1
     sections[at:at] = later
-    used = [x for x in reached([*made.expressions(), *added(sections)]) if x.op == SYMBOL]
+    used = [x for x in nodes_in_order([*made.expressions(), *added_symbols(sections)]) if x.op == SYMBOL]
     sections.insert(1, contents.symbols(used))
     return made
 
 
-def summed(made: Document, units: list[list[Node]]) -> None:
+def as_sums(made: Document, units: list[list[Node]]) -> None:
     """Right sides that are sums of others, by these, where that is shorter: each by itself has cancelled more."""
     blocks = [b for s in made.sections for b in s.blocks if isinstance(b, Formulas)]
-    sums = [f for b in blocks for f in b.formulas if f.parts and length([p.right for p in f.parts]) <= LONG]
+    sums = [
+        f for b in blocks for f in b.formulas if f.parts and symbol_count([p.right for p in f.parts]) <= LONG_EXPRESSION
+    ]
     others = simplified([sum((p.right for p in f.parts), 0.0) for f in sums], units=units)
     for f, other in zip(sums, others, strict=True):
-        f.right = other if length([other]) < length([f.right]) else f.right
+        f.right = other if symbol_count([other]) < symbol_count([f.right]) else f.right
 
 
-def tidied(made: Document) -> None:
+def without_zeros(made: Document) -> None:
     """Without what has turned out to be zero: products, and forces."""
     for section in made.sections:
         for block in section.blocks:
@@ -94,22 +154,22 @@ def tidied(made: Document) -> None:
             section.blocks = [b for b in section.blocks if not isinstance(b, Formulas) or b.formulas]
 
 
-def added(sections: list[Section]) -> list[Node]:
+def added_symbols(sections: list[Section]) -> list[Node]:
     """Symbols beside expressions."""
     formulas = [f for s in sections for b in s.blocks if isinstance(b, Formulas) for f in b.formulas]
     return [x for f in formulas for _, x in (*f.before, *f.after)]
 
 
-def subtitle(eq: Equations) -> str:
+def size_description(eq: Equations) -> str:
     """Sizes, in words."""
     count = {"coordinate": len(eq.q), "velocity": len(eq.v), "constraint": len(eq.lam)}
     many = {"velocity": "velocities"}
     return ", ".join(f"{n} {k if n == 1 else many.get(k, k + 's')}" for k, n in count.items())
 
 
-def candidates(eq: Equations) -> list[tuple[Any, Symbol]]:
+def candidate_symbols(eq: Equations) -> list[tuple[Any, Symbol]]:
     """Kinematics of the bodies, which have names where they are long."""
-    x = eq.formulated
+    x = eq.named_equations
     if x.values.structure.model.planar:
         return []
     out: list[tuple[Any, Symbol]] = []
@@ -117,7 +177,7 @@ def candidates(eq: Equations) -> list[tuple[Any, Symbol]]:
         if b < 0:
             continue
         record = x.cleaned(x.traced.work.BK[b])
-        for first, count, letter, plain in PARTS:
+        for first, count, letter, plain in KINEMATIC_PARTS:
             for k in range(count):
                 index = f"{k // 3 + 1}{k % 3 + 1}" if count == 9 else str(k + 1)
                 circle = r",\circ" if plain in ("alpha", "a") else ""
@@ -126,14 +186,14 @@ def candidates(eq: Equations) -> list[tuple[Any, Symbol]]:
     return out
 
 
-def defined(definitions: Definitions) -> list[Formula]:
+def definition_formulas(definitions: Definitions) -> list[Formula]:
     """Symbols and what they stand for, as formulas."""
-    return [Formula(Tex(spelt(x.data), x.data.name), y) for x, y in definitions]
+    return [Formula(Tex(latex_symbol(x.data), x.data.name), y) for x, y in definitions]
 
 
-def kinematics(meant: Definitions) -> list[Any]:
+def kinematic_formulas(meant: Definitions) -> list[Any]:
     """Positions, rotations, velocities by body."""
     by: dict[str, Definitions] = {}
     for x, y in meant:
         by.setdefault(x.data.element, []).append((x, y))
-    return [Formulas(name, defined(rows)) for name, rows in by.items()]
+    return [Formulas(name, definition_formulas(rows)) for name, rows in by.items()]

@@ -1,8 +1,9 @@
-"""A mechanism's equations as code: in memory, or as files of a folder."""
+"""A mechanism's equations as code, in memory or as files of a folder: what `Mechanism.export` returns."""
 
 from __future__ import annotations
 
 import keyword
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,20 +14,67 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import ModelError
-from ...graph.printers.c import c_sources
-from ...graph.printers.casadi import casadi_functions
-from ...graph.printers.naming import Names
-from ...graph.printers.numba import numba_module
-from ...graph.printers.python import python_functions, python_module, told_constants
-from ...graph.printers.routine import Routine
-from ...graph.printers.tables import opaque
-from ...model.words import suggest
-from ...model.writing import make_folder, write
+from ...expression_graph.printers.c import c_sources
+from ...expression_graph.printers.casadi import casadi_functions
+from ...expression_graph.printers.numba import numba_module
+from ...expression_graph.printers.python import constant_definitions, python_functions, python_module
+from ...expression_graph.printers.routines import Identifiers, Routine, python_functions_of
+from ...model.messages import suggest
+from ...model.output_files import make_folder, write_file
 from .functions import Functions
-from .words import constants, head
 
 if TYPE_CHECKING:
     from ..equations import Equations
+
+
+EQUATIONS = "qdot = T v,  M vdot = f + G^T lam,  g = 0,  G v = nu,  G vdot = gamma"
+
+CALLING_CONVENTIONS = {
+    "c": "Arguments and results are arrays of double, matrices row by row; results have to be there. Nothing is kept "
+    "from one call to the next, so that threads may share them. Compile with a C99 compiler, link with -lm.",
+    "python": "Arguments are numbers and sequences; arrays of states have the states' own axes first, and so have the "
+    "results. NumPy is all that is needed.",
+    "casadi": "Functions of SX; they take numbers, SX and MX. Matrices are matrices, several of them stand below one "
+    "another. The files beside this one hold them.",
+    "numba": "Arguments are floats and arrays of floats; one state at a time.",
+}
+
+
+def file_header(eq: Equations, language: str, routines: Sequence[Routine]) -> str:
+    """Text of a head."""
+    from ... import __version__
+
+    told = [
+        f"Functions of the mechanism {eq.model.name!r}, written by flyball {__version__}.",
+        "",
+        f"    {EQUATIONS}",
+        "",
+        *textwrap.wrap(
+            "SI units and radians. World axes unless told otherwise. Velocities v are rates of the coordinates q, "
+            "but for bodies that turn freely: unit quaternions e0 to e3 (scalar first) in q, angular velocities w_x, "
+            "w_y, w_z along the body's own axes in v. Reactions are G^T lam.",
+            105,
+        ),
+        *textwrap.wrap(CALLING_CONVENTIONS[language], 105),
+        "",
+        f"Coordinates: {eq.coordinates}.",
+    ]
+    lists = {"q": eq.q.rows, "v": eq.v.rows, "lam": eq.lam.rows, "u": eq.inputs, "p": tuple(eq.parameters)}
+    for name, items in lists.items():
+        if items:
+            told += textwrap.wrap(f"{name} ({len(items)}): {', '.join(items)}", 105, subsequent_indent="    ")
+    told += [f"{r.name}: {r.operations} operations" for r in routines]
+    return "\n".join(told)
+
+
+def argument_constants(eq: Equations, start: Mapping[str, np.ndarray]) -> dict[str, Sequence[object]]:
+    """Names of the arguments' entries, and what they are at the start."""
+    names = {"q": eq.q.rows, "v": eq.v.rows, "lam": eq.lam.rows, "u": eq.inputs, "p": tuple(eq.parameters)}
+    named = {f"{k}_names": x for k, x in names.items() if x}
+    return named | {
+        f"{k}_start" if k != "p" else "p_values": x.tolist() for k, x in start.items() if k != "u" and len(x)
+    }
+
 
 LANGUAGES = ("c", "python", "casadi", "numba")
 
@@ -94,14 +142,14 @@ class Code:
         """Write the files to a folder, which is made where it is not there; the same code, which names them."""
         folder = make_folder(folder)
         for name, text in self.texts.items():
-            write(folder / name, text)
+            write_file(folder / name, text)
         written = [folder / name for name in self.texts]
         if self.language == "casadi":
             for name, f in self.functions.items():
                 written.append(folder / f"{self.name}_{name}.casadi")
                 with TemporaryDirectory() as aside:  # CasADi writes files by itself
                     f.save(str(Path(aside) / name))
-                    write(written[-1], (Path(aside) / name).read_bytes())
+                    write_file(written[-1], (Path(aside) / name).read_bytes())
         return replace(self, files=tuple(written))
 
     def lines(self) -> list[tuple[str, str]]:
@@ -123,7 +171,7 @@ class Code:
         }
 
 
-def exported(
+def export_equations(
     eq: Equations,
     folder: str | Path | None = None,
     *,
@@ -139,10 +187,10 @@ def exported(
         raise ModelError("functions and outputs are lists of names")
     made = Functions(eq, outputs)
     routines = tuple(made.routine(k) for k in dict.fromkeys(functions or made.names))
-    _say_where(eq, routines)
+    _annotate_functions(eq, routines)
     called = _identifier(name or eq.model.name, language)
     start = _start(eq, made)
-    told, top = constants(eq, start), head(eq, language, routines)
+    told, top = argument_constants(eq, start), file_header(eq, language, routines)
     if language == "c":
         sources = c_sources(routines, called, top, told)
         texts = {f"{called}.c": sources.source, f"{called}.h": sources.header}
@@ -161,7 +209,7 @@ def exported(
 
 def _start(eq: Equations, made: Functions) -> dict[str, np.ndarray]:
     """What state, places, inputs and parameters are at the start."""
-    wanted = {p.symbol.data.name: p.symbol for p in eq.formulated.places}
+    wanted = {p.symbol.data.name: p.symbol for p in eq.named_equations.places}
     known = eq.checked(eq.start, wanted)
     values: dict[str, list[float]] = {
         k: [float(known[x.data.name]) for x in made.arguments[k].nodes]
@@ -172,20 +220,20 @@ def _start(eq: Equations, made: Functions) -> dict[str, np.ndarray]:
     return {k: np.array(x) for k, x in (values | given).items()}
 
 
-def _say_where(eq: Equations, routines: Sequence[Routine]) -> None:
+def _annotate_functions(eq: Equations, routines: Sequence[Routine]) -> None:
     """Tell Python functions whose laws they are."""
-    laws = {id(c.native.python): c.where for c in eq.formulated.values.structure.functions}
-    for _, f in opaque(routines, Names()).values():
+    laws = {id(c.native.python): c.where for c in eq.named_equations.values.structure.functions}
+    for _, f in python_functions_of(routines, Identifiers()).values():
         f.told["of"] = laws.get(id(f.python), "")
 
 
 def _identifier(name: str, language: str) -> str:
     taken = [*keyword.kwlist, "numpy", "casadi", "numba", "math"] if language != "c" else ["math"]
-    return Names(taken)(name.lower())
+    return Identifiers(taken)(name.lower())
 
 
-def _loader(routines: Sequence[Routine], name: str, top: str, told: Mapping[str, Sequence[Any]]) -> str:
+def _loader(routines: Sequence[Routine], name: str, top: str, constants_text: Mapping[str, Sequence[Any]]) -> str:
     """A module that reads the functions of CasADi."""
     read = "".join(f'{r.name} = ca.Function.load(str(HERE / "{name}_{r.name}.casadi"))\n' for r in routines)
     imports = "from pathlib import Path\n\nimport casadi as ca\n"
-    return f'"""{top}\n"""\n\n{imports}{told_constants(told)}\nHERE = Path(__file__).parent\n{read}'
+    return f'"""{top}\n"""\n\n{imports}{constant_definitions(constants_text)}\nHERE = Path(__file__).parent\n{read}'

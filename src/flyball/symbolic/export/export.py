@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...analysis.options import Options
+from ...analysis_options import Options
 from ...errors import ModelError
 from ...model.model import Model
-from ..asked import symbolic
-from ..symbols import SymbolicOptions
+from ..derivation import symbolic
+from ..equations import SymbolicOptions
 from .code import Code
 
 

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import ModelError
-from ...graph.derivative import replaced
-from ...graph.node import SYMBOL, Node
-from ...graph.printers.routine import Argument, Routine
-from ...graph.values import reached
+from ...expression_graph.evaluation import nodes_in_order, substitute
+from ...expression_graph.graph import SYMBOL, Node
+from ...expression_graph.printers.routines import Argument, Routine
 from ...math.vec import add, cross, load3, load9, mm, mv
 from ...model.body import Frame
-from ...model.words import listing
-from ...results.numbers import with_unit
-from .solution import Solution, solution
+from ...model.messages import listing
+from ...results.wording import with_unit
+from .solution import Solution, solve_traced
 
 if TYPE_CHECKING:
     from ..equations import Equations
@@ -34,7 +33,7 @@ class Functions:
     """
 
     def __init__(self, equations: Equations, outputs: Sequence[str] = ()) -> None:
-        self.equations, self.traced = equations, equations.formulated.traced
+        self.equations, self.traced = equations, equations.named_equations.traced
         self.outputs = tuple(outputs)
 
     def routine(self, name: str) -> Routine:
@@ -62,12 +61,12 @@ class Functions:
         named = eq.named
         u = [named[k] for k in eq.inputs]
         p = [named[k] for k in eq.parameters]
-        places = [place.symbol for place in eq.formulated.places]
+        places = [place.symbol for place in eq.named_equations.places]
         found = {
             "t": Argument("t", x.t, "time"),
             "q": Argument("q", x.q, "coordinates"),
             "v": Argument("v", x.v, "velocities"),
-            "vdot": Argument("vdot", eq.formulated.vdot, "accelerations"),
+            "vdot": Argument("vdot", eq.named_equations.vdot, "accelerations"),
             "lam": Argument("lam", x.lam, "multipliers"),
             "loads": Argument("loads", x.loads, "what presses together the surfaces of joints with friction"),
             "places": Argument("places", places, "places of followers on their curves"),
@@ -79,19 +78,19 @@ class Functions:
     def _arguments(self, usual: Sequence[str], results: dict[str, Any]) -> list[Argument]:
         """The usual arguments of a function, and those that it takes besides for this mechanism."""
         nodes = [x for a in results.values() for x in np.ravel(a)]
-        met = {x.index for x in reached(nodes) if x.op == SYMBOL}
+        met = {x.index for x in nodes_in_order(nodes) if x.op == SYMBOL}
         return [a for k, a in self.arguments.items() if k in usual or any(x.index in met for x in a.nodes)]
 
     @cached_property
     def solution(self) -> Solution:
         """Accelerations, multipliers and loads."""
-        return solution(self.traced)
+        return solve_traced(self.traced)
 
     @cached_property
     def solved(self) -> list[tuple[Node, Any]]:
         """What stands for the symbols of accelerations, multipliers and loads at a state."""
         x, found = self.traced, self.solution
-        pairs = ((self.equations.formulated.vdot, found.vdot), (x.lam, found.lam), (x.loads, found.loads))
+        pairs = ((self.equations.named_equations.vdot, found.vdot), (x.lam, found.lam), (x.loads, found.loads))
         return [(symbol, value) for symbols, values in pairs for symbol, value in zip(symbols, values, strict=True)]
 
     @property
@@ -102,7 +101,7 @@ class Functions:
 
     def records(self) -> list[tuple[Any, ...]]:
         """Position, axes, velocity and angular velocity of every body's reference frame and every named frame."""
-        x, found = self.equations.formulated.values, []
+        x, found = self.equations.named_equations.values, []
         W = self.traced.work
         for name in self.carried:
             e = self.equations.model[name]
@@ -127,22 +126,22 @@ class Functions:
         made = np.empty((len(parts), *parts[0].shape), object)
         for n, a in enumerate(parts):
             made[n] = a
-        return self.equations.formulated.cleaned(made)
+        return self.equations.named_equations.cleaned(made)
 
 
-Made = tuple[dict[str, Any], str, str, dict[str, str]]
-FUNCTIONS: dict[str, Callable[[Functions], Made]] = {}
+FunctionParts = tuple[dict[str, Any], str, str, dict[str, str]]
+FUNCTIONS: dict[str, Callable[[Functions], FunctionParts]] = {}
 """Functions by name: results, their usual arguments, what the function is, what the results are."""
 
 
-def function(make: Callable[[Functions], Made]) -> Callable[[Functions], Made]:
+def exported_function(make: Callable[[Functions], FunctionParts]) -> Callable[[Functions], FunctionParts]:
     """Make a function known by its name."""
     FUNCTIONS[make.__name__.rstrip("_")] = make
     return make
 
 
-@function
-def kinematics(x: Functions) -> Made:
+@exported_function
+def kinematics(x: Functions) -> FunctionParts:
     """Poses."""
     told = f"of {', '.join(x.carried)}: origins [m], along the world's axes"
     turned = "their axes, as columns"
@@ -152,8 +151,8 @@ def kinematics(x: Functions) -> Made:
     }  # fmt: skip
 
 
-@function
-def velocities(x: Functions) -> Made:
+@exported_function
+def velocities(x: Functions) -> FunctionParts:
     """Velocities of the same."""
     results = {"velocities": x.stacked(2), "angular_velocities": x.stacked(3)}
     return results, "t q v p", "Velocities of bodies' reference frames and of named frames.", {
@@ -162,65 +161,65 @@ def velocities(x: Functions) -> Made:
     }  # fmt: skip
 
 
-@function
-def T(x: Functions) -> Made:
+@exported_function
+def T(x: Functions) -> FunctionParts:
     """Rates of coordinates."""
     return {"T": x.traced.T}, "q p", "qdot = T v.", {"T": "rates of the coordinates by the velocities"}
 
 
-@function
-def M(x: Functions) -> Made:
+@exported_function
+def M(x: Functions) -> FunctionParts:
     """Mass matrix."""
     return {"M": x.traced.M}, "q p", "Mass matrix.", {"M": "symmetric [kg, kg m, kg m^2]"}
 
 
-@function
-def f(x: Functions) -> Made:
+@exported_function
+def f(x: Functions) -> FunctionParts:
     """Forces."""
     what = "All forces but reactions along the velocities, gyroscopic ones included."
     return {"f": x.traced.f}, "t q v u p", what, {"f": "[N, N m]"}
 
 
-@function
-def g(x: Functions) -> Made:
+@exported_function
+def g(x: Functions) -> FunctionParts:
     """Constraints."""
     return {"g": x.traced.g}, "t q p", "Constraints, g = 0.", {"g": "[m, rad, 1]; 0 for those of velocities only"}
 
 
-@function
-def nu(x: Functions) -> Made:
+@exported_function
+def nu(x: Functions) -> FunctionParts:
     """Right-hand side of velocities."""
     return {"nu": x.traced.nu}, "t q p", "What constraints ask of velocities: G v = nu.", {}
 
 
-@function
-def G(x: Functions) -> Made:
+@exported_function
+def G(x: Functions) -> FunctionParts:
     """Jacobian."""
     return {"G": x.traced.G}, "t q p", "Jacobian of the constraints along the velocities.", {}
 
 
-@function
-def gamma(x: Functions) -> Made:
+@exported_function
+def gamma(x: Functions) -> FunctionParts:
     """Right-hand side of accelerations."""
     return {"gamma": x.traced.gamma}, "t q v p", "What constraints ask of accelerations: G vdot = gamma.", {}
 
 
-@function
-def residual(x: Functions) -> Made:
+@exported_function
+def residual(x: Functions) -> FunctionParts:
     """Residual."""
     T = x.traced
-    missed = T.M @ np.array(x.equations.formulated.vdot, object) - T.f
+    missed = T.M @ np.array(x.equations.named_equations.vdot, object) - T.f
     if T.lam:
         missed = missed - T.G.T @ np.array(T.lam, object)
     given = list(zip(T.loads, T.returned, strict=True))
     new = np.empty(len(missed), object)
-    new[:] = replaced(list(missed), given)
+    new[:] = substitute(list(missed), given)
     what = "M vdot - f - G^T lam: zero along every motion."
     return {"residual": new}, "t q v vdot lam u p", what, {"residual": "[N, N m]"}
 
 
-@function
-def right_hand_side(x: Functions) -> Made:
+@exported_function
+def right_hand_side(x: Functions) -> FunctionParts:
     """Rates of the state, and multipliers."""
     T, found = x.traced, x.solution
     qdot = T.T @ np.array(T.v, object)
@@ -230,7 +229,7 @@ def right_hand_side(x: Functions) -> Made:
         "vdot": "accelerations",
         "lam": "multipliers: reactions are G^T lam",
     }
-    places = x.equations.formulated.places
+    places = x.equations.named_equations.places
     if T.loads:
         results["loads"] = found.loads
         meanings["loads"] = "of joints with friction [N]"
@@ -240,25 +239,27 @@ def right_hand_side(x: Functions) -> Made:
     return results, "t q v u p", "Accelerations and multipliers at a state with g = 0 and G v = nu.", meanings
 
 
-@function
-def energies(x: Functions) -> Made:
+@exported_function
+def energies(x: Functions) -> FunctionParts:
     """Kinetic and potential energy."""
     quantity = x.equations.quantities.quantity
     results = {k: quantity(f"energy.{k}").nodes[()] for k in ("kinetic", "potential")}
     return results, "t q v p", "Kinetic energy, and potential energy of gravity and springs [J].", {}
 
 
-@function
-def outputs(x: Functions) -> Made:
+@exported_function
+def outputs(x: Functions) -> FunctionParts:
     """Quantities by name."""
     found = [x.equations[name] for name in x.outputs]
     wide = [name for name, e in zip(x.outputs, found, strict=True) if e.shape]
     if wide:
         raise ModelError(f"the output {wide[0]!r} is no single number: take its components, such as {wide[0] + '_x'!r}")
     nodes: list[Any] = [e.nodes[()] for e in found]
-    met = {n.index for n in reached(nodes) if n.op == SYMBOL}
-    if any(n.index in met for symbols in (x.equations.formulated.vdot, x.traced.lam, x.traced.loads) for n in symbols):
-        nodes = replaced(nodes, x.solved)
+    met = {n.index for n in nodes_in_order(nodes) if n.op == SYMBOL}
+    if any(
+        n.index in met for symbols in (x.equations.named_equations.vdot, x.traced.lam, x.traced.loads) for n in symbols
+    ):
+        nodes = substitute(nodes, x.solved)
     units = ", ".join(with_unit(n, e.unit) for n, e in zip(x.outputs, found, strict=True))
     y = np.empty(len(nodes), object)
     y[:] = nodes

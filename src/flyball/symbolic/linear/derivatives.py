@@ -1,9 +1,9 @@
-"""Derivatives of the equations by everything, in any state, and their values at a point: expressions or numbers.
+"""A mechanism's equations traced for linearisation, and their derivatives by state, multipliers and inputs.
 
     r = M vdot - f - G^T lam,  g,  n = G v - nu,  y
 
 are differentiated by positions (along the velocities, so that quaternions have three directions), velocities,
-accelerations, multipliers and inputs. Multipliers are held: what reactions do when the bodies that carry them move,
+accelerations, multipliers and inputs. Multipliers are held constant: the change of the reactions' directions,
 d(G^T lam)/dx, is in dr/dx.
 """
 
@@ -11,16 +11,191 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...equations.tree import quaternion_at
-from ...graph.arrays import zeros
-from ...graph.derivative import replaced, tangents
-from ...graph.node import Node
-from ...graph.values import evaluate
-from .traced import Mechanics
+from ...engine.kinematics import quaternion_at
+from ...errors import ModelError
+from ...expression_graph.evaluation import directional_derivatives, evaluate, substitute
+from ...expression_graph.graph import Graph, Node, Symbol, object_vector, zero_objects
+from ...expression_graph.tracing import TracedEquations, object_tables, parameter_symbols, trace_equations
+from ...laws.bytecode import BY_TIME, evaluate_jet
+from ...model.contact import has_contact
+from ...model.element_laws import Input, with_inputs
+from ...model.model import Model
+from ...model.quantities import single_quantity
+from ...results.health import Health
+from ...results.result import Result
+from ...tables.structure import Choices, structure
+from ...tables.structure_definition import VelocityName, velocity_names
+from ...tables.values import Values, values
+
+
+@dataclass
+class TracedMechanism:
+    """A mechanism as expressions: its equations of motion, its drawn state, its inputs.
+
+    Attributes
+    ----------
+    values : Values
+        Tables and drawn state, of expressions.
+    x : Traced
+    given : dict
+        Parameter -> its symbol.
+    env : dict
+        Parameter -> what it is, an expression of those that have a value of their own.
+    inputs : list of Input
+    names : list of Named
+        Of all velocities.
+    vdot : list of Node
+        Symbols of the accelerations.
+    g, n : ndarray (rows,)
+        Constraints on positions and velocities, G v - nu; prescribed coordinates behind the rows.
+    multipliers : list of Node
+        Symbols, those of prescribed coordinates (their efforts) behind those of the rows.
+    r : ndarray (nv,)
+        M vdot - f - G^T lam - efforts.
+    holonomic : ndarray of bool (rows,)
+    laws : list of (which coordinate, which velocity, Node, Node)
+        Coordinates that drivers prescribe, and their rates.
+    """
+
+    values: Values
+    x: TracedEquations
+    given: dict[str, Node]
+    env: Mapping[str, Any]
+    inputs: list[Input]
+    names: list[VelocityName]
+    vdot: list[Node]
+    g: np.ndarray
+    n: np.ndarray
+    multipliers: list[Node]
+    r: np.ndarray
+    holonomic: np.ndarray
+    laws: list[tuple[int, int, Node, Node]]
+
+    @property
+    def graph(self) -> Graph:
+        """Where all expressions live."""
+        return self.x.graph
+
+    @property
+    def model(self) -> Model:
+        """The mechanism, with the inputs in its laws."""
+        return self.values.structure.model
+
+    @property
+    def pushed(self) -> list[Node]:
+        """Symbols of the inputs."""
+        return [self.given[i.parameter] for i in self.inputs]
+
+    @property
+    def added(self) -> list[Node]:
+        """Symbols of those inputs that are no parameters of the mechanism: zero at the point."""
+        return [self.given[i.parameter] for i in self.inputs if i.name != i.parameter]
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """What a large step is along every velocity, in parts of the mechanism's length."""
+        return np.array([1.0 if k.unit == "m" else 1.0 / self.values.length for k in self.names])
+
+    @cached_property
+    def result(self) -> Result:
+        """The state as a result of expressions at one time: outputs are its curves."""
+        x = self.x
+        q, v, a, lam, z = (object_vector(part)[None] for part in (x.q, x.v, self.vdot, self.multipliers, x.z))
+        health = Health(True, "one state", 0.0, 0.0, 0, 0, 0, 0, 0.0)
+        return Result(self.model, self.values, np.array([x.t], object), q, v, z, a, lam, health)
+
+    def output(self, name: str) -> tuple[str, Node]:
+        """(unit, expression) of a curve of results, or of a sensor."""
+        unit, found = self.result.curve(name)
+        return unit, self.graph.node(np.ravel(found)[0])
+
+
+def trace_mechanism(
+    model: Model, tree: Sequence[str], inputs: Sequence[str], changed_parameters: Mapping[str, float] | None
+) -> TracedMechanism:
+    """Trace a mechanism.
+
+    Parameters
+    ----------
+    model : Model
+    tree : sequence of str
+        Tree joints; none for absolute coordinates.
+    inputs : sequence of str
+        See `Mechanism.linearize`.
+    changed_parameters : mapping, optional
+        Values of parameters in place of the model's own.
+
+    Raises
+    ------
+    ModelError
+        If there is no such input, or the mechanism has contact or laws that are Python functions.
+    """
+    if has_contact(model):
+        raise ModelError(
+            f"{model.name!r} has contact, which is no set of equations; linearize takes it where it rests, in numbers"
+        )
+    model, named = with_inputs(model, inputs)
+    model = _with_values(model, changed_parameters or {}).snapshot()
+    s = structure(model, Choices(tree=tuple(tree), coupled=bool(tree)))
+    if s.functions:
+        raise ModelError(
+            f"law {s.functions[0].text!r} is a Python function, which has no derivatives; write it as an expression or "
+            f"give a table"
+        )
+    graph = Graph()
+    given = parameter_symbols(model, graph)
+    V = values(s, given)  # type: ignore[arg-type]
+    x = trace_equations(s, V.system if given else object_tables(V.system), graph)
+    vdot = [graph.symbol(Symbol(f"a[{d}]", "acceleration", f"a_{{{d}}}")) for d in range(s.nv)]
+    laws = _prescribed(x)
+    efforts = [graph.symbol(Symbol(f"effort[{k}]", "multiplier")) for k in range(len(laws))]
+    r = x.M @ np.array(vdot, object) - x.f
+    if x.lam:
+        r = r - x.G.T @ np.array(x.lam, object)
+    for (_, d, _, _), effort in zip(laws, efforts, strict=True):
+        r[d] = r[d] - effort
+    r[:] = substitute(list(r), list(zip(x.loads, x.returned, strict=True)))
+    n = (x.G @ np.array(x.v, object) - x.nu).tolist() if x.lam else []
+    return TracedMechanism(
+        values=V, x=x, given=given, env=V.env, inputs=named, names=velocity_names(s), vdot=vdot,
+        g=object_vector([*x.g.tolist(), *(x.q[k] - law for k, _, law, _ in laws)]),
+        n=object_vector([*n, *(x.v[d] - rate for _, d, _, rate in laws)]),
+        multipliers=[*x.lam, *efforts], r=r,
+        holonomic=np.array([*(row.holonomic for row in s.rows), *(True for _ in laws)], bool), laws=laws,
+    )  # fmt: skip
+
+
+def refuse_unknown(model: Model, outputs: Sequence[str]) -> None:
+    """Refuse outputs that there are not."""
+    for name in outputs:
+        single_quantity(model, name)
+
+
+def _with_values(model: Model, changed_parameters: Mapping[str, float]) -> Model:
+    """A copy whose parameters have these values."""
+    out = model.copy()
+    out.environment(changed_parameters)  # refuses those that do not exist
+    for name, x in changed_parameters.items():
+        out.parameters[name] = x
+    return out
+
+
+def _prescribed(x: TracedEquations) -> list[tuple[int, int, Node, Node]]:
+    """Coordinates that drivers prescribe: where they and their rates stand, and what these are."""
+    S, s = x.system, x.structure
+    stack = zero_objects(s.depth + 1, 3)
+    out = []
+    for b in s.prescribed.values():
+        f, f1, _ = evaluate_jet(S.code, S.const, int(S.tree.law[b]), stack, x.t, zero_objects(3, 0), BY_TIME)
+        law = x.graph.node(f - S.bodies.offset[b])
+        out.append((int(S.tree.q[b]), int(S.tree.v[b]), law, x.graph.node(f1)))
+    return out
+
 
 BY = ("x", "v", "a", "l", "w")
 
@@ -51,7 +226,7 @@ class Perturbed:
 
         def new(X: np.ndarray) -> np.ndarray:
             out = X.copy()
-            out.ravel()[:] = replaced(list(X.ravel()), pairs)
+            out.ravel()[:] = substitute(list(X.ravel()), pairs)
             return out
 
         value, by = ({k: new(X) for k, X in of.items()} for of in (self.value, self.by))
@@ -67,7 +242,7 @@ class Derivatives:
     outputs : sequence of Node
     """
 
-    def __init__(self, m: Mechanics, outputs: Sequence[Node]) -> None:
+    def __init__(self, m: TracedMechanism, outputs: Sequence[Node]) -> None:
         self.m = m
         self.blocks: dict[str, np.ndarray] = {"r": m.r, "g": m.g, "n": m.n, "y": _row(outputs)}
         self.ends = np.cumsum([0, *(len(b) for b in self.blocks.values())])
@@ -79,7 +254,7 @@ class Derivatives:
         seeds |= {k: [[(s, 1.0)] for s in of] for k, of in zip(
             BY[1:], (x.v, m.vdot, m.multipliers, m.pushed), strict=True
         )}  # fmt: skip
-        self.columns = {k: [tangents(nodes, s) for s in of] for k, of in seeds.items()}
+        self.columns = {k: [directional_derivatives(nodes, s) for s in of] for k, of in seeds.items()}
         self.N = _turning(m)
 
     @property
@@ -90,7 +265,7 @@ class Derivatives:
 
     def at(self, point: Sequence[tuple[Node, Any]]) -> Perturbed:
         """With other expressions in place of the state's symbols."""
-        return self._sorted(replaced(self.all, point))
+        return self._sorted(substitute(self.all, point))
 
     def near(self, point: Mapping[str, float]) -> Perturbed:
         """In numbers; symbol's name -> value."""
@@ -102,7 +277,7 @@ class Derivatives:
         at, by = rows, dict[str, np.ndarray]()
         for k in BY:
             count = len(self.columns[k])
-            J = zeros(rows, count)
+            J = zero_objects(rows, count)
             for c in range(count):
                 J[:, c] = found[at : at + rows]
                 at += rows
@@ -117,15 +292,15 @@ class Derivatives:
 
 
 def _row(x: Sequence[Any]) -> np.ndarray:
-    out = zeros(len(x))
+    out = zero_objects(len(x))
     out[:] = list(x)
     return out
 
 
-def _turning(m: Mechanics) -> np.ndarray:
+def _turning(m: TracedMechanism) -> np.ndarray:
     """N: changes of rotations have components along axes that turn."""
     nv = len(m.x.v)
-    N = zeros(nv, nv)
+    N = zero_objects(nv, nv)
     for b in range(len(m.x.system.tree.parent)):
         _, w0 = quaternion_at(m.x.system, b)
         if w0 >= 0:

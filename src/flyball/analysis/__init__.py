@@ -1,1 +1,0 @@
-"""Analyses: one file for each question a user can ask."""

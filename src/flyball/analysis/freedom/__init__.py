@@ -1,1 +1,0 @@
-"""Pieces of ``mobility``: free motions, dependent constraints, cures, which reactions are determined."""

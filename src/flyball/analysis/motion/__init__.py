@@ -1,1 +1,0 @@
-"""Pieces of ``simulate``: the start, the choices, the coordinates, and what comes out."""

@@ -1,1 +1,0 @@
-"""What happens at an instant of a motion, and the loop from one to the next."""

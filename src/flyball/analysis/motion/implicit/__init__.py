@@ -1,1 +1,0 @@
-"""Motions by implicit integrators."""

@@ -1,1 +1,0 @@
-"""Motion by steps of impulses: what `Mechanism.simulate` does where things touch."""

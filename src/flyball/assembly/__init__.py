@@ -1,0 +1,7 @@
+"""Assembly: positions that close all loops and velocities that fulfil all constraints, near those described.
+
+`assemble` is the entry; it adds an explanation where no velocities exist. `assembled_state` finds the state,
+`positions_and_velocities` holds the numerical methods. Imports the model, tables, engine and numerics; of the
+questions only `mobility`, which names what is free in an explanation. Motion, statics and the other analyses
+begin with an `Assembly`.
+"""

@@ -1,0 +1,451 @@
+"""The engine's loops run on expressions, task by task: what each procedure reads, and what it writes where.
+
+What is in the engine's arrays afterwards is what the generated code has to write, at the same places. The tables'
+entries are symbols, so that the code holds for other values of parameters; entries that are 0, 1 or -1 stay
+numbers. Factors and solves read what they work on from where the engine has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from ..engine.articulated_body import solve_articulated
+from ..engine.element_dispatch import progress, remember
+from ..engine.entry_point import allocate_work
+from ..engine.loads import loads_end, reaction_loads
+from ..engine.motion import apply_all_forces, store_derivative
+from ..engine.projection import set_prescribed, update_positions, update_velocities, velocity_violation
+from ..engine.pulse_detection import LAWS, count_law_inputs, inspection_buffer, law_at, store_law_inputs
+from ..engine.rows import BY_TIME, count_measured, row_times
+from ..engine.solve import (
+    apply_inverse_mass,
+    factor,
+    pass_coupled,
+    pass_schur,
+    remainder_coupled,
+    remainder_schur,
+    rows_by_inverse_mass,
+)
+from ..expression_graph.graph import Graph, Node, Symbol, UndeterminedDecision
+from ..expression_graph.printers.llvm import Place, Procedure, ordered_operations
+from ..expression_graph.tracing import TRACED_TABLES
+from ..laws.bytecode import evaluate, evaluate_jet, may_be_brief
+from ..math.scalar import choose
+from ..tables.structure_definition import Structure
+from ..tables.table_definitions import (
+    ARTICULATED,
+    BIAS,
+    COUPLED,
+    LAW_INPUT,
+    LOAD,
+    LOAD_RESIDUAL,
+    LOAD_SIZE,
+    LOADED,
+    RATE,
+    ROW_SIZE,
+    SCHUR,
+    TERMS,
+    VALUE,
+    System,
+    Work,
+    with_numbers,
+)
+
+PLAIN_ENTRIES = (0.0, 1.0, -1.0)  # entries of tables that the code may know
+SOLVES = (
+    "STEP",
+    "STEP_UNLOADED",
+    "REFINE",
+    "DRIFT",
+)  # best in the order in which they are made
+
+
+def tables_of_symbols(
+    S: System, graph: Graph, known: Sequence[tuple[str, int]] = ()
+) -> tuple[System, dict[int, Place]]:
+    """The tables with symbols in them, and where each stands; entries that are ``known`` are numbers."""
+    places: dict[int, Place] = {}
+    told = set(known)
+
+    def with_symbols(name: str, table: np.ndarray) -> np.ndarray:
+        out = np.empty(table.shape, object)
+        for k, x in enumerate(table.ravel().tolist()):
+            law_zero = name == "const" and x == 0.0  # 0 sqrt(x) has no value where sqrt(x) has none
+            if (x in PLAIN_ENTRIES and not law_zero) or (name, k) in told:
+                out.ravel()[k] = x
+                continue
+            node = graph.symbol(Symbol(f"{name}[{k}]", "parameter"), x)
+            places[node.index] = (f"C_{name}", k)
+            out.ravel()[k] = node
+        return out
+
+    return with_numbers(S, with_symbols, TRACED_TABLES), places
+
+
+class ProcedureRecorder:
+    """What of the engine's arrays is an expression, and where each stands.
+
+    Attributes
+    ----------
+    graph : Graph
+    constants : dict
+        Symbols of the tables' entries: number of the node -> place.
+    procedures : dict of str to Procedure
+        By the names of `System.flat`'s entries.
+    """
+
+    def __init__(self, s: Structure, S: System, known: Sequence[tuple[str, int]] = ()) -> None:
+        self.s, self.graph = s, Graph(rounded=True)
+        self.S, self.constants = tables_of_symbols(S, self.graph, known)
+        self.W: Work = allocate_work(s, self.S, dtype=object)
+        self.nv, self.nr, self.nm = s.nv, len(S.rows.law), count_measured(S)
+        self.procedures: dict[str, Procedure] = {}
+        self.t = self.graph.symbol("t")
+        self.q, self.v = self.numbered("q", s.nq), self.numbered("v", s.nv)
+        self.z = self.numbered("z", len(s.states))
+
+    def numbered(self, name: str, n: int) -> np.ndarray:
+        """Symbols that are called by their numbers."""
+        out = np.zeros(n, object)
+        out[:] = [self.graph.symbol(f"{name}[{k}]") for k in range(n)]
+        return out
+
+    def array(self, name: str) -> np.ndarray:
+        """An array of `Work`, by its name: ``"rows.gamma"``."""
+        found: Any = reduce(getattr, name.split("."), self.W)
+        return found  # type: ignore[no-any-return]
+
+    def at(self, name: str, *index: int) -> Place:
+        """Where an entry of an array of `Work` stands."""
+        array = self.array(name)
+        return f"W_{name.replace('.', '_')}", index[0] if array.ndim == 1 else index[0] * array.shape[1] + index[1]
+
+    def fresh(self, name: str, row: int | None, columns: Sequence[int]) -> dict[int, Place]:
+        """Put symbols into an array of `Work`, or a row of it, in place of what is there; where they are read."""
+        reads = {}
+        array = self.array(name)
+        for c in columns:
+            index = (c,) if row is None else (row, c)
+            node = self.graph.symbol(f"W.{name}[{', '.join(map(str, index))}]")
+            array[index] = node
+            reads[node.index] = self.at(name, *index)
+        return reads
+
+    def again(self, name: str) -> dict[int, Place]:
+        """Symbols in place of what is no number in an array of one dimension: it is read from there."""
+        array = self.array(name)
+        reads = {}
+        for e, x in enumerate(array):
+            if isinstance(x, Node) and not x.known:
+                array[e] = self.graph.symbol(f"W.{name}[{e}]")
+                reads[array[e].index] = self.at(name, e)
+        return reads
+
+    def stored(self, name: str, row: int | None, columns: Sequence[int]) -> list[tuple[Place, Any]]:
+        """What stands in an array of `Work`, or in a row of it, to be written there."""
+        array = self.array(name)
+        return [(self.at(name, *i), array[i]) for i in ((c,) if row is None else (row, c) for c in columns)]
+
+    def kept(self, name: str) -> list[tuple[Place, Any]]:
+        """A whole array of one dimension, to be written."""
+        return [(self.at(name, e), x) for e, x in enumerate(self.array(name))]
+
+    def given(self, base: str, nodes: np.ndarray, first: int = 0) -> dict[int, Place]:
+        """Symbols that stand one after the other from an argument on."""
+        return {x.index: (base, first + k) for k, x in enumerate(nodes)}
+
+    @property
+    def time(self) -> dict[int, Place]:
+        """The time."""
+        return {self.t.index: ("t", 0)}
+
+    @property
+    def state(self) -> dict[int, Place]:
+        """The whole state as the first argument."""
+        nq, nv = self.s.nq, self.nv
+        return {
+            **self.given("a", self.q),
+            **self.given("a", self.v, nq),
+            **self.given("a", self.z, nq + nv),
+            **self.time,
+        }
+
+    def add(
+        self, name: str, reads: dict[int, Place], stores: list[tuple[Place, Any]], returned: Any = 0.0
+    ) -> Procedure:
+        """Another procedure; what formulas took for granted meanwhile makes it return a number greater than 0."""
+        granted, self.graph.granted = self.graph.granted, []
+        checks = [([x], what, k + 1.0) for k, (x, what) in enumerate(granted)]
+        made = Procedure(
+            name, reads, stores, returned, checks, name not in ("STEP", "STEP_UNLOADED", "REFINE", "DRIFT")
+        )
+        self.procedures[name] = made
+        return made
+
+    @property
+    def driven(self) -> list[int]:
+        """Velocities that drivers prescribe."""
+        return self.S.tree.v[self.S.tree.law >= 0].tolist()
+
+
+class SolveProcedures(ProcedureRecorder):
+    """Factor, solves, and what is missing of the velocities' constraints."""
+
+    def solved(self) -> None:
+        """Factor and solves."""
+        solver = self.S.sizes.solver
+        S, W = self.S, self.W
+        if solver == SCHUR:
+            rows_by_inverse_mass(S, W)
+            self.add("REUSE", {}, self.kept("H"))
+        factor(S, W)
+        stores = {SCHUR: self.kept("H"), COUPLED: self.kept("M"), ARTICULATED: []}[solver]
+        if solver != ARTICULATED:
+            stores += self.kept("L") + self.stored("D", 0, range(len(W.D[0])))
+            stores += self.stored("rows.diagonal", None, range(self.nr))
+        self.add("FACTOR", {}, stores)
+        reads: dict[int, Place] = {}
+        if solver != ARTICULATED:
+            reads |= self.again("H" if solver == SCHUR else "M") | self.again("L")
+            reads |= self.fresh("D", 0, range(len(W.D[0]))) | self.fresh("rows.diagonal", None, range(self.nr))
+        for name, is_loaded in (("STEP", True), ("STEP_UNLOADED", False)):
+            self.stepped(name, is_loaded, reads)
+        if solver != ARTICULATED:
+            self.refined(reads)
+
+    def stepped(self, name: str, is_loaded: bool, reads: dict[int, Place]) -> None:
+        """Begin of a solve: what there is without the rows' multipliers, and what is left of the equations."""
+        S, W = self.S, self.W
+        f, gamma = self.numbered("f", self.nv), self.numbered("gamma", self.nr)
+        reads = {**reads, **self.given("a", f), **self.given("b", gamma)}
+        x, lam = np.array([0.0] * self.nv, object), np.array([0.0] * self.nr, object)
+        W.rows.scratch_1[:] = gamma
+        W.velocities.scratch_2[:] = W.velocities.effort[:] = 0.0
+        if is_loaded:
+            reads |= self.fresh("velocities.prescribed", None, self.driven)
+            x[self.driven] = W.velocities.prescribed[self.driven]
+        if S.sizes.solver == SCHUR and self.semidefinite:  # what a pass gives back of E is of all that it has moved
+            W.velocities.scratch_2[:] = f if is_loaded else 0.0
+        elif S.sizes.solver == SCHUR:
+            for b in range(len(S.tree.parent)) if is_loaded else ():
+                apply_inverse_mass(S, b, f, S.tree.v[b], x, S.tree.v[b])
+            W.rows.scratch_1[:] = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]
+        elif S.sizes.solver == COUPLED and is_loaded:
+            remainder_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
+        elif S.sizes.solver == ARTICULATED:
+            solve_articulated(S, W, f, x, W.velocities.effort)
+        stores = [*self.solution(x, lam), (("W_flat", LOADED), 1.0 if is_loaded else 0.0)]
+        self.add(name, reads, stores)
+
+    def solution(self, x: np.ndarray, lam: np.ndarray) -> list[tuple[Place, Any]]:
+        """What a pass leaves: the solution, what is left of the equations, efforts of drivers."""
+        out: list[tuple[Place, Any]] = [(("c", k), y) for k, y in enumerate(x)] + [
+            (("d", k), y) for k, y in enumerate(lam)
+        ]
+        if self.S.sizes.solver == SCHUR:
+            left = self.stored("velocities.scratch_2", None, range(self.nv)) if self.semidefinite else []
+        else:
+            left = self.stored("velocities.scratch_2", None, range(self.nv)) + self.stored(
+                "velocities.effort", None, self.driven
+            )
+        return out + left + self.stored("rows.scratch_1", None, range(self.nr))
+
+    @property
+    def semidefinite(self) -> bool:
+        """Whether something stands in for missing masses."""
+        return bool(self.S.scales.semidefinite > 0.0)
+
+    def refined(self, reads: dict[int, Place]) -> None:
+        """A pass for what is left."""
+        S, W = self.S, self.W
+        f, gamma = self.numbered("f", self.nv), self.numbered("gamma", self.nr)
+        x, lam = self.numbered("x", self.nv), self.numbered("lam", self.nr)
+        reads = {**reads, **self.given("a", f), **self.given("b", gamma), **self.given("c", x), **self.given("d", lam)}
+        reads |= self.fresh("rows.scratch_1", None, range(self.nr)) | self.fresh(
+            "velocities.scratch_2", None, range(self.nv)
+        )
+        x, lam = x.copy(), lam.copy()
+        if S.sizes.solver == SCHUR:
+            pass_schur(S, W, W.velocities.scratch_2, x, lam, self.semidefinite)
+            off, *sizes = remainder_schur(S, W, gamma, x, lam, W.velocities.scratch_2, self.semidefinite)
+        else:
+            is_loaded = self.graph.symbol("loaded")
+            reads[is_loaded.index] = ("W_flat", LOADED)
+            f = np.array([choose(is_loaded, y, 0.0) for y in f] or [0.0], object)[: self.nv]
+            off, *sizes = pass_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
+        places = [("W_flat", k) for k in (ROW_SIZE, LOAD_RESIDUAL, LOAD_SIZE)]
+        self.add("REFINE", reads, self.solution(x, lam) + list(zip(places, sizes, strict=True)), off)
+
+    def drifted(self) -> None:
+        """What is missing of the velocities' constraints."""
+        out = np.array([0.0] * self.nr, object)
+        worst, size = velocity_violation(self.S, self.W, self.v, out)
+        stores = [(("b", k), x) for k, x in enumerate(out)] + [(("W_flat", TERMS), size)]
+        self.add("DRIFT", self.given("a", self.v), stores, worst)
+
+
+class MechanismProcedures(SolveProcedures):
+    """All procedures of one mechanism, as far as expressions go; `Linked` says what they hand on to each other."""
+
+    def __init__(self, s: Structure, S: System, known: Sequence[tuple[str, int]] = ()) -> None:
+        super().__init__(s, S, known)
+        self.read_by_others = self.entries((self._place_rates, self._weighed))
+        self.read_at_ends = self.entries((self._remembered_states, self._law_inputs), far=True)
+        self.finishes = self._can_progress()
+        self.prepared()
+        self.placed()
+        self.moved()
+        self.graph.strict = True  # where a force has no value, neither has what it is added to
+        self.loaded()
+        self.graph.strict = False
+        self.finished()
+        self.solved()
+        self.drifted()
+        self.graph.strict = True
+        self.sampled()
+
+    def prepared(self) -> None:
+        """Unit quaternions, prescribed coordinates."""
+        q, v = self.q.copy(), self.v.copy()
+        set_prescribed(self.S, self.W, self.t, q, v)
+        stores = [(("a", k), x) for k, x in enumerate(q) if x is not self.q[k]]
+        stores += [(("b", k), x) for k, x in enumerate(v) if x is not self.v[k]]
+        stores += [(self.at("velocities.prescribed", d), self.W.velocities.prescribed[d]) for d in self.driven]
+        self.add("PREPARE", {**self.given("a", self.q), **self.given("b", self.v), **self.time}, stores)
+
+    def placed(self) -> None:
+        """Poses and rows."""
+        nm, nr = self.nm, self.nr
+        reads = self.fresh("sensed", VALUE, range(nm, 2 * nm))  # rates, as last measured
+        update_positions(self.S, self.W, self.t, self.q, self.z)
+        rows = range(nr)
+        stores = [x for name in ("value", "nu", "nu_dot") for x in self.stored(f"rows.{name}", None, rows)]
+        stores += [(self.at("G", e), x) for e, x in enumerate(self.W.G)]
+        stores += self.stored("sensed", VALUE, range(nm))
+        stores += [(self.at("T", k, c), x) for (k, c), x in np.ndenumerate(self.W.T)]
+        stores += [(self.at("FK", *e), self.W.FK[e]) for e in self.read_by_others if e[1] < 12]
+        reads |= {**self.given("a", self.q), **self.given("b", self.z), **self.time}
+        self.add("PLACE", reads, stores)
+        shown = [(self.at("FK", *e), self.W.FK[e]) for e in self.read_at_ends if e[1] < 12]
+        self.add("SHOW", self.given("a", self.q), shown)
+
+    def entries(self, readers: Sequence[Callable[[Work], list[Any]]], far: bool = False) -> list[tuple[int, int]]:
+        """Entries of the frames' records that others read; all positions if they ask how ``far`` frames are."""
+        S, FK, graph = self.S, self.W.FK, self.graph
+        moving = range(S.sizes.ground_frames, S.sizes.moving_frames)
+        asked = {(k, c) for k in moving for c in range(3)} if far else set()
+        granted = len(graph.granted)
+        for reader in readers:
+            trial = FK.copy()
+            names = {}
+            for k in moving:
+                for c in range(24):
+                    trial[k, c] = graph.symbol(f"FK[{k}, {c}]")
+                    names[trial[k, c].index] = (k, c)
+            try:
+                found = reader(self.W._replace(FK=trial))
+            except UndeterminedDecision:
+                found = list(trial[list(moving)].ravel())
+            asked |= {names[x.index] for x in ordered_operations(found, {}) if x.index in names}
+        del graph.granted[granted:]  # by formulas of symbols that stand in no procedure
+        return sorted(asked)
+
+    def _can_progress(self) -> bool:
+        """Whether expressions can say how places on curves go on."""
+        granted = len(self.graph.granted)
+        try:
+            self._place_rates(self.W._replace(FK=self.numbered("FK?", self.W.FK.size).reshape(self.W.FK.shape)))
+        except UndeterminedDecision:
+            return False
+        finally:
+            del self.graph.granted[granted:]
+        return True
+
+    def _place_rates(self, W: Work) -> list[Any]:
+        """Nothing, if expressions can do it."""
+        progress(self.S, W, self.z, np.zeros(len(self.z), object))
+        return []
+
+    def _remembered_states(self, W: Work) -> list[Any]:
+        z = self.z.copy()
+        remember(self.S, W, z)
+        return list(z)
+
+    def _law_inputs(self, W: Work) -> list[Any]:
+        if inspection_buffer(self.S).shape[1] == 0:
+            return []
+        seen = np.zeros((6, count_law_inputs(self.S)), object)
+        store_law_inputs(self.S, W, seen, 1)
+        return list(seen.ravel())
+
+    def _weighed(self, W: Work) -> list[Any]:
+        if not len(self.S.load_terms.load):
+            return []
+        T, lam, sensed = (np.array([self.graph.symbol(f"{n}?{k}") for k in range(x.size)], object).reshape(x.shape)
+                          for n, x in (("T", W.T), ("lam", W.rows.multiplier), ("sensed", W.sensed)))  # fmt: skip
+        reaction_loads(self.S, W._replace(T=T, rows=W.rows._replace(multiplier=lam), sensed=sensed))
+        return list(sensed.ravel())
+
+    def moved(self) -> None:
+        """Velocities, bias accelerations, and what follows."""
+        nm = self.nm
+        update_velocities(self.S, self.W, self.t, self.v, self.z)
+        stores = self.stored("rows.gamma", None, range(self.nr))
+        stores += self.stored("sensed", RATE, range(nm)) + self.stored("sensed", BIAS, range(nm))
+        stores += self.stored("sensed", VALUE, range(nm, 2 * nm))
+        stores += [(self.at("FK", *e), self.W.FK[e]) for e in (*self.read_by_others, *self.read_at_ends) if e[1] >= 12]
+        self.add("MOVE", {**self.given("a", self.v), **self.given("b", self.z), **self.time}, stores)
+
+    def loaded(self) -> None:
+        """Generalised forces."""
+        nm = self.nm
+        reads = self.fresh("sensed", LOAD, range(2 * nm, loads_end(self.S, self.W)))
+        rates = np.full(len(self.z), None, object)
+        apply_all_forces(self.S, self.W, self.t, None, rates)
+        stores = self.stored("velocities.applied", None, range(self.nv))
+        stores += [(("b", k), x) for k, x in enumerate(rates) if x is not None]
+        self.add("LOADS", {**self.state, **reads}, stores)
+
+    def finished(self) -> None:
+        """The state's derivative."""
+        if not self.finishes:
+            return
+        nq, nv = self.s.nq, self.nv
+        given = self.W.velocities.solved, self.W.rows.multiplier
+        x, lam = self.numbered("x", nv), self.numbered("lam", self.nr)
+        self.W.velocities.solved[:], self.W.rows.multiplier[:] = x, lam
+        reads = self.fresh("velocities.effort", None, self.driven)
+        before = self.numbered("dy", nq + nv + len(self.z))  # works stand there already
+        dy = before.copy()
+        store_derivative(self.S, self.W, self.t, np.concatenate([self.q, self.v, self.z]), dy)
+        self.W.velocities.solved[:], self.W.rows.multiplier[:] = given
+        stores = [(("b", k), y) for k, y in enumerate(dy) if y is not before[k]]
+        reads |= {**self.state, **self.given("b", before), **self.given("c", x), **self.given("d", lam)}
+        made = self.add("FINISH", reads, stores)
+        made.checks = [(list({y.index: y for y in dy if isinstance(y, Node)}.values()), "finite", 1.0)]
+
+    def sampled(self) -> None:
+        """Laws that may do much within a step, one by one."""
+        S, W = self.S, self.W
+        sensed = np.full((3, 2 * self.nm), None, object)
+        sensed[VALUE] = values = self.numbered("within", 2 * self.nm)
+        inputs = (self.t, *self.numbered("input", 2))
+        forces = LAWS * len(S.forces.F)
+        self.laws: list[str] = []
+        for k in range(forces + len(S.rows.law) + len(S.tree.parent)) if inspection_buffer(S).shape[1] else ():
+            law = law_at(S, k)
+            self.laws.append("")
+            if law < 0 or not may_be_brief(S.code, law):
+                continue
+            if k < forces:
+                value = evaluate(S.code, S.const, law, W.stack, inputs, sensed)
+            else:
+                value = evaluate_jet(S.code, S.const, law, W.stack, self.t, sensed, BY_TIME)[2]
+            reads = {**self.time, **self.given("a", values)}
+            reads |= {x.index: ("W_flat", LAW_INPUT + n) for n, x in enumerate(inputs[1:])}
+            self.laws[k] = f"LAW{k}"
+            self.add(self.laws[k], reads, [], value)

@@ -1,0 +1,273 @@
+"""Hashed grid with levels by size, and the sorting of bounded shapes into slots in the order of their cells.
+
+Every shape stands in one cell, that of its envelope's middle. Shapes of a level differ in size by no more than
+a factor of two (ten for shapes that have gained speed), and its cells are as wide as the largest. A shape
+examines the neighbouring cells at each level, so the cost is linear in the number of shapes, whatever their
+sizes (after Eitz and Gu 2007, "Hierarchical spatial hashing for real-time collision detection").
+"""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ...math.scalar import sqrt
+from ..shape_kinds import SPHERE
+from ..tables import AHEAD, KIND, MOVER
+from .envelopes import store_axes, update_axes, update_motion, write_envelope
+from .workspace import (
+    BOUNDED,
+    CELL_EDGE,
+    ENVELOPE_BOUND,
+    ENVELOPES_RENEWED,
+    FRAME_LAG,
+    FRAME_ORIGIN,
+    FRAME_STEP,
+    FRAME_VELOCITY,
+    GRID_CORNER,
+    INVERSE_EDGE,
+    IS_GENERIC,
+    IS_SPHERE,
+    LAYER_STRIDE,
+    LEVEL_CLASS,
+    LEVEL_FIRST,
+    LEVEL_MASK,
+    LEVEL_SHAPES,
+    LEVELS,
+    MIDDLE,
+    RAW_BOUND,
+    RAW_ENVELOPE,
+    ROW_STRIDE,
+    SIZE_LEVELS,
+    SLOT_CLASS,
+    SLOT_FORM,
+    SLOT_LEVEL,
+    SLOT_MOVER,
+    SLOT_SHAPE,
+    TYPICAL_RADIUS,
+)
+
+SMALLEST_EDGE = 1e-6  # edges of cells, in usual radii: shapes may be points
+FARTHEST_CELL = 1e15  # cells from the corner; what is further away stands in the last one
+KEY_BITS, KEY_MASK = 21, (1 << 21) - 1
+
+
+@formula
+def cell_index(B, l, c, x):
+    """Number of the cell along axis c at level l."""
+    k = (x - B.level_x[l, GRID_CORNER + c]) * B.level_x[l, INVERSE_EDGE]
+    k = min(FARTHEST_CELL, max(-FARTHEST_CELL, k))
+    whole = int(k)
+    return whole - 1 if k < whole else whole
+
+
+@formula
+def cell_key(a, b, c):
+    """A cell by one number; cells are told apart as long as fewer than 2^21 lie between them along an axis."""
+    return (a & KEY_MASK) | (b & KEY_MASK) << KEY_BITS | (c & KEY_MASK) << 2 * KEY_BITS
+
+
+@formula
+def bucket_of_cell(B, l, a, b, c):
+    """Where in `Search.head` a cell stands; cells of a row stand side by side."""
+    k = a + B.level_i[l, ROW_STRIDE] * b + B.level_i[l, LAYER_STRIDE] * c
+    return B.level_i[l, LEVEL_FIRST] + (k & B.level_i[l, LEVEL_MASK])
+
+
+@formula
+def size_level(largest, whole):
+    """By which power of two a shape is smaller than the largest of its class."""
+    k, edge = 0, 0.5 * largest
+    while whole <= edge and k < SIZE_LEVELS - 1:
+        k, edge = k + 1, 0.5 * edge
+    return k
+
+
+@formula
+def group_extent(sums, g, c, edge):
+    """Over how many cells a group lies along axis c (without shapes far from the rest); where these begin."""
+    n = sums[g, 0]
+    mean = sums[g, 2 + c] / n
+    spread = 6.0 * sqrt(max(0.0, sums[g, 5 + c] / n - mean * mean)) / edge
+    return 3.0 + min(spread, 1e6), mean - 0.5 * spread * edge
+
+
+@formula
+def lay_out_levels(B):
+    """Levels from the sums over groups of one class and size: `Search.level_i`, `level_x`; all places emptied."""
+    count, base = 0, 0
+    for g in range(B.sums.shape[0]):
+        n = int(B.sums[g, 0])
+        if n == 0:
+            continue
+        edge = max(2.0 * B.sums[g, 1], SMALLEST_EDGE * B.real[TYPICAL_RADIUS])
+        B.level_x[count, CELL_EDGE], B.level_x[count, INVERSE_EDGE] = edge, 1.0 / edge
+        places = 2
+        while places < 2 * n:
+            places *= 2
+        row, B.level_x[count, GRID_CORNER] = group_extent(B.sums, g, 0, edge)
+        rows, B.level_x[count, GRID_CORNER + 1] = group_extent(B.sums, g, 1, edge)
+        _, B.level_x[count, GRID_CORNER + 2] = group_extent(B.sums, g, 2, edge)
+        B.level_i[count, ROW_STRIDE] = int(row) | 1
+        B.level_i[count, LAYER_STRIDE] = B.level_i[count, ROW_STRIDE] * (int(rows) | 1)
+        B.level_i[count, LEVEL_CLASS], B.level_i[count, LEVEL_FIRST], B.level_i[count, LEVEL_MASK] = (
+            g // SIZE_LEVELS,
+            base,
+            places - 1,
+        )
+        B.level_i[count, LEVEL_SHAPES] = n
+        B.sums[g, 8] = count
+        base += places
+        count += 1
+    for k in range(base):
+        B.head[k] = -1
+    B.count[LEVELS] = count
+    return base
+
+
+@formula
+def cell_of_slot(B, s, l):
+    """Name and place of the cell in which slot s stands at level l."""
+    a = cell_index(B, l, 0, B.envelope[s, MIDDLE])
+    b = cell_index(B, l, 1, B.envelope[s, MIDDLE + 1])
+    c = cell_index(B, l, 2, B.envelope[s, MIDDLE + 2])
+    return cell_key(a, b, c), bucket_of_cell(B, l, a, b, c)
+
+
+@formula
+def remove_from_cell(B, s):
+    """Take a slot out of its cell (before its envelope changes)."""
+    l = B.slot[s, SLOT_LEVEL]
+    B.level_i[l, LEVEL_SHAPES] -= 1
+    _, at = cell_of_slot(B, s, l)
+    t = B.head[at]
+    if t == s:
+        B.head[at] = B.link[s]
+        return
+    while B.link[t] != s:
+        t = B.link[t]
+    B.link[t] = B.link[s]
+
+
+@formula
+def insert_into_cell(B, s, l):
+    """Put a slot into its cell at level l."""
+    B.slot[s, SLOT_LEVEL] = l
+    B.level_i[l, LEVEL_SHAPES] += 1
+    B.key[s], at = cell_of_slot(B, s, l)
+    B.link[s] = B.head[at]
+    B.head[at] = s
+
+
+@formula
+def finest_level(B, of, whole):
+    """The finest level of a class that takes a shape of this size, or -1."""
+    best = -1
+    for l in range(B.count[LEVELS]):
+        takes = B.level_i[l, LEVEL_CLASS] == of and 2.0 * whole <= B.level_x[l, CELL_EDGE]
+        if takes and (best < 0 or B.level_x[l, CELL_EDGE] < B.level_x[best, CELL_EDGE]):
+            best = l
+    return best
+
+
+@formula
+def neighbour_cells(B, s, l):
+    """First and last cells along each axis in which partners of slot s can stand at level l, and how many cells."""
+    r = B.envelope[s, ENVELOPE_BOUND] + 0.5 * B.level_x[l, CELL_EDGE]
+    x, y, z = B.envelope[s, MIDDLE], B.envelope[s, MIDDLE + 1], B.envelope[s, MIDDLE + 2]
+    a, d = cell_index(B, l, 0, x - r), cell_index(B, l, 0, x + r)
+    b, e = cell_index(B, l, 1, y - r), cell_index(B, l, 1, y + r)
+    c, f = cell_index(B, l, 2, z - r), cell_index(B, l, 2, z + r)
+    many = (d - a + 1.0) * (e - b + 1.0) * (f - c + 1.0)
+    return (a, b, c), (d, e, f), many
+
+
+@formula
+def scan_is_cheaper(B, many):
+    """Whether looking at every shape is quicker than looking at so many cells."""
+    return many > 27.0 + B.count[BOUNDED]
+
+
+@formula
+def make_envelopes(G, M, B):
+    """Envelopes of all bounded shapes, by shape, in ``raw``; sums over shapes of one class and size in ``sums``."""
+    for g in range(B.sums.shape[0]):
+        for c in range(B.sums.shape[1]):
+            B.sums[g, c] = 0.0
+    for i in range(B.shape_class.shape[0]):
+        if B.shape_class[i] >= 0:
+            m = G.shape_i[i, MOVER]
+            update_motion(M, B, i, m, G.shape_i[i, KIND] == SPHERE, B.raw, i)
+            B.raw[i, RAW_BOUND] = write_envelope(B, B.raw, i, RAW_ENVELOPE, m < 0)
+            first = B.shape_class[i] * SIZE_LEVELS
+            B.sums[first, 9] = max(B.sums[first, 9], B.raw[i, RAW_ENVELOPE + ENVELOPE_BOUND])
+    for i in range(B.shape_class.shape[0]):
+        if B.shape_class[i] >= 0:
+            g = B.shape_class[i] * SIZE_LEVELS
+            g += size_level(B.sums[g, 9], B.raw[i, RAW_ENVELOPE + ENVELOPE_BOUND])
+            B.mark[i] = g
+            B.sums[g, 0] += 1.0
+            B.sums[g, 1] = max(B.sums[g, 1], B.raw[i, RAW_BOUND])
+            for c in range(3):
+                x = B.raw[i, RAW_ENVELOPE + MIDDLE + c]
+                B.sums[g, 2 + c] += x
+                B.sums[g, 5 + c] += x * x
+
+
+@formula
+def number_slots(B, places):
+    """Slots by counting how many shapes stand at each place: by shape, in ``moved``; ``head`` then tells the first."""
+    for i in range(B.shape_class.shape[0]):
+        if B.shape_class[i] >= 0:
+            l = int(B.sums[B.mark[i], 8])
+            a = cell_index(B, l, 0, B.raw[i, RAW_ENVELOPE + MIDDLE])
+            b = cell_index(B, l, 1, B.raw[i, RAW_ENVELOPE + MIDDLE + 1])
+            B.moved[i] = bucket_of_cell(B, l, a, b, cell_index(B, l, 2, B.raw[i, RAW_ENVELOPE + MIDDLE + 2]))
+            B.mark[i] = l
+            B.head[B.moved[i]] += 1  # from -1
+    total = 0
+    for p in range(places):
+        total += B.head[p] + 1
+        B.head[p] = total
+    for k in range(B.shape_class.shape[0]):
+        i = B.shape_class.shape[0] - 1 - k
+        if B.shape_class[i] >= 0:
+            p = B.moved[i]
+            B.head[p] -= 1
+            B.moved[i] = B.head[p]
+    for p in range(places):
+        first = B.head[p]
+        end = B.head[p + 1] if p + 1 < places else total
+        if first == end:
+            B.head[p] = -1
+        for s in range(first, end):
+            B.link[s] = s + 1 if s + 1 < end else -1
+
+
+@formula
+def fill_slots(G, M, B):
+    """What is kept by slot, from what is kept by shape."""
+    for i in range(B.shape_class.shape[0]):
+        if B.shape_class[i] >= 0:
+            s = B.moved[i]
+            B.slot[s, SLOT_SHAPE], B.slot[s, SLOT_MOVER], B.slot[s, SLOT_LEVEL] = i, G.shape_i[i, MOVER], B.mark[i]
+            B.slot[s, SLOT_FORM] = IS_SPHERE if G.shape_i[i, KIND] == SPHERE else IS_GENERIC
+            B.slot[s, SLOT_CLASS] = B.shape_class[i]
+            for c in range(8):
+                B.now[s, c], B.envelope[s, c] = B.raw[i, c], B.raw[i, RAW_ENVELOPE + c]
+            if B.slot[s, SLOT_FORM] == IS_GENERIC:
+                update_axes(G, M, B, s, i, B.slot[s, SLOT_MOVER])
+                store_axes(B, s)
+    for s in range(B.count[BOUNDED]):
+        B.key[s], _ = cell_of_slot(B, s, B.slot[s, SLOT_LEVEL])
+        B.mark[s] = 0
+
+
+@formula
+def sort_shapes(G, M, B):
+    """New slots and envelopes for all bounded shapes; the frame begins anew."""
+    for c in range(3):
+        B.real[FRAME_ORIGIN + c] = B.real[FRAME_LAG + c] = 0.0
+        B.real[FRAME_STEP + c] = B.real[AHEAD] * B.real[FRAME_VELOCITY + c]
+    make_envelopes(G, M, B)
+    number_slots(B, lay_out_levels(B))
+    fill_slots(G, M, B)
+    B.count[ENVELOPES_RENEWED] += B.count[BOUNDED]

@@ -1,0 +1,286 @@
+"""The list of pairs of shapes that may touch: pair filter, overlap of envelopes, full and partial rebuild."""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ..contact_matching import store_pair, stored_contact
+from ..tables import MASK, MEMBER
+from .cell_grid import (
+    bucket_of_cell,
+    cell_index,
+    cell_key,
+    finest_level,
+    insert_into_cell,
+    neighbour_cells,
+    remove_from_cell,
+    scan_is_cheaper,
+)
+from .envelopes import bounds_meet, envelope_reaches_plane, store_axes, store_reference_plane, write_envelope
+from .workspace import (
+    BOUNDED,
+    CELL_EDGE,
+    CLASSES_EXACT,
+    CURRENT_HALF,
+    ENVELOPE_BOUND,
+    ENVELOPE_RADIUS,
+    ENVELOPES_RENEWED,
+    GENERIC_PAIR,
+    IS_GENERIC,
+    IS_PLANE,
+    IS_SPHERE,
+    LEVEL_CLASS,
+    LEVELS,
+    MIDDLE,
+    MOVED_SLOTS,
+    PAIRS_COMPARED,
+    PAIRS_IN_LIST,
+    PLANE_SPHERE,
+    RAW_ENVELOPE,
+    SLOT_CLASS,
+    SLOT_FORM,
+    SLOT_LEVEL,
+    SLOT_MOVER,
+    SLOT_SHAPE,
+    SPHERE_PLANE,
+    SPHERE_RADIUS,
+    SPHERE_SPHERE,
+    WIDE,
+)
+
+LONG_ENVELOPE = 0.5  # an envelope longer than this, in radii, is looked at as a capsule
+
+
+@formula
+def is_excluded(excluded, a, b):
+    """Whether the pair of movers stands in a sorted list of pairs, the smaller first."""
+    if a > b:
+        a, b = b, a
+    low, high = 0, excluded.shape[0]
+    while low < high:
+        k = (low + high) // 2
+        if excluded[k, 0] < a or (excluded[k, 0] == a and excluded[k, 1] < b):
+            low = k + 1
+        else:
+            high = k
+    return low < excluded.shape[0] and excluded[low, 0] == a and excluded[low, 1] == b
+
+
+@formula
+def may_touch(G, B, s, t):
+    """Whether the shapes of two slots may touch at all."""
+    a, b = B.slot[s, SLOT_MOVER], B.slot[t, SLOT_MOVER]
+    if a == b:  # the same mover, or both stand still
+        return False
+    if B.count[CLASSES_EXACT] == 0:
+        i, j = B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE]
+        if G.shape_i[i, MEMBER] & G.shape_i[j, MASK] == 0 or G.shape_i[j, MEMBER] & G.shape_i[i, MASK] == 0:
+            return False
+    return G.apart.shape[0] == 0 or not is_excluded(G.apart, a, b)
+
+
+@formula
+def squared_axis_distance(fat, s, t, x, y, z):
+    """Squared distance of the lines of two envelopes; (x, y, z) from the middle of s to that of t.
+
+    The parameters are found in turn, as for two segments (Ericson 2005, 5.1.9).
+    """
+    a, b = (fat[s, 3], fat[s, 4], fat[s, 5]), (fat[t, 3], fat[t, 4], fat[t, 5])
+    aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+    bb = b[0] * b[0] + b[1] * b[1] + b[2] * b[2]
+    ab = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    ax, bx = x * a[0] + y * a[1] + z * a[2], x * b[0] + y * b[1] + z * b[2]
+    det = aa * bb - ab * ab
+    p = 0.0  # place on the line of s, in [-1, 1]
+    if det > 1e-12 * aa * bb:
+        p = min(1.0, max(-1.0, (ax * bb - bx * ab) / det))
+    q = 0.0
+    if bb > 0.0:
+        q = min(1.0, max(-1.0, (p * ab - bx) / bb))
+    if aa > 0.0:
+        p = min(1.0, max(-1.0, (ax + q * ab) / aa))
+    if det <= 1e-12 * aa * bb and bb > 0.0:  # side by side: once more
+        q = min(1.0, max(-1.0, (p * ab - bx) / bb))
+        if aa > 0.0:
+            p = min(1.0, max(-1.0, (ax + q * ab) / aa))
+    x, y, z = x + q * b[0] - p * a[0], y + q * b[1] - p * a[1], z + q * b[2] - p * a[2]
+    return x * x + y * y + z * z
+
+
+@formula
+def envelopes_meet(B, s, t):
+    """Whether the envelopes of two bounded slots meet."""
+    fat = B.envelope
+    x = fat[t, MIDDLE] - fat[s, MIDDLE]
+    y = fat[t, MIDDLE + 1] - fat[s, MIDDLE + 1]
+    z = fat[t, MIDDLE + 2] - fat[s, MIDDLE + 2]
+    whole = fat[s, ENVELOPE_BOUND] + fat[t, ENVELOPE_BOUND]
+    if x * x + y * y + z * z > whole * whole:
+        return False
+    close = fat[s, ENVELOPE_RADIUS] + fat[t, ENVELOPE_RADIUS]
+    if whole > (1.0 + LONG_ENVELOPE) * close and squared_axis_distance(fat, s, t, x, y, z) > close * close:
+        return False
+    return bounds_meet(B, B.turn, s, t, (x, y, z), whole - B.now[s, SPHERE_RADIUS] - B.now[t, SPHERE_RADIUS])
+
+
+SUCCEEDING_SLOTS, ALL_SLOTS, UNVISITED_SLOTS = range(3)
+"""Which partners are taken: those that come later in order, all, or all but moved ones that come earlier."""
+
+
+@formula
+def add_pair(G, B, s, t):
+    """Put two slots into the list: whether there was room."""
+    n = B.count[PAIRS_IN_LIST]
+    if n >= B.pair.shape[0]:
+        return False
+    i, j = B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE]
+    if i > j:
+        i, j, s, t = j, i, t, s
+    a, b = B.slot[s, SLOT_FORM], B.slot[t, SLOT_FORM]
+    way = GENERIC_PAIR
+    if b == IS_SPHERE and (a == IS_SPHERE or a == IS_PLANE):
+        way = SPHERE_SPHERE if a == IS_SPHERE else PLANE_SPHERE
+    elif a == IS_SPHERE and b == IS_PLANE:
+        way = SPHERE_PLANE
+    B.pair[n, 0], B.pair[n, 1], B.pair[n, 2] = s, t, way
+    B.seen[B.count[CURRENT_HALF], n] = stored_contact(B, i, j)
+    B.count[PAIRS_IN_LIST] = n + 1
+    return True
+
+
+@formula
+def add_from_cell(G, B, s, t, key, which):
+    """Offer all of one place that stand in the cell ``key``; ``t`` is the first."""
+    compared = 0
+    while t >= 0:
+        if B.key[t] == key and t != s and not (which == UNVISITED_SLOTS and t < s and B.mark[t] != 0):
+            compared += 1
+            if envelopes_meet(B, s, t) and may_touch(G, B, s, t) and not add_pair(G, B, s, t):
+                return False
+        t = B.link[t]
+    B.count[PAIRS_COMPARED] += compared
+    return True
+
+
+@formula
+def add_from_level(G, B, s, l, which):
+    """Offer all of level l, one by one."""
+    for t in range(B.count[BOUNDED]):
+        if B.slot[t, SLOT_LEVEL] == l and t != s and not (which == UNVISITED_SLOTS and t < s and B.mark[t] != 0):
+            B.count[PAIRS_COMPARED] += 1
+            if envelopes_meet(B, s, t) and may_touch(G, B, s, t) and not add_pair(G, B, s, t):
+                return False
+    return True
+
+
+@formula
+def add_neighbours(G, B, s, l, which):
+    """Offer the partners of slot s at level l: whether there was room."""
+    first, last, many = neighbour_cells(B, s, l)
+    if which != SUCCEEDING_SLOTS and scan_is_cheaper(B, many):
+        return add_from_level(G, B, s, l, which)
+    a, b, c = first
+    own = (a, b, c)
+    if which == SUCCEEDING_SLOTS:
+        own = (
+            cell_index(B, l, 0, B.envelope[s, MIDDLE]),
+            cell_index(B, l, 1, B.envelope[s, MIDDLE + 1]),
+            cell_index(B, l, 2, B.envelope[s, MIDDLE + 2]),
+        )
+        if not add_from_cell(G, B, s, B.link[s], B.key[s], SUCCEEDING_SLOTS):
+            return False
+        c = own[2]
+    for z in range(c, last[2] + 1):
+        ahead = which == SUCCEEDING_SLOTS and z == own[2]
+        for y in range(own[1] if ahead else b, last[1] + 1):
+            for x in range(own[0] + 1 if ahead and y == own[1] else a, last[0] + 1):
+                t = B.head[bucket_of_cell(B, l, x, y, z)]
+                if t >= 0 and not add_from_cell(G, B, s, t, cell_key(x, y, z), which):
+                    return False
+    return True
+
+
+@formula
+def add_plane_pairs(G, B, w):
+    """Offer the partners of a wide slot: whether there was room."""
+    of = B.slot[w, SLOT_CLASS]
+    store_reference_plane(B, w - B.count[BOUNDED], B.slot[w, SLOT_MOVER] < 0)
+    for s in range(B.count[BOUNDED]):
+        near = B.meets[of, B.slot[s, SLOT_CLASS]] != 0 and envelope_reaches_plane(B, w - B.count[BOUNDED], s)
+        if near and may_touch(G, B, s, w) and not add_pair(G, B, s, w):
+            return False
+    return True
+
+
+@formula
+def list_all(G, B):
+    """All pairs, in the order of the slots: whether there was room."""
+    B.count[PAIRS_IN_LIST] = 0
+    for s in range(B.count[BOUNDED]):
+        own = B.slot[s, SLOT_LEVEL]
+        edge = B.level_x[own, CELL_EDGE]
+        for l in range(B.count[LEVELS]):
+            if B.meets[B.slot[s, SLOT_CLASS], B.level_i[l, LEVEL_CLASS]] != 0:
+                coarser = B.level_x[l, CELL_EDGE] > edge or (B.level_x[l, CELL_EDGE] == edge and l >= own)
+                if coarser and not add_neighbours(G, B, s, l, SUCCEEDING_SLOTS if l == own else ALL_SLOTS):
+                    return False
+    for w in range(B.count[BOUNDED], B.count[BOUNDED] + B.count[WIDE]):  # noqa: SIM110
+        if not add_plane_pairs(G, B, w):
+            return False
+    return True
+
+
+@formula
+def drop_moved(B):
+    """Take the pairs of marked slots off the list, and keep in the table which contacts they had."""
+    n, half = 0, B.count[CURRENT_HALF]
+    for k in range(B.count[PAIRS_IN_LIST]):
+        s, t, first = B.pair[k, 0] + 0, B.pair[k, 1] + 0, B.seen[half, k] + 0  # all integers of one type
+        if B.mark[s] == 0 and B.mark[t] == 0:
+            if n < k:
+                B.pair[n, 0], B.pair[n, 1], B.pair[n, 2], B.seen[half, n] = s, t, B.pair[k, 2], first
+            n += 1
+        elif first >= 0:
+            store_pair(B, B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE], first)
+    B.count[PAIRS_IN_LIST] = n
+
+
+@formula
+def renew_envelope(B, s):
+    """Another envelope for slot s, in its cell: whether a level takes it."""
+    i = B.slot[s, SLOT_SHAPE]
+    for c in range(8):
+        B.raw[i, c] = B.now[s, c]
+    write_envelope(B, B.raw, i, RAW_ENVELOPE, B.slot[s, SLOT_MOVER] < 0)
+    l = finest_level(B, B.slot[s, SLOT_CLASS], B.raw[i, RAW_ENVELOPE + ENVELOPE_BOUND])
+    if l < 0:
+        return False
+    remove_from_cell(B, s)
+    for c in range(8):
+        B.envelope[s, c] = B.raw[i, RAW_ENVELOPE + c]
+    if B.slot[s, SLOT_FORM] == IS_GENERIC:
+        store_axes(B, s)
+    insert_into_cell(B, s, l)
+    B.count[ENVELOPES_RENEWED] += 1
+    return True
+
+
+@formula
+def list_moved(G, B):
+    """The pairs of shapes that have left their envelopes, at the end of the list: whether there was room."""
+    wide = B.count[BOUNDED]
+    for k in range(B.count[MOVED_SLOTS]):
+        s = B.moved[k]
+        if s >= wide:
+            if not add_plane_pairs(G, B, s):
+                return False
+            continue
+        for l in range(B.count[LEVELS]):
+            if B.meets[B.slot[s, SLOT_CLASS], B.level_i[l, LEVEL_CLASS]] != 0 and not add_neighbours(
+                G, B, s, l, UNVISITED_SLOTS
+            ):
+                return False
+        for w in range(wide, wide + B.count[WIDE]):
+            may = B.mark[w] == 0 and B.meets[B.slot[w, SLOT_CLASS], B.slot[s, SLOT_CLASS]] != 0
+            if may and envelope_reaches_plane(B, w - wide, s) and may_touch(G, B, s, w) and not add_pair(G, B, s, w):
+                return False
+    return True

@@ -1,0 +1,562 @@
+"""The compiled contact search, and the contacts of the listed pairs.
+
+::
+
+    status = enter(address, G, M, C, O, B, STEP)      # structures passed by pointer: see compiler/door.py
+
+`search` brings the list of pairs (`broad_phase/pair_list`) up to date, then computes the contacts of every
+listed pair: spheres and planes directly, other pairs by the narrow phase. A pair that moves fast is advanced
+along its motion to where it first touches (conservative advancement: Mirtich 1996, "Impulse-based dynamic
+simulation of rigid body systems", 2.3): nearest points of shapes that are far apart say little about where they
+will meet.
+
+`C` receives the contacts for the poses in `M`; `O` holds those of the last search that returned `DONE` (the two
+change places from step to step). With status `FULL_*` or `NOT_FINITE`, `O` and the workspace stay as they were:
+the caller enlarges the table (`ContactFinder.enlarge`) and calls again. ``C.count[FOUND]`` is the number of
+contacts (with FULL_CONTACTS: how many there would be; with NOT_FINITE: the mover). Poses in `M` may change
+while the search runs; they are restored.
+"""
+
+from __future__ import annotations
+
+from ..compiler.formulas import call, formula
+from ..compiler.kernels import kernel
+from ..math.scalar import cos, sin, sqrt
+from ..math.vec import add, dot, load3, load9, mm, norm, quaternion_matrix, scale, store3, store9, sub
+from .broad_phase.cell_grid import sort_shapes
+from .broad_phase.envelopes import (
+    advance_frame,
+    bounds_meet,
+    half_extent,
+    set_frame,
+    update_plane,
+    update_slots,
+    velocity_at_point,
+)
+from .broad_phase.pair_list import drop_moved, list_all, list_moved, renew_envelope
+from .broad_phase.workspace import (
+    BOUNDED,
+    CENTRE,
+    CURRENT_HALF,
+    DISPLACEMENT,
+    FRAME_ORIGIN,
+    FRAME_STEP,
+    FRAME_VELOCITY,
+    GENERIC_PAIR,
+    IS_PLANE,
+    LIST_VALID,
+    MOVED_SLOTS,
+    NARROW_PHASE,
+    PAIRS_AT_REBUILD,
+    PAIRS_EXAMINED,
+    PAIRS_IN_LIST,
+    PLANE_NORMAL,
+    PLANE_ORIGIN,
+    PLANE_SPIN,
+    PLANE_VELOCITY,
+    QUERY_REACH,
+    QUERY_SHAPE_1,
+    QUERY_SHAPE_2,
+    REBUILDS,
+    SEARCHES,
+    SLOT_FORM,
+    SLOT_MOVER,
+    SLOT_SHAPE,
+    SPHERE_PLANE,
+    SPHERE_RADIUS,
+    SPHERE_SPHERE,
+    TURNING_SPEED,
+    VELOCITY,
+    WIDE,
+    Search,
+)
+from .contact_matching import clear_table, matching_contact, store_all_pairs
+from .tables import (
+    AHEAD,
+    APART,
+    BEFORE,
+    DONE,
+    FEATURE,
+    FOUND,
+    FULL_CONTACTS,
+    FULL_PAIRS,
+    GAP,
+    MARGIN,
+    NORMAL,
+    NOT_FINITE,
+    NUMBER,
+    PAIRS,
+    POINT,
+    REBUILT,
+    SHAPE_1,
+    SHAPE_2,
+    STATUS,
+    Contacts,
+    Geometry,
+    Movers,
+)
+
+
+@formula
+def write_contact(C, n, point, normal, gap, offset):
+    """Row n of the contacts, if there is one."""
+    if n < C.x.shape[0]:
+        C.x[n, POINT], C.x[n, POINT + 1], C.x[n, POINT + 2] = point
+        C.x[n, NORMAL], C.x[n, NORMAL + 1], C.x[n, NORMAL + 2] = normal
+        C.x[n, GAP] = gap
+        C.x[n, APART], C.x[n, APART + 1], C.x[n, APART + 2] = offset
+
+
+@formula
+def write_contact_identity(C, n, i, j, feature, first):
+    """Say between which shapes contact n is, and which it was before."""
+    if n < C.at.shape[0]:
+        C.at[n, SHAPE_1], C.at[n, SHAPE_2], C.at[n, FEATURE], C.at[n, BEFORE] = i, j, feature, first
+
+
+@formula
+def approach_time(d, r, reach, u, horizon):
+    """When spheres a vector d apart that goes on with u touch, or are nearest; -1 if not within ``reach``."""
+    du, u2, d2 = dot(d, u), dot(u, u), dot(d, d)
+    if du >= 0.0:
+        return -1.0
+    time = min(horizon, -du / u2)
+    if d2 + time * (2.0 * du + time * u2) >= reach * reach:
+        return -1.0
+    deep = du * du - u2 * (d2 - r * r)  # discriminant: when the surfaces meet
+    if deep > 0.0:
+        time = min(time, (d2 - r * r) / (sqrt(deep) - du))
+    return time
+
+
+@formula
+def sphere_sphere_contact(C, B, s, t, n):
+    """The contact of two spheres, as row n: how many.
+
+    Spheres whose surfaces come to within the margin in `AHEAD` seconds, as they go or if something stops one of them,
+    touch already: along the normal at which they will (first) be nearest, with the gap between their tangent planes
+    across it. A sphere that passes another has no contact with it.
+    """
+    now, far = B.now, 0.0
+    x, y, z = (
+        now[t, CENTRE] - now[s, CENTRE],
+        now[t, CENTRE + 1] - now[s, CENTRE + 1],
+        now[t, CENTRE + 2] - now[s, CENTRE + 2],
+    )
+    r = now[s, SPHERE_RADIUS] + now[t, SPHERE_RADIUS]
+    reach = r + B.real[MARGIN]
+    d2 = x * x + y * y + z * z
+    a, b, c = x, y, z
+    if d2 >= reach * reach:
+        D = (B.real[FRAME_VELOCITY], B.real[FRAME_VELOCITY + 1], B.real[FRAME_VELOCITY + 2])
+        v, w = sub(load3(now, s, VELOCITY), D), sub(load3(now, t, VELOCITY), D)
+        u = sub(w, v)
+        time = approach_time((x, y, z), r, reach, u, B.real[AHEAD])
+        if time < 0.0:
+            u = w
+            time = approach_time((x, y, z), r, reach, u, B.real[AHEAD])
+        if time < 0.0:
+            u = scale(-1.0, v)
+            time = approach_time((x, y, z), r, reach, u, B.real[AHEAD])
+        if time < 0.0:
+            return 0
+        a, b, c = x + time * u[0], y + time * u[1], z + time * u[2]
+        d2 = a * a + b * b + c * c
+        far = 1.0
+    d = sqrt(d2)
+    if d > 1e-150:
+        a, b, c = a / d, b / d, c / d
+    else:
+        a, b, c = 1.0, 0.0, 0.0
+    gap = d - r if far == 0.0 else a * x + b * y + c * z - r
+    p = now[s, SPHERE_RADIUS] - 0.5 * r
+    point = (
+        now[s, CENTRE] + 0.5 * x + p * a,
+        now[s, CENTRE + 1] + 0.5 * y + p * b,
+        now[s, CENTRE + 2] + 0.5 * z + p * c,
+    )
+    # half of what the middles are apart across the normal: each sphere is touched on the line through its own middle
+    along = 0.5 * (a * x + b * y + c * z)
+    apart = 0.5 * x - along * a, 0.5 * y - along * b, 0.5 * z - along * c
+    if B.slot[t, SLOT_MOVER] < 0:
+        point, apart = sub(point, apart), (0.0, 0.0, 0.0)
+    elif B.slot[s, SLOT_MOVER] < 0:
+        point, apart = add(point, apart), (0.0, 0.0, 0.0)
+    write_contact(C, n, point, (a, b, c), gap, apart)
+    return 1
+
+
+@formula
+def plane_sphere_contact(C, B, w, s, side, n):
+    """The contact of wide slot w, a plane, and slot s, a sphere; ``side`` is -1 where the sphere is shape 1."""
+    k = w - B.count[BOUNDED]
+    q = B.wide
+    x = (
+        B.now[s, CENTRE] - q[k, PLANE_ORIGIN],
+        B.now[s, CENTRE + 1] - q[k, PLANE_ORIGIN + 1],
+        B.now[s, CENTRE + 2] - q[k, PLANE_ORIGIN + 2],
+    )
+    a, b, c = q[k, PLANE_NORMAL], q[k, PLANE_NORMAL + 1], q[k, PLANE_NORMAL + 2]
+    gap = a * x[0] + b * x[1] + c * x[2] - B.now[s, SPHERE_RADIUS]
+    if gap >= B.real[MARGIN]:
+        u = (q[k, PLANE_SPIN], q[k, PLANE_SPIN + 1], q[k, PLANE_SPIN + 2])
+        closing = a * (q[k, PLANE_VELOCITY] + u[1] * x[2] - u[2] * x[1] - B.now[s, VELOCITY])
+        closing += b * (q[k, PLANE_VELOCITY + 1] + u[2] * x[0] - u[0] * x[2] - B.now[s, VELOCITY + 1])
+        closing += c * (q[k, PLANE_VELOCITY + 2] + u[0] * x[1] - u[1] * x[0] - B.now[s, VELOCITY + 2])
+        if gap >= B.real[MARGIN] + closing * B.real[AHEAD]:
+            return 0
+    p = B.now[s, SPHERE_RADIUS] + 0.5 * gap
+    point = (B.now[s, CENTRE] - p * a, B.now[s, CENTRE + 1] - p * b, B.now[s, CENTRE + 2] - p * c)
+    write_contact(C, n, point, (side * a, side * b, side * c), gap, (0.0, 0.0, 0.0))
+    return 1
+
+
+MAX_ADVANCES = 40  # advances
+TOUCHING_GAP = 0.01  # a gap that is taken for touching, in radii of the smaller shape
+
+
+@formula
+def store_pose(M, B, row, m):
+    """Keep the pose of a mover."""
+    if m >= 0:
+        for c in range(12):
+            B.kept[row, c] = M.pose[m, c]
+
+
+@formula
+def restore_pose(M, B, row, m):
+    """Put it back where it was."""
+    if m >= 0:
+        for c in range(12):
+            M.pose[m, c] = B.kept[row, c]
+
+
+@formula
+def advance_pose(M, B, row, m, time):
+    """Put a mover where it will be."""
+    if m >= 0:
+        w = load3(M.twist, m, 3)
+        half = 0.5 * time * norm(w)
+        store3(M.pose, m, 0, add(load3(B.kept, row, 0), scale(time, load3(M.twist, m, 0))))
+        if half > 0.0:
+            e = scale(0.5 * time * sin(half) / half, w)
+            store9(M.pose, m, 3, mm(quaternion_matrix(cos(half), e[0], e[1], e[2]), load9(B.kept, row, 3)))
+
+
+@formula
+def query_narrow_phase(G, M, B, s, t, reach):
+    """Contacts of the pair of slots as it stands, up to this gap, into ``room``: how many."""
+    B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH] = (
+        B.slot[s, SLOT_SHAPE],
+        B.slot[t, SLOT_SHAPE],
+        reach,
+    )
+    return call(B.count[NARROW_PHASE], G, M, B, B, B, 0)
+
+
+@formula
+def smallest_gap(B, found):
+    """The contact with the least gap."""
+    best = 0
+    for k in range(found):
+        if B.room[k, 6] < B.room[best, 6]:
+            best = k
+    return best
+
+
+@formula
+def closing_speed(B, s, t, k):
+    """How fast two bounded shapes can come nearer along the normal of contact k."""
+    v = B.now[s, TURNING_SPEED] + B.now[t, TURNING_SPEED]
+    for c in range(3):
+        v += B.room[k, 3 + c] * (B.now[s, VELOCITY + c] - B.now[t, VELOCITY + c])
+    return v
+
+
+@formula
+def advance_to_touch(G, M, B, s, t, reach, size):
+    """Contacts where a fast pair will first touch within `AHEAD` seconds: how many, and after what time.
+
+    They stand in ``room``, their poses in M: `restore_pose` puts these back. ``reach`` is `MARGIN` and the largest way.
+    """
+    a, b = B.slot[s, SLOT_MOVER], B.slot[t, SLOT_MOVER]
+    ahead, time = B.real[AHEAD], 0.0
+    fastest = (reach - B.real[MARGIN]) / ahead
+    enough = B.real[MARGIN] + TOUCHING_GAP * size
+    for _ in range(MAX_ADVANCES):
+        found = query_narrow_phase(G, M, B, s, t, B.real[MARGIN] + fastest * (ahead - time))
+        if found == 0:
+            return 0, time
+        k = smallest_gap(B, found)
+        gap = B.room[k, 6]
+        if gap <= enough:
+            return found, time
+        speed = fastest
+        if s < B.count[BOUNDED] and t < B.count[BOUNDED]:
+            speed = min(fastest, closing_speed(B, s, t, k))
+        if gap - B.real[MARGIN] >= speed * (ahead - time):
+            return 0, time
+        time += (gap - 0.5 * enough) / speed
+        if time >= ahead:
+            return 0, time
+        advance_pose(M, B, 0, a, time)
+        advance_pose(M, B, 1, b, time)
+    return found, time
+
+
+FAST_STEP = (
+    0.25  # what goes further than this with a step, in radii of the smaller shape, is carried on to where it touches
+)
+
+
+@formula
+def frame_velocity(B):
+    """The velocity with which all go together, if they do."""
+    return (B.real[FRAME_VELOCITY], B.real[FRAME_VELOCITY + 1], B.real[FRAME_VELOCITY + 2])
+
+
+@formula
+def largest_approach(B, s, t):
+    """What two bounded slots cover of their distance in `AHEAD` seconds at most."""
+    u = norm(sub(load3(B.now, t, VELOCITY), load3(B.now, s, VELOCITY)))
+    return B.real[AHEAD] * (u + B.now[s, TURNING_SPEED] + B.now[t, TURNING_SPEED])
+
+
+@formula
+def pair_reach(B, s, t):
+    """The largest gap at which a pair of bounded slots may touch within `AHEAD` seconds; below 0 if it cannot."""
+    now = B.now
+    reach = B.real[MARGIN]
+    D = frame_velocity(B)
+    v, w = sub(load3(now, s, VELOCITY), D), sub(load3(now, t, VELOCITY), D)
+    u = max(norm(sub(w, v)), norm(v), norm(w))
+    d = sub(load3(now, t, CENTRE), load3(now, s, CENTRE))
+    reach += B.real[AHEAD] * (u + now[s, TURNING_SPEED] + now[t, TURNING_SPEED])
+    whole = reach + now[s, SPHERE_RADIUS] + now[t, SPHERE_RADIUS]
+    return reach if dot(d, d) < whole * whole and bounds_meet(B, B.axes, s, t, d, reach) else -1.0
+
+
+@formula
+def plane_reach(M, B, w, s):
+    """As `pair_reach`, for wide slot w and slot s."""
+    k = w - B.count[BOUNDED]
+    q = B.wide
+    p, n = load3(B.now, s, CENTRE), load3(q, k, PLANE_NORMAL)
+    u = norm(sub(velocity_at_point(M, B.slot[w, SLOT_MOVER], p), load3(B.now, s, VELOCITY)))
+    gap = dot(n, sub(p, load3(q, k, PLANE_ORIGIN))) - half_extent(B, B.axes, s, n)
+    reach = B.real[MARGIN] + B.real[AHEAD] * (
+        u + B.now[s, TURNING_SPEED] + norm(load3(q, k, PLANE_SPIN)) * B.now[s, SPHERE_RADIUS]
+    )
+    return -1.0 if gap > reach else reach
+
+
+@formula
+def point_before_motion(M, p, a, b, time):
+    """A point at which movers a and b will touch after some time, before it, and half of what it is apart on them.
+
+    Each mover has it where it will be from its origin when they touch.
+    """
+    v = load3(M.twist, a, 0) if a >= 0 else (0.0, 0.0, 0.0)
+    u = load3(M.twist, b, 0) if b >= 0 else (0.0, 0.0, 0.0)
+    if a < 0 or b < 0:
+        return sub(p, scale(time, add(v, u))), (0.0, 0.0, 0.0)
+    return sub(p, scale(0.5 * time, add(v, u))), scale(0.5 * time, sub(v, u))
+
+
+@formula
+def accept_contacts(M, C, O, B, pair, rows, time, found):
+    """Of the contacts in ``room``, after some time of motion, those that may touch: into C, as they are before it.
+
+    ``rows`` are the first contact of the pair before and the row that the first now goes to. Returns how many.
+    """
+    many, used, ahead = 0, 0, B.real[AHEAD]
+    s, t = pair
+    i, j = B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE]
+    size = min(B.now[s, SPHERE_RADIUS], B.now[t, SPHERE_RADIUS])
+    for k in range(found):
+        p, e = load3(B.room, k, 0), load3(B.room, k, 3)
+        v, u = velocity_at_point(M, B.slot[s, SLOT_MOVER], p), velocity_at_point(M, B.slot[t, SLOT_MOVER], p)
+        closing = dot(e, sub(v, u))
+        gap = B.room[k, 6] + time * closing
+        D = frame_velocity(B)
+        if s < B.count[BOUNDED] and t < B.count[BOUNDED]:  # something else may stop one of them
+            closing = max(closing, dot(e, sub(v, D)), dot(e, sub(D, u)))
+        if gap < B.real[MARGIN] + ahead * max(0.0, closing):
+            p, apart = point_before_motion(M, p, B.slot[s, SLOT_MOVER], B.slot[t, SLOT_MOVER], time)
+            feature = int(B.room[k, 7])
+            c, bit = matching_contact(O, (i, j), rows[0], feature, sub(p, scale(ahead, v)), size, used)
+            used |= bit
+            write_contact(C, rows[1] + many, p, e, gap, apart)
+            write_contact_identity(C, rows[1] + many, i, j, feature, c)
+            many += 1
+    return many
+
+
+@formula
+def generic_contacts(G, M, C, O, B, pair, first, n):
+    """Contacts of any pair of slots, from row n on: how many. ``first`` is the pair's first contact before."""
+    s, t = pair
+    bounded = B.count[BOUNDED]
+    reach = pair_reach(B, s, t) if s < bounded and t < bounded else plane_reach(M, B, max(s, t), min(s, t))
+    if reach < 0.0:
+        return 0
+    a, b, size = B.slot[s, SLOT_MOVER], B.slot[t, SLOT_MOVER], min(B.now[s, SPHERE_RADIUS], B.now[t, SPHERE_RADIUS])
+    flat = (s >= bounded and B.slot[s, SLOT_FORM] == IS_PLANE) or (t >= bounded and B.slot[t, SLOT_FORM] == IS_PLANE)
+    near = largest_approach(B, s, t) if s < bounded and t < bounded else reach - B.real[MARGIN]
+    if flat or near <= FAST_STEP * size:
+        return accept_contacts(M, C, O, B, pair, (first, n), 0.0, query_narrow_phase(G, M, B, s, t, reach))
+    found = query_narrow_phase(G, M, B, s, t, B.real[MARGIN])
+    if found > 0:
+        return accept_contacts(M, C, O, B, pair, (first, n), 0.0, query_narrow_phase(G, M, B, s, t, reach))
+    store_pose(M, B, 0, a)
+    store_pose(M, B, 1, b)
+    found, time = advance_to_touch(G, M, B, s, t, B.real[MARGIN] + near, size)
+    found = accept_contacts(M, C, O, B, pair, (first, n), time, found)
+    restore_pose(M, B, 0, a)
+    restore_pose(M, B, 1, b)
+    return found
+
+
+@formula
+def contacts_of_pairs(G, M, C, O, B):
+    """All contacts: how many there are, also where there is no room for them all."""
+    n, half = 0, B.count[CURRENT_HALF]
+    for k in range(B.count[PAIRS_IN_LIST]):
+        s, t, way = B.pair[k, 0] + 0, B.pair[k, 1] + 0, B.pair[k, 2]  # + 0: all integers of one type
+        first = B.seen[half, k] + 0
+        if way == GENERIC_PAIR:
+            found = generic_contacts(G, M, C, O, B, (s, t), first, n)
+        else:
+            if way == SPHERE_SPHERE:
+                found = sphere_sphere_contact(C, B, s, t, n)
+            elif way == SPHERE_PLANE:
+                found = plane_sphere_contact(C, B, t, s, -1.0, n)
+            else:
+                found = plane_sphere_contact(C, B, s, t, 1.0, n)
+            if found != 0:
+                write_contact_identity(C, n, B.slot[s, SLOT_SHAPE], B.slot[t, SLOT_SHAPE], 0, first)
+        B.seen[1 - half, k] = n if found > 0 else -1
+        n += found
+    return n
+
+
+STEP, REBUILD, NEW_VELOCITIES, MIDWAY = range(4)
+"""Tasks: contacts at new poses, with the list of pairs mended where it must be; the same, all pairs looked for anew;
+contacts at the poses of the last search with other velocities; contacts of the known pairs within the margin, at poses
+between those of this search and of the next one. Of the last two, `O` are the contacts of the last search."""
+REBUILD_FRACTION = 0.3  # where more shapes than this part have left their envelopes, all pairs are looked for anew
+
+
+@formula
+def rebuild_list(G, M, O, B):
+    """Look for all pairs: whether there was room."""
+    B.count[LIST_VALID] = 0
+    clear_table(B)
+    store_all_pairs(O, B)
+    sort_shapes(G, M, B)
+    for w in range(B.count[WIDE]):
+        s = B.count[BOUNDED] + w
+        update_plane(G, M, B, w, B.slot[s, SLOT_SHAPE], B.slot[s, SLOT_MOVER])
+        B.mark[s] = 0
+    room = list_all(G, B)
+    clear_table(B)
+    B.count[REBUILDS] += 1
+    B.count[PAIRS_AT_REBUILD] = B.count[PAIRS_IN_LIST]
+    B.count[LIST_VALID] = 1 if room else 0
+    return room
+
+
+@formula
+def repair_list(G, B):
+    """Look again for pairs of what has left its envelope: 1 if that was done, 0 without room, -1 if all must."""
+    if B.count[MOVED_SLOTS] > REBUILD_FRACTION * B.count[BOUNDED] + 8.0:
+        return -1
+    B.count[LIST_VALID] = 0
+    for k in range(B.count[MOVED_SLOTS]):
+        s = B.moved[k]
+        if s < B.count[BOUNDED] and not renew_envelope(B, s):
+            return -1
+    drop_moved(B)
+    room = list_moved(G, B)
+    clear_table(B)
+    B.count[LIST_VALID] = 1 if room else 0
+    return 1 if room else 0
+
+
+@formula
+def add_displacement(B, displacement):
+    """Add displacements to those that were seen since the frame went on."""
+    for c in range(3):
+        B.real[DISPLACEMENT + c] += displacement[c]
+
+
+@formula
+def update_list(G, M, O, B, task):
+    """Bring the list of pairs up to now: whether there was room."""
+    for c in range(3 if task != NEW_VELOCITIES else 0):
+        B.real[FRAME_ORIGIN + c] += B.real[FRAME_STEP + c]
+    if B.count[LIST_VALID] == 0:
+        return rebuild_list(G, M, O, B)
+    n, way = update_slots(G, M, B)
+    add_displacement(B, way)
+    mended = 1
+    if (
+        task == REBUILD
+        or O.count[NUMBER] != B.count[SEARCHES]
+        or B.count[PAIRS_IN_LIST] > 2 * B.count[PAIRS_AT_REBUILD] + 64
+    ):
+        mended = -1
+    elif B.count[MOVED_SLOTS] > 0:
+        mended = repair_list(G, B)
+    if mended < 0:
+        return rebuild_list(G, M, O, B)
+    if task != NEW_VELOCITIES:
+        advance_frame(B, n, (B.real[DISPLACEMENT], B.real[DISPLACEMENT + 1], B.real[DISPLACEMENT + 2]))
+        for c in range(3):
+            B.real[DISPLACEMENT + c] = 0.0
+    return mended == 1
+
+
+@formula
+def midway_contacts(G, M, C, O, B):
+    """Contacts of the listed pairs at these poses: what is remembered of the last search stays as it was."""
+    ahead = B.real[AHEAD]
+    B.real[AHEAD] = 0.0
+    _, way = update_slots(G, M, B)
+    add_displacement(B, way)
+    n = contacts_of_pairs(G, M, C, O, B)
+    B.real[AHEAD] = ahead
+    C.count[FOUND] = n
+    return DONE if n <= C.x.shape[0] else FULL_CONTACTS
+
+
+@formula
+def find_contacts(G, M, C, O, B, task):
+    """See `search`."""
+    if task == MIDWAY:
+        return midway_contacts(G, M, C, O, B)
+    bad = set_frame(M, B)
+    if bad >= 0:
+        C.count[FOUND] = bad
+        return NOT_FINITE
+    if not update_list(G, M, O, B, task):
+        C.count[FOUND] = 0
+        return FULL_PAIRS
+    n = contacts_of_pairs(G, M, C, O, B)
+    B.count[PAIRS_EXAMINED] += B.count[PAIRS_IN_LIST]
+    C.count[FOUND] = n
+    if n > C.x.shape[0]:
+        return FULL_CONTACTS
+    B.count[CURRENT_HALF] = 1 - B.count[CURRENT_HALF]
+    B.count[SEARCHES] += 1
+    C.count[NUMBER] = B.count[SEARCHES]
+    return DONE
+
+
+@kernel
+def search(G: Geometry, M: Movers, C: Contacts, O: Contacts, B: Search, task: int) -> int:
+    """Contacts at the movers' poses: a status (DONE, FULL_*, NOT_FINITE), also in ``C.count[STATUS]``."""
+    C.count[STATUS] = find_contacts(G, M, C, O, B, task)
+    C.count[REBUILT] = B.count[REBUILDS]
+    C.count[PAIRS] = B.count[PAIRS_IN_LIST]
+    return C.count[STATUS]

@@ -1,0 +1,134 @@
+"""Dispatch of the narrow phase: the formula for a pair of kinds, and the kernels that the contact search calls.
+
+The list of special pairs comes from the files of `special_pairs`; any other pair is a generic convex pair
+(`distance`). Kernels are compiled apart from the search, in variants for fewer kinds, so that shapes that do
+not occur are not compiled. A kernel writes the contacts of the two shapes named in its workspace into
+`Search.room`, and returns how many there are.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from ...compiler.formulas import formula, generated_formula
+from ...compiler.kernels import Kernel, kernel
+from ...math.vec import add, dot, load3, load9, mm, mv, sub
+from ..broad_phase.workspace import QUERY_REACH, QUERY_SHAPE_1, QUERY_SHAPE_2, Search
+from ..shape_kinds import FIELD, PLANAR
+from ..tables import AXES, KIND, MOVER, PLACE, Geometry, Movers
+from .distance import generic_pair
+from .special_pairs.registry import PAIR_FORMULAS
+
+ALL_KINDS = {kind for pair in PAIR_FORMULAS for kind in pair}
+
+
+def _by_kinds(name, kinds, otherwise):
+    """The formula that chooses among the pairs of these kinds."""
+    names, lines = {"any_pair": generic_pair}, []
+    for number, pair in enumerate(sorted(PAIR_FORMULAS, key=lambda p: (p[1] is None, p))):
+        if pair[0] in kinds and (pair[1] is None or pair[1] in kinds):
+            names[f"way_{number}"] = PAIR_FORMULAS[pair]
+            test = f"a == {pair[0]}" + ("" if pair[1] is None else f" and b == {pair[1]}")
+            lines += [f"if {test}:", f"    return way_{number}(G, i, j, A, B, reach, room)"]
+    return generated_formula(__name__, name, "a, b, G, i, j, A, B, reach, room", [*lines, f"return {otherwise}"], names)
+
+
+_by_kinds_all = _by_kinds("by_kinds", ALL_KINDS, "any_pair(G, i, j, A, B, reach, room)")
+_by_kinds_convex = _by_kinds("by_kinds_convex", ALL_KINDS - {FIELD}, "any_pair(G, i, j, A, B, reach, room)")
+_by_kinds_planar = _by_kinds("by_kinds_planar", PLANAR, "0")
+
+
+@formula
+def shape_pose(G, M, i):
+    """Where a shape's origin is, and its axes (rows take its components to the world's)."""
+    m = G.shape_i[i, MOVER]
+    p, R = load3(G.shape_x, i, PLACE), load9(G.shape_x, i, AXES)
+    if m < 0:
+        return p, R
+    Q = load9(M.pose, m, 3)
+    return add(load3(M.pose, m, 0), mv(Q, p)), mm(Q, R)
+
+
+@formula
+def _collide_by(by_kinds, G, M, i, j, reach, scratch):
+    """Contacts of two shapes by a choice among pairs."""
+    a, b = G.shape_i[i, KIND], G.shape_i[j, KIND]
+    turned = a > b
+    if turned:
+        i, j, a, b = j, i, b, a
+    p, R = shape_pose(G, M, i)
+    q, Q = shape_pose(G, M, j)
+    d = sub(q, p)
+    if not dot(d, d) < inf:  # what is no number touches nothing
+        return 0
+    count = by_kinds(a, b, G, i, j, ((0.0, 0.0, 0.0), R), (d, Q), reach, scratch)
+    for k in range(count):
+        for c in range(3):
+            scratch[k, c] += p[c]
+            if turned:
+                scratch[k, 3 + c] = -scratch[k, 3 + c]
+    return count
+
+
+@formula
+def collide(G, M, i, j, reach, scratch):
+    """Contacts of shapes i and j: how many were written into the first rows of ``scratch``.
+
+    A row is a point midway between the surfaces, the unit normal from i to j, the gap and the feature, a whole number
+    that tells the points of this pair apart and lasts. Points whose gap is above ``reach`` are no contacts.
+
+    Parameters
+    ----------
+    G : Geometry
+    M : Movers
+    i, j : int
+        Two shapes.
+    reach : float
+        Largest gap [m].
+    scratch : array (ROOM, 8)
+        Contacts come first; the rest is scratch (``room.py``).
+    """
+    return _collide_by(_by_kinds_all, G, M, i, j, reach, scratch)
+
+
+@formula
+def collide_planar(G, M, i, j, reach, scratch):
+    """As `collide`, for the kinds of planar mechanisms only: a third of it to compile."""
+    return _collide_by(_by_kinds_planar, G, M, i, j, reach, scratch)
+
+
+@formula
+def collide_convex(G, M, i, j, reach, scratch):
+    """As `collide`, where no height fields are: three quarters of it to compile."""
+    return _collide_by(_by_kinds_convex, G, M, i, j, reach, scratch)
+
+
+@kernel
+def between(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
+    """Of any kind."""
+    return collide(G, M, B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH], B.room)
+
+
+@kernel
+def between_convex(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
+    """Of convex kinds."""
+    return collide_convex(G, M, B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH], B.room)
+
+
+@kernel
+def between_planar(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
+    """Of the kinds of planar mechanisms."""
+    return collide_planar(G, M, B.count[QUERY_SHAPE_1], B.count[QUERY_SHAPE_2], B.real[QUERY_REACH], B.room)
+
+
+@kernel
+def no_pair_contacts(G: Geometry, M: Movers, B: Search, C: Search, D: Search, task: int) -> int:
+    """No contacts: stands for `between` where no pair asks for it."""
+    return 0
+
+
+def kernel_for_kinds(kinds: set[int]) -> Kernel:
+    """The one to compile for shapes of these kinds."""
+    if kinds <= PLANAR:
+        return between_planar
+    return between if FIELD in kinds else between_convex

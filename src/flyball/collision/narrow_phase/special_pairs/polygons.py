@@ -1,0 +1,41 @@
+"""Two convex polygons in the plane."""
+
+from __future__ import annotations
+
+from math import inf
+
+from ....compiler.formulas import formula
+from ....math.vec import add, mtv, mv, neg, scale, sub
+from ...shape_kinds import POLYGON
+from ...shapes.polygon import support
+from ...tables import PAR, RADIUS
+from ..distance import polygon_distance, polygon_separation
+from ..manifold import manifold, smallest_contact_gap
+
+KINDS = (POLYGON, POLYGON)
+PREFER = 1e-9  # of the size: sides come before corners, the first polygon's before the second's
+
+
+@formula
+def collide(G, i, j, A, B, reach, scratch):
+    """One or two points of the sides that face each other."""
+    r, s = G.shape_x[i, PAR], G.shape_x[j, PAR]
+    prefer = PREFER * min(G.shape_x[i, RADIUS], G.shape_x[j, RADIUS])
+    far, n = polygon_separation(G, i, j, A, B, prefer)
+    if far - r - s > reach:
+        return 0
+    if far > -inf:
+        n = (n[0], n[1], 0.0)
+        count = manifold(G, i, j, A, B, n, (inf, n), reach, scratch)
+        if count > 0 and (far <= 0.0 or smallest_contact_gap(scratch, count) <= far - r - s + prefer):
+            return count
+    if -inf < far <= 0.0:  # sides too steep to cut: the corner of the second that is deepest
+        p = add(B[0], mv(B[1], support(G, j, mtv(B[1], neg(n)))))
+        p = sub(p, scale(0.5 * far, n))
+    else:
+        far, n, p = polygon_distance(G, i, j, A, B, prefer)
+    if not far - r - s <= reach:
+        return 0
+    n = (n[0], n[1], 0.0)
+    p = add(p, scale(0.5 * (r - s), n))
+    return manifold(G, i, j, A, B, n, (far - r - s, (p[0], p[1], 0.0)), reach, scratch)

@@ -1,0 +1,16 @@
+"""Two spheres."""
+
+from __future__ import annotations
+
+from ....compiler.formulas import formula
+from ...shape_kinds import SPHERE
+from ...tables import PAR
+from ..primitives import sphere_contact
+
+KINDS = (SPHERE, SPHERE)
+
+
+@formula
+def collide(G, i, j, A, B, reach, scratch):
+    """One point, on the line between the middles."""
+    return sphere_contact(A[0], G.shape_x[i, PAR], B[0], G.shape_x[j, PAR], reach, scratch, 0, 0.0)

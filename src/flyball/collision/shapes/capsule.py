@@ -1,0 +1,32 @@
+"""A capsule: a line along z with a radius."""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ...math.vec import store3
+from ..shape_kinds import CAPSULE
+from ..tables import PAR
+
+KIND = CAPSULE
+
+
+@formula
+def support(G, i, d):
+    """The upper or the lower end of its line."""
+    h = G.shape_x[i, PAR + 1]
+    return (0.0, 0.0, h if d[2] >= 0 else -h)
+
+
+@formula
+def face(G, i, d, scratch, at):
+    """Its line."""
+    h = G.shape_x[i, PAR + 1]
+    store3(scratch, at, 0, (0.0, 0.0, -h))
+    store3(scratch, at + 1, 0, (0.0, 0.0, h))
+    return 2, 0
+
+
+@formula
+def radius(G, i):
+    """Radius about the line."""
+    return G.shape_x[i, PAR]

@@ -1,0 +1,30 @@
+"""Half a ball: its flat side in z = 0, its dome towards +z."""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ...math.scalar import sqrt
+from ...math.vec import dot, scale
+from ..narrow_phase.primitives import disc_corners, lateral_direction
+from ..shape_kinds import HEMISPHERE
+from ..tables import PAR
+
+KIND = HEMISPHERE
+
+
+@formula
+def support(G, i, d):
+    """A point of the dome, or of the rim."""
+    r = G.shape_x[i, PAR]
+    if d[2] > 0.0:
+        return scale(r / sqrt(dot(d, d)), d)
+    (x, y), s = lateral_direction(d)
+    return (r * x, r * y, 0.0)
+
+
+@formula
+def face(G, i, d, scratch, at):
+    """Its flat side as a polygon, where that looks down by more than 45 degrees; else no flat part."""
+    if d[2] * d[2] < 0.5 or d[2] > 0.0:
+        return 0, 1
+    return disc_corners(G.shape_x[i, PAR], 0.0, -1.0, d, scratch, at), 0

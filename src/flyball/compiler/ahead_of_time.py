@@ -1,0 +1,134 @@
+"""Every kernel compiled ahead of time, on all cores: ``flyball compile``, and the wheel that brings object code."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
+from pathlib import Path
+from subprocess import PIPE
+from threading import Lock
+
+from .formulas import KERNELS, PACKAGE, compiled_files
+from .kernels import Kernel
+from .object_code import (
+    COSTS,
+    DEFAULT_COST,
+    baseline,
+    cache_folder,
+    compile_kernel,
+    file_name,
+    read_object,
+    write_object,
+)
+
+_DECORATED = re.compile(r"^@(first_order_)?kernel$", re.MULTILINE)
+# Modules are found where this process finds them, and an interrupt is this process' to answer.
+_WORKER = """import signal, sys
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+sys.path[:] = {path!r}
+from flyball.compiler.ahead_of_time import work
+work()
+"""
+
+
+def all_kernels() -> list[Kernel]:
+    """The kernels of flyball, those that take longest first."""
+    for file in sorted(compiled_files()):
+        if _DECORATED.search(file.read_text(encoding="utf-8")):
+            import_module(".".join(("flyball", *file.relative_to(PACKAGE).with_suffix("").parts)))
+    own = [k for k in KERNELS if k.name.startswith("flyball.")]
+    return sorted(own, key=lambda k: -COSTS.get(k.__qualname__, DEFAULT_COST)[1])
+
+
+def missing_kernels(folder: Path, cpus: Sequence[str]) -> list[Kernel]:
+    """Kernels of which a folder has not all object code."""
+    return [k for k in all_kernels() if any(read_object(folder / file_name(k, cpu)) is None for cpu in cpus)]
+
+
+def compile_all(
+    folder: Path | None = None, cpus: Sequence[str] = (), progress: Callable[[str, int, int], None] | None = None
+) -> int:
+    """Compile what a folder lacks; processes share the work.
+
+    Parameters
+    ----------
+    folder : Path
+        The user's if it is not given.
+    cpus : sequence of str
+        See `object_code.BASELINES`; this machine's if there are none.
+    progress : function
+        Called with the name of a kernel that is ready, how many are, and how many there are in all.
+
+    Returns
+    -------
+    int
+        How many were compiled.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written.
+    RuntimeError
+        If a kernel cannot be compiled, with the end of what that process said.
+    """
+    folder, cpus = folder or cache_folder(), cpus or (baseline(),)
+    if folder is None:
+        raise OSError("there is no folder that compiled code can be kept in; FLYBALL_CACHE names one")
+    folder.mkdir(parents=True, exist_ok=True)
+    todo = [k.name for k in missing_kernels(folder, cpus)]
+    total, left, failures = len(todo), todo[::-1], list[str]()
+    ready: list[str] = []
+    lock = Lock()
+
+    def serve() -> None:
+        """Have one process compile what nobody has taken yet."""
+        code = _WORKER.format(path=sys.path)
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-c", code], stdin=PIPE, stdout=PIPE, stderr=PIPE, text=True, bufsize=1
+        )
+        give, answers = process.stdin, process.stdout
+        assert give is not None
+        assert answers is not None
+        give.write(f"{folder}\n{' '.join(cpus)}\n")
+        while not failures:
+            with lock:
+                name = left.pop() if left else None
+            if name is None:
+                break
+            give.write(f"{name}\n")
+            if answers.readline().strip() != name:
+                failures.append(f"{name} cannot be compiled: {process.communicate()[1][-1000:]}")
+                return
+            with lock:
+                ready.append(name)
+                if progress is not None:
+                    progress(name, len(ready), total)
+        process.communicate()
+
+    with ThreadPoolExecutor(max_workers=max(1, min(available_cores(), total))) as pool:
+        for future in [pool.submit(serve) for _ in range(min(available_cores(), total))]:
+            future.result()
+    if failures:
+        raise RuntimeError(failures[0])
+    return total
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def work() -> None:
+    """What a process does that was started for this: compile the kernels whose names it reads, one a line."""
+    folder, cpus = Path(sys.stdin.readline().strip()), tuple(sys.stdin.readline().split())
+    known = {k.name: k for k in all_kernels()}
+    for line in sys.stdin:
+        kernel = known[line.strip()]
+        for cpu, code in zip(cpus, compile_kernel(kernel, cpus), strict=True):
+            write_object(folder / file_name(kernel, cpu), code)
+        print(kernel.name, flush=True)

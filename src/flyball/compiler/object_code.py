@@ -1,0 +1,517 @@
+"""Object code of kernels: made by LLVM, stored in files, loaded into memory.
+
+Code is made for a fixed baseline of a processor's family, not for the processor that happens to be there:
+x86-64-v3 (2013 and later), else x86-64-v2, of the others what all of their family have. So results have the same
+bits on all of these: products and sums are not contracted, and nothing is reordered.
+
+A file is known by its content: a hash of the sources that the kernel is made of, of the layouts of its parameters
+and of the processor that it is for. Files that came with flyball are looked at first, then those that this user's
+machine has made. Long compilations are announced before they begin.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import hashlib
+import os
+import re
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from threading import Lock
+from typing import Any, NamedTuple
+
+from ..errors import PerformanceNotice, warn_user
+from .formulas import LOCK, PACKAGE, register_all
+from .struct_layout import Array, Struct
+
+BASELINES = {"x86-64-v3": ("avx2", "bmi2", "f16c", "fma", "lzcnt", "movbe"), "x86-64-v2": ("sse4.2", "popcnt", "ssse3")}
+"""Processors that code is made for, the best first, and features of theirs that LLVM knows them by."""
+_LLVM_LOCK = threading.RLock()
+
+
+@lru_cache(maxsize=1)
+def llvm_binding() -> Any:
+    """llvmlite's binding, ready for this machine."""
+    import llvmlite.binding as binding
+
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    return binding
+
+
+@lru_cache(maxsize=1)
+def baseline() -> str:
+    """The processor that code is made for here: ``FLYBALL_TARGET``, or the best baseline that this machine has.
+
+    Raises
+    ------
+    ValueError
+        If ``FLYBALL_TARGET`` names none that is known.
+    """
+    wanted = os.environ.get("FLYBALL_TARGET", "")
+    if wanted:
+        if wanted not in BASELINES:
+            raise ValueError(f"FLYBALL_TARGET={wanted} is not known: give one of {', '.join(BASELINES)}")
+        return wanted
+    if not target_triple().startswith("x86_64"):
+        return "generic"
+    has = llvm_binding().get_host_cpu_features()
+    return next((name for name, needs in BASELINES.items() if all(has.get(x) for x in needs)), "x86-64")
+
+
+def baselines() -> tuple[str, ...]:
+    """The processors that object code is shipped for, of this machine's family."""
+    return tuple(BASELINES) if target_triple().startswith("x86_64") else (baseline(),)
+
+
+@lru_cache(maxsize=1)
+def target_triple() -> str:
+    """Architecture, system and object format of this process."""
+    return str(llvm_binding().get_process_triple())
+
+
+def target_machine(cpu: str = "", system: str = "") -> Any:
+    """LLVM's generator of code for a processor and a system; who makes an engine of it, owns it."""
+    found = llvm_binding().Target.from_triple(system or target_triple())
+    position = "static" if (system or target_triple()).startswith(("x86_64", "i686")) else "default"
+    return found.create_target_machine(
+        cpu=cpu or baseline(), features="", opt=3, reloc=position, codemodel="jitdefault", jit=True
+    )
+
+
+def object_code_of_text(text: str, level: int = 2) -> bytes:
+    """Object code of one module in LLVM's language."""
+    return emit_object(llvm_binding().parse_assembly(text), target_machine(), level)
+
+
+def emit_object(module: Any, machine: Any, level: int) -> bytes:
+    """Object code of a module, optimised at a level of LLVM's.
+
+    Loops and straight code are not vectorised: measured, the same speed or slower, and longer in the making.
+    """
+    with _LLVM_LOCK:
+        module.triple, module.data_layout = machine.triple, str(machine.target_data)
+        options = llvm_binding().create_pipeline_tuning_options(speed_level=level)
+        options.loop_vectorization = options.slp_vectorization = False
+        builder = llvm_binding().create_pass_builder(machine, options)
+        builder.getModulePassManager().run(module, builder)
+        module.verify()
+        return bytes(machine.emit_object(module))
+
+
+class LoadedCode:
+    """Object code in memory, as long as this lives.
+
+    Raises
+    ------
+    RuntimeError
+        If it is no object code for this machine.
+    """
+
+    def __init__(self, code: bytes) -> None:
+        with _LLVM_LOCK:
+            self._engine = llvm_binding().create_mcjit_compiler(
+                llvm_binding().parse_assembly(""),
+                target_machine(),
+                use_lmm=target_triple().startswith(("aarch64", "arm64")),
+            )
+            self._engine.add_object_file(llvm_binding().ObjectFileRef.from_data(code))
+            self._engine.finalize_object()
+
+    def address(self, name: str) -> int:
+        """Where a function begins; 0 if there is none of that name."""
+        return int(self._engine.get_function_address(name))
+
+
+FAILED = -(2**63)  # what a kernel returns whose formulas ended in an error
+ENTRY_NAME = "flyball_kernel"  # the name of a kernel's entry point in its object
+_started: list[bool] = []
+OPTIMIZATION_LEVEL = 3
+"""Of optimisation: 1 and 2 take a second less of twenty, and run 5 to 15 % longer."""
+
+
+def compile_kernel(kernel: Any, cpus: tuple[str, ...], system: str = "") -> list[bytes]:
+    """Object code of a kernel for some processors.
+
+    Parameters
+    ----------
+    kernel : kernels.Kernel
+    cpus : tuple of str
+        In the words of LLVM: see `object_code.BASELINES`.
+    system : str
+        Triple of the system; this one if it is empty.
+    """
+    with LOCK:
+        start_compiler()
+        from numba.core.compiler_lock import global_compiler_lock
+
+        with global_compiler_lock:
+            code = _linked_bitcode(kernel)
+        modules = [llvm_binding().parse_bitcode(code) for _ in cpus]
+        pairs = zip(cpus, modules, strict=True)
+        return [
+            emit_object(module, target_machine(cpu, system or target_triple()), OPTIMIZATION_LEVEL)
+            for cpu, module in pairs
+        ]
+
+
+def start_compiler() -> None:
+    """Import Numba, and tell it of flyball's types and of every formula."""
+    with LOCK:
+        if not _started:
+            from . import numba_target
+
+            _started.append(True)
+            numba_target.register_types()
+            register_all(numba_target.overload)
+
+
+def _linked_bitcode(kernel: Any) -> bytes:
+    """Bitcode of a kernel with all that it calls, behind an entry point in C's calling convention."""
+    from .numba_target import translate
+
+    collecting = gc.isenabled()
+    gc.disable()  # millions of small objects, hardly any garbage: looking for it takes a fifth of the time
+    try:
+        context, description, library = translate(kernel.function, _argument_types(kernel), kernel.first_order)
+    finally:
+        if collecting:
+            gc.enable()
+    entry = (
+        _kernel_entry(context, description)
+        if kernel.signature is None
+        else _formula_entry(context, description, kernel)
+    )
+    module = llvm_binding().parse_assembly(entry)
+    for text in library.modules():
+        part = llvm_binding().parse_assembly(text)
+        for function in part.functions:
+            if not function.is_declaration:
+                function.linkage = "linkonce_odr"  # some stand in several texts
+        module.link_in(part)
+    for function in module.functions:
+        if not function.is_declaration and function.name != ENTRY_NAME:
+            function.linkage = "internal"  # nobody outside calls them: they may be inlined, and go
+    return bytes(module.as_bitcode())
+
+
+def _argument_types(kernel: Any) -> tuple[Any, ...]:
+    from numba import types
+
+    from .numba_target import number_type, reference
+
+    if kernel.signature is not None:
+        return tuple(number_type(x, kernel.first_order) for x in kernel.parameters)
+    return tuple(
+        reference(x) if isinstance(x, Struct | Array) else types.int64 if x is int else types.float64
+        for x in kernel.parameters
+    )
+
+
+def _kernel_entry(context: Any, description: Any) -> str:
+    """A function that calls the kernel's, and returns its number; `FAILED` where that ended in an error."""
+    from llvmlite import ir
+    from numba.core import types
+
+    module = context.create_module("entry")
+    of = context.call_conv.get_function_type(description.restype, description.argtypes)
+    callee = ir.Function(module, of, description.llvm_func_name)
+    returns = ir.DoubleType() if description.restype == types.float64 else ir.IntType(64)
+    given = [context.get_value_type(x) for x in description.argtypes]
+    entry = ir.Function(module, ir.FunctionType(returns, given), ENTRY_NAME)
+    builder = ir.IRBuilder(entry.append_basic_block("entry"))
+    status, found = context.call_conv.call_function(
+        builder, callee, description.restype, description.argtypes, entry.args
+    )
+    if isinstance(description.restype, types.NoneType):
+        found = returns(0)
+    elif found.type != returns:
+        found = context.cast(builder, found, description.restype, types.int64)
+    failed = returns(float("nan") if returns == ir.DoubleType() else FAILED)
+    builder.ret(builder.select(status.is_error, failed, found))
+    return str(module)
+
+
+def _formula_entry(context: Any, description: Any, code: Any) -> str:
+    """A function that calls a formula on numbers in memory: see `references`; nan where that ended in an error.
+
+    Raises
+    ------
+    TypeError
+        If its result is not nested as that of its signature.
+    """
+    from llvmlite import ir
+
+    from .numba_target import load_numbers, nested_lengths, nested_value, number_type, store_numbers, tuple_leaves
+
+    if (found := nested_lengths(description.restype)) != code.signature.result:
+        raise TypeError(
+            f"the lengths of its result are {found or description.restype}, not {code.signature.result} (0: a number)"
+        )
+    module = context.create_module("entry")
+    of = context.call_conv.get_function_type(description.restype, description.argtypes)
+    callee = ir.Function(module, of, description.llvm_func_name)
+    number = number_type(0, code.first_order)
+    address = context.get_data_type(number).as_pointer()
+    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [address, address]), ENTRY_NAME)
+    builder = ir.IRBuilder(entry.append_basic_block("entry"))
+    given = [
+        x for t in description.argtypes for x in tuple_leaves(builder, t, ir.Constant(context.get_value_type(t), None))
+    ]
+    taken = load_numbers(builder, number, entry.args[0], len(given))
+    args = [nested_value(context, builder, t, taken) for t in description.argtypes]
+    status, found = context.call_conv.call_function(builder, callee, description.restype, description.argtypes, args)
+    results = list(tuple_leaves(builder, description.restype, found))
+    nan = context.get_constant(number, float("nan"))
+    with builder.if_else(status.is_error) as (failed, well):
+        with failed:
+            store_numbers(context, builder, number, ((number, nan) for _ in results), entry.args[1])
+        with well:
+            store_numbers(context, builder, number, iter(results), entry.args[1])
+    builder.ret_void()
+    return str(module)
+
+
+def compile_timed(kernel: Any, cpus: tuple[str, ...]) -> tuple[list[bytes], float]:
+    """Its object code, and the seconds of processor time that it took."""
+    began = time.process_time()
+    return compile_kernel(kernel, cpus), time.process_time() - began
+
+
+NOTICE_PREFIX = "compiling for this machine, once: "
+NUMBA_IMPORT_SECONDS = 0.25
+"""Seconds that importing Numba takes the machine on which `COSTS` were measured."""
+COSTS: dict[str, tuple[str, float]] = {
+    "engine": ("the equations of motion", 22.0),
+    "residuals_kernel": ("the derivatives of the equations", 15.0),
+    "radau_steps": ("the Radau method", 9.5),
+    "alpha_steps": ("the generalised-alpha method", 6.0),
+    "variational_steps": ("the variational method", 4.0),
+    "event_loop_kernel": ("the search for events", 8.7),
+    "mode_kernel": ("what happens at events", 3.2),
+    "explicit_steps": ("explicit methods", 2.1),
+    "variation_kernel": ("sensitivities of motions", 4.5),
+    "between": ("contact of all shapes", 9.0),
+    "between_convex": ("contact of convex shapes", 2.3),
+    "between_planar": ("contact in the plane", 1.3),
+    "search": ("the search for contacts", 5.6),
+    "step_loop_kernel": ("time stepping with contact", 7.7),
+    "mechanism_kernel": ("mechanisms in time stepping", 7.9),
+    "newton": ("the contact solver", 5.8),
+    "gauss_seidel": ("the contact solver by sweeps", 3.5),
+    "admm": ("the contact solver admm", 7.7),
+    "apgd": ("the contact solver apgd", 6.4),
+    "barzilai_borwein": ("the contact solver barzilai-borwein", 2.7),
+    "jacobi": ("the contact solver jacobi", 2.9),
+    "scaled_apgd": ("the contact solver apgd-lean", 2.8),
+    "solve_dense_kernel": ("contact forces at rest", 3.8),
+    "auto": ("the choice of contact solvers", 1.8),
+    "group_guard_kernel": ("forces that are shared", 2.1),
+    "margin_kernel": ("forces that are shared", 1.7),
+    "distribute_forces_kernel": ("forces that are shared", 2.1),
+    "dependencies_kernel": ("dependent constraints", 1.6),
+    "sampled_kernel": ("sampled controllers", 1.2),
+    "sampled_steps_kernel": ("sampled controllers", 1.5),
+    "largest_margin_kernel": ("forces that are shared", 1.3),
+    "pyramid": ("the contact solver of pyramids", 1.7),
+}
+"""What a kernel is, in words, and the seconds that compiling it took that machine, Numba's import apart."""
+DEFAULT_COST = ("part of the numerics", 0.5)
+
+_compile_spans: list[tuple[float, float]] = []
+_spans_lock = Lock()
+_scale: list[float] = []  # seconds that compiling takes here, for one of that machine
+
+
+@contextmanager
+def announce_compilation(kernel: Any) -> Iterator[None]:
+    """Say that a kernel is compiled, and for about how long, by what this machine has taken so far; keep the time."""
+    began = time.perf_counter()
+    if not _scale:
+        pass
+
+        start_compiler()
+        _scale.append((time.perf_counter() - began) / NUMBA_IMPORT_SECONDS)
+    what, seconds = COSTS.get(kernel.__qualname__, DEFAULT_COST)
+    if seconds * _scale[-1] >= 1.0:
+        warn_user(f"{NOTICE_PREFIX}{what}, about {_rounded_seconds(seconds * _scale[-1])} s", PerformanceNotice)
+    try:
+        yield
+    finally:
+        with _spans_lock:
+            _compile_spans.append((began, time.perf_counter()))
+        took = time.perf_counter() - began
+        if seconds >= 1.0:
+            _scale.append(took / seconds)
+
+
+def note_compiled(kernel: Any, seconds: float) -> None:
+    """Note the processor time that a kernel took, for ``flyball compile``."""
+    COMPILE_SECONDS[kernel.name] = seconds
+
+
+COMPILE_SECONDS: dict[str, float] = {}
+
+
+def compiled_since(begin: float) -> float:
+    """Seconds since ``begin`` (by `time.perf_counter`) during which this process compiled."""
+    with _spans_lock:
+        return sum(max(0.0, b - max(a, begin)) for a, b in _compile_spans if b > begin)
+
+
+def _rounded_seconds(seconds: float) -> int:
+    return 5 * max(1, round(seconds / 5)) if seconds > 7.5 else max(1, round(seconds))
+
+
+FILE_MARK = b"flyball object code 1\n"
+HASH_DIGITS = 24  # of the hash in the name of a file
+SHIPPED = PACKAGE / "objects"
+"""Object code that came with this installation."""
+MAX_FOLDER_BYTES = 500_000_000  # bytes of all files in the user's folder; those used last stay
+
+
+class LoadedKernel(NamedTuple):
+    """A kernel's code in memory."""
+
+    address: int
+    code: Any  # which is freed with this
+    origin: str  # "shipped", "cache" or "compiled"
+
+
+def code_of(kernel: Any) -> LoadedKernel:
+    """The code of a kernel: found, or compiled now and kept."""
+    for origin, folder in object_folders():
+        path = folder / file_name(kernel, baseline())
+        if (code := read_object(path)) is not None:
+            if origin == "cache":
+                mark_used(path)
+            with contextlib.suppress(RuntimeError):  # LLVM's, of code that is none of this machine
+                return _load(code, origin)
+    with announce_compilation(kernel):
+        pass
+
+        (code,), seconds = compile_timed(kernel, (baseline(),))
+    note_compiled(kernel, seconds)
+    store_object(kernel, code)
+    return _load(code, "compiled")
+
+
+def is_stored(kernel: Any) -> bool:
+    """Whether its code is in a file."""
+    return any((folder / file_name(kernel, baseline())).is_file() for _, folder in object_folders())
+
+
+def _load(code: bytes, origin: str) -> LoadedKernel:
+    pass
+
+    made = LoadedCode(code)
+    return LoadedKernel(made.address(ENTRY_NAME), made, origin)
+
+
+def object_folders() -> list[tuple[str, Path]]:
+    """Where files are looked for."""
+    cache = cache_folder()
+    return [("shipped", SHIPPED), *([("cache", cache)] if cache is not None else [])]
+
+
+@lru_cache(maxsize=1)
+def cache_folder() -> Path | None:
+    """The user's folder for compiled code: ``FLYBALL_CACHE``, else where the system has such; None if it has none."""
+    given = os.environ.get("FLYBALL_CACHE")
+    if given:
+        root = Path(given)
+    elif sys.platform == "win32":
+        root = Path(os.environ.get("LOCALAPPDATA", Path.symbol_table())) / "flyball"
+    elif sys.platform == "darwin":
+        root = Path.symbol_table() / "Library/Caches/flyball"
+    else:
+        root = Path(os.environ.get("XDG_CACHE_HOME", Path.symbol_table() / ".cache")) / "flyball"
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=root):
+            return root
+    except OSError as error:
+        warn_user(
+            f"compiled code cannot be kept in {root} ({error.strerror}): each process compiles. FLYBALL_CACHE names "
+            f"another folder",
+            PerformanceNotice,
+        )
+        return None
+
+
+def file_name(kernel: Any, cpu: str) -> str:
+    """Name of the file of a kernel's code."""
+    name = re.sub(r"\W+", "_", kernel.function.__qualname__)
+    return f"{name}-{content_key(kernel, cpu)}.o"
+
+
+def content_key(kernel: Any, cpu: str) -> str:
+    """A hash of all that a kernel's code depends on."""
+    layouts = ", ".join(str(x) for x in kernel.parameters)
+    text = f"{kernel.name} {kernel.first_order} ({layouts}) {target_triple()} {cpu} {kernel.content}"
+    return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
+
+
+def read_object(path: Path) -> bytes | None:
+    """The content of a file after its head; None if there is none, or it is damaged."""
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    head, digest, code = data[: len(FILE_MARK)], data[len(FILE_MARK) : len(FILE_MARK) + 64], data[len(FILE_MARK) + 64 :]
+    return code if head == FILE_MARK and hashlib.sha256(code).hexdigest().encode() == digest else None
+
+
+def write_object(path: Path, code: bytes) -> None:
+    """Write a file, at once or not at all.
+
+    Raises
+    ------
+    OSError
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(FILE_MARK + hashlib.sha256(code).hexdigest().encode() + code)
+        Path(name).replace(path)
+    except OSError:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def store_object(kernel: Any, code: bytes) -> None:
+    """Leave code for other processes; where that cannot be, say so."""
+    folder = cache_folder()
+    if folder is None:
+        return
+    try:
+        write_object(folder / file_name(kernel, baseline()), code)
+    except OSError as error:
+        warn_user(f"compiled code cannot be kept in {folder}: {error.strerror}", PerformanceNotice)
+        return
+    remove_oldest(folder)
+
+
+def mark_used(path: Path) -> None:
+    """Note that a file of the user's folder is used."""
+    with contextlib.suppress(OSError):
+        path.touch()
+
+
+def remove_oldest(folder: Path) -> None:
+    """Remove the files that were used longest ago, beyond `MAX_FOLDER_BYTES` bytes; other processes may do the same meanwhile."""
+    total = 0
+    with contextlib.suppress(OSError):
+        found = [(path.stat(), path) for path in folder.glob(f"*-{'[0-9a-f]' * HASH_DIGITS}.o")]
+        for status, path in sorted(found, key=lambda x: x[0].st_mtime, reverse=True):
+            total += status.st_size
+            if total > MAX_FOLDER_BYTES:
+                path.unlink()

@@ -1,0 +1,183 @@
+"""Layouts of the structures of arrays, arrays and records that kernels take, read from annotations."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+Float1 = Annotated[np.ndarray, "Float1"]
+Float2 = Annotated[np.ndarray, "Float2"]
+Float3 = Annotated[np.ndarray, "Float3"]
+Complex1 = Annotated[np.ndarray, "Complex1"]
+Complex2 = Annotated[np.ndarray, "Complex2"]
+Int1 = Annotated[np.ndarray, "Int1"]
+Int2 = Annotated[np.ndarray, "Int2"]
+Short2 = Annotated[np.ndarray, "Short2"]
+Number1 = Annotated[np.ndarray, "Number1"]  # of floats; of complex numbers where a structure is annotated as COMPLEX
+Number2 = Annotated[np.ndarray, "Number2"]
+CodeTables1 = Annotated[np.ndarray, "CodeTables1"]  # addresses of code tables, 0 for none (`by_address`)
+COMPLEX = "complex"
+"""``ComplexSystem = Annotated[System, COMPLEX]``: the structure whose numbers are complex."""
+
+_TYPES = {"Float": "f8", "Complex": "c16", "Int": "i8", "Short": "i4", "CodeTables": "i8"}
+HEAD, DATA, DIMENSION = 40, 32, 16
+"""Bytes of an array's description without its shape, those before the address of its numbers, those of a dimension."""
+
+
+class Array(NamedTuple):
+    """An array without gaps, in C order."""
+
+    dtype: str
+    ndim: int
+
+    @property
+    def size(self) -> int:
+        """Bytes of its description."""
+        return HEAD + DIMENSION * self.ndim
+
+    def __str__(self) -> str:
+        return f"{self.dtype}x{self.ndim}"
+
+
+class CodeTables(Array):
+    """The same of addresses of code tables, which are made ready before a kernel is given the array."""
+
+
+class RecordLayout(NamedTuple):
+    """An array of one dimension whose entries have names."""
+
+    array: Array
+    of: type[Record]
+
+    @property
+    def size(self) -> int:
+        """Bytes of its description."""
+        return self.array.size
+
+    def __str__(self) -> str:
+        return f"{self.of.__name__}({','.join(self.of.names)}):{self.array}"
+
+
+class Record(np.ndarray):
+    """Numbers of one type with names, in one array: ``class Tolerances(Record, kind="Float"): position: float``.
+
+    ``x.position`` is an entry, also in compiled code; a structure has the class as the annotation of a field.
+    """
+
+    names: ClassVar[tuple[str, ...]] = ()
+    kind: ClassVar[str]
+
+    def __init_subclass__(cls, kind: str) -> None:
+        cls.names, cls.kind = tuple(cls.__annotations__), kind
+        for k, name in enumerate(cls.names):
+            if hasattr(np.ndarray, name):
+                raise TypeError(f"{cls.__name__}: arrays have an attribute {name!r}; take another name")
+            setattr(cls, name, _entry_property(k))
+
+    @classmethod
+    def blank(cls, dtype: Any = None) -> Any:
+        """All of them 0."""
+        return np.zeros(len(cls.names), dtype or {"Int": np.int64}.get(cls.kind, float)).view(cls)
+
+
+def _entry_property(k: int) -> property:
+    def get(self: Record) -> Any:
+        return self[k]
+
+    def put(self: Record, value: Any) -> None:
+        self[k] = value
+
+    return property(get, put)
+
+
+class Struct(NamedTuple):
+    """A named tuple of arrays and of structures."""
+
+    of: type
+    complex: bool
+    fields: tuple[tuple[str, Any], ...]
+
+    @property
+    def size(self) -> int:
+        """Bytes of it."""
+        return sum(x.size for _, x in self.fields)
+
+    def offset(self, name: str) -> int:
+        """Where a field begins [bytes]."""
+        at = 0
+        for field, x in self.fields:
+            if field == name:
+                return at
+            at += x.size
+        raise AttributeError(f"{self.of.__name__} has no field {name!r}")
+
+    def arrays(self) -> Iterator[Array | RecordLayout]:
+        """The arrays of it and of structures in it."""
+        for _, x in self.fields:
+            yield from x.arrays() if isinstance(x, Struct) else (x,)
+
+    def __str__(self) -> str:
+        return f"{self.of.__name__}({','.join(f'{name}:{x}' for name, x in self.fields)})"
+
+
+@cache
+def struct_layout(of: type, is_complex: bool = False) -> Struct:
+    """Layout of a named tuple."""
+    scope = vars(sys.modules[of.__module__])
+    fields = tuple((name, _declared_layout(text, scope, is_complex)) for name, text in of.__annotations__.items())
+    if is_complex and (plain := struct_layout(of)).fields == fields:
+        return plain
+    return Struct(of, is_complex, fields)
+
+
+def parameter_layouts(function: Callable[..., Any]) -> tuple[tuple[Any, ...], type | None]:
+    """Layouts of a kernel's parameters (`int` and `float` are numbers), and the type that it returns.
+
+    Raises
+    ------
+    TypeError
+        If a parameter is not annotated with a layout or a number.
+    """
+    code = function.__code__
+    names = code.co_varnames[: code.co_argcount]
+    texts = function.__annotations__
+    found: list[Any] = []
+    for name in names:
+        try:
+            found.append(_declared_layout(texts[name], function.__globals__, False))
+        except (KeyError, TypeError) as error:
+            raise TypeError(
+                f"kernel {function.__qualname__}: parameter {name!r} needs the annotation of a structure of arrays, of "
+                f"an array ({', '.join(_TYPES)}, and the number of dimensions), int or float: {error}"
+            ) from None
+    return tuple(found), {"int": int, "float": float}.get(_annotation_text(texts.get("return")))
+
+
+def _annotation_text(annotation: Any) -> str:
+    """An annotation as it is written, also where it was evaluated."""
+    if isinstance(annotation, str):
+        return annotation
+    array = getattr(annotation, "__metadata__", ("",))[0]
+    return getattr(annotation, "__forward_arg__", "") or array or getattr(annotation, "__name__", "")
+
+
+def _declared_layout(text: Any, scope: dict[str, Any], is_complex: bool) -> Any:
+    """What an annotation declares."""
+    text = _annotation_text(text)
+    if text in ("int", "float"):
+        return int if text == "int" else float
+    kind, ndim = text[:-1], text[-1:]
+    if kind == "Number":
+        kind = "Complex" if is_complex else "Float"
+    if kind in _TYPES and ndim.isdigit():
+        return (CodeTables if kind == "CodeTables" else Array)(_TYPES[kind], int(ndim))
+    made = scope[text]
+    if isinstance(made, type) and issubclass(made, Record):
+        return RecordLayout(_declared_layout(f"{made.kind}1", scope, is_complex), made)
+    if hasattr(made, "__metadata__"):  # Annotated[System, COMPLEX]
+        return struct_layout(made.__origin__, COMPLEX in made.__metadata__)
+    return struct_layout(made, is_complex)

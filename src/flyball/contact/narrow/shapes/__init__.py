@@ -1,1 +1,0 @@
-"""What every kind of shape must say of itself, one file a kind: see ``registry``."""

@@ -1,0 +1,418 @@
+"""Exact derivatives of the equations of motion at a state, by complex steps through the compiled formulas.
+
+With a step i h along one direction the imaginary part of the result is h times the derivative, to rounding: nothing
+is subtracted (Lyness and Moler 1967; Squire and Trapp 1998). The equations are the residuals of
+``engine/residual.py``: nothing in them is solved. Directions that no equation depends on together are taken in
+one step (Curtis, Powell and Reid 1974), so that a chain of a thousand bodies needs as many steps as one of three.
+
+Joint friction depends on the reactions of its joint: in r = M vdot - f - G^T lam the forces f then depend on lam,
+so that dr/dlam = -G^T + F. F is found by a complex step of each multiplier that loads a joint with friction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..assembly.compiled_mechanism import CompiledMechanism
+from ..engine.entry_point import MOTION, allocate_work
+from ..engine.residual import evaluate_residuals
+from ..errors import AnalysisError, ModelError
+from ..laws.bytecode import BY_TIME, evaluate_jet
+from ..numerics.rank import fundamental_subspaces
+from ..tables.structure_definition import Structure
+from ..tables.table_definitions import ALONG, SLIDING, System, Work, with_numbers
+from ..tables.values import Values, values
+
+COMPLEX_STEP = 1e-40
+SELF_STRESS_LIMIT = 1e-8  # singular values of rows of unit size below this part of the largest are none
+COUPLING_LIMIT = 1e-9  # part of its largest entry below which F leaves a self-stress alone
+
+
+def complex_step_derivative(x: np.ndarray) -> np.ndarray:
+    """By what carries a complex step, of numbers that followed it.
+
+    The third order leaves STEP^2 / 6 of the third derivative: of a law without a slope, such as a cube at 0, too.
+    """
+    found = np.imag(x) / COMPLEX_STEP
+    return np.where(np.abs(found) <= COMPLEX_STEP, 0.0, found)
+
+
+def friction_load_rows(s: Structure) -> np.ndarray:
+    """The rows whose multipliers some friction depends on."""
+    terms = s.tables["load_terms"].term if s.loads else np.zeros(0, int)
+    return np.unique(s.tables["terms"].row[terms[terms >= 0] % len(s.terms)])
+
+
+def complex_system(system: System) -> System:
+    """The same tables in complex numbers."""
+    return with_numbers(system, lambda _, x: x.astype(complex))
+
+
+def complex_tables(c: CompiledMechanism) -> tuple[System, Work]:
+    """Tables and scratch in complex numbers."""
+    system = complex_system(c.values.system)
+    return system, allocate_work(c.structure, system, complex)
+
+
+def friction_by_multipliers(x: MechanismState, system: System, W: Work) -> np.ndarray:
+    """F, what is added to -G^T in the derivatives of r by the multipliers, (nv, rows).
+
+    Parameters
+    ----------
+    x : State
+    system, W : System, Work
+        Its tables and scratch in complex numbers.
+    """
+    s = x.c.structure
+    nv, nr = s.nv, len(s.rows)
+    out = np.zeros((nv, nr))
+    width = nv + 3 * nr + 3 * len(s.measured)
+    steps, found = np.zeros((1, 3 * nv + 1), complex), np.zeros((1, width), complex)
+    y, vdot = x.y.astype(complex), x.vdot.astype(complex)
+    rows = friction_load_rows(s)
+    for k in rows.tolist():
+        lam = x.lam.astype(complex)
+        lam[k] += 1j * COMPLEX_STEP
+        evaluate_residuals(system, W, complex(x.t), y, vdot, lam, steps, found)
+        out[:, k] = complex_step_derivative(found[0, :nv])
+    if len(rows):
+        x.c.at(x.t, x.q, x.v)
+        G = x.c.jacobian()
+        out[:, rows] += G[rows].T
+        out[:, np.abs(out).max(axis=0) <= COUPLING_LIMIT * np.abs(G).max(initial=0.0)] = 0.0
+    return out
+
+
+def has_reaction_friction(x: MechanismState, system: System, W: Work) -> bool:
+    """Whether the equations of motion depend on the multipliers by more than -G^T; arguments as `friction_by_multipliers`."""
+    s = x.c.structure
+    nv, nr = s.nv, len(s.rows)
+    random = np.random.default_rng(0).uniform(1.0, 2.0, nr)
+    steps = np.zeros((1, 3 * nv + 1), complex)
+    found = np.zeros((1, nv + 3 * nr + 3 * len(s.measured)), complex)
+    y, vdot, lam = x.y.astype(complex), x.vdot.astype(complex), x.lam + 1j * COMPLEX_STEP * random
+    evaluate_residuals(system, W, complex(x.t), y, vdot, lam, steps, found)
+    x.c.at(x.t, x.q, x.v)
+    G = x.c.sparse_jacobian()
+    left = complex_step_derivative(found[0, :nv]) + G.T @ random
+    return bool((np.abs(left) > COUPLING_LIMIT * (abs(G).T @ random)).any())
+
+
+def refuse_undetermined_friction(s: Structure, G: np.ndarray, F: np.ndarray) -> None:
+    """Refuse friction under reactions that redundancy leaves open: what it does then depends on what nobody knows.
+
+    Parameters
+    ----------
+    s : Structure
+    G : ndarray (rows, nv)
+        Constraint rows, turns counted in lengths.
+    F : ndarray (nv, rows)
+
+    Raises
+    ------
+    ModelError
+        Naming the frictions.
+    """
+    size = np.maximum(np.sqrt((G * G).sum(axis=1)), 1e-300)
+    free = fundamental_subspaces(G / size[:, None], SELF_STRESS_LIMIT).dependencies / size[:, None]
+    if (
+        not free.size
+        or not np.abs(F @ free).max(initial=0.0) > SELF_STRESS_LIMIT * np.abs(F).max() * np.abs(free).max()
+    ):
+        return
+    names = [
+        e.name
+        for e in s.loads
+        if np.abs(free[s.slices[e.joint]]).max(initial=0.0)  # type: ignore[attr-defined]
+        > SELF_STRESS_LIMIT * np.abs(free).max()
+    ]
+    raise ModelError(
+        f"the friction of {', '.join(names)} depends on reactions that redundant constraints leave undetermined, so "
+        f"there are no linear equations; take the redundancy out (m.mobility() names it)"
+    )
+
+
+DIRECTIONS_PER_CALL = 128  # directions a call
+
+
+@dataclass
+class MechanismState:
+    """A mechanism in motion at an instant, with what follows from it."""
+
+    c: CompiledMechanism
+    t: float
+    q: np.ndarray
+    v: np.ndarray
+    z: np.ndarray
+    vdot: np.ndarray
+    lam: np.ndarray  # multipliers of the rows
+    effort: np.ndarray  # efforts of prescribed coordinates, (nv,), zero elsewhere
+
+    @classmethod
+    def moving(cls, c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> MechanismState:
+        """With the accelerations and multipliers that the equations of motion give.
+
+        Raises
+        ------
+        AnalysisError
+            If they give none.
+        """
+        if c.at(t, q, v, MOTION)[0] != 0:
+            from ..simulation.diagnosis import reason_without_solution  # simulation stands on derivatives
+
+            raise AnalysisError(f"{c.structure.model.name!r} at t = {t:.6g} s, {reason_without_solution(c, t, abs(t))}")
+        W = c.work
+        return cls(
+            c, t, q, v, c.z.copy(), W.velocities.solved.copy(), W.rows.multiplier.copy(), W.velocities.effort.copy()
+        )
+
+    @classmethod
+    def resting(cls, c: CompiledMechanism, t: float, q: np.ndarray, lam: np.ndarray | None = None) -> MechanismState:
+        """At rest, whatever the forces say, under given multipliers."""
+        nv, nr = c.structure.nv, len(c.structure.rows)
+        still = np.zeros(nv)
+        c.at(t, q, still)
+        return cls(c, t, q, still, c.z.copy(), still, np.zeros(nr) if lam is None else lam, still)
+
+    @property
+    def y(self) -> np.ndarray:
+        """State vector."""
+        return np.r_[self.q, self.v, self.z]
+
+
+class EquationDerivatives:
+    """The residuals at a state and their derivatives.
+
+    Names of blocks: ``r`` = M vdot - f - G^T lam - effort, ``g``, ``n`` = G v - nu, ``a`` = G vdot - gamma, and
+    ``value``, ``rate``, ``acceleration`` of the measured quantities.
+    """
+
+    def __init__(self, state: MechanismState) -> None:
+        refuse_function_laws(state.c.structure)
+        self.state = state
+        s = state.c.structure
+        nv, nr, nm = s.nv, len(s.rows), len(s.measured)
+        ends = np.cumsum([0, nv, nr, nr, nr, nm, nm, nm])
+        names = ("r", "g", "n", "a", "value", "rate", "acceleration")
+        self.at = {k: slice(i, j) for k, i, j in zip(names, ends[:-1], ends[1:], strict=True)}
+        self.width = int(ends[-1])
+
+    @cached_property
+    def residual(self) -> np.ndarray:
+        """All residuals at the state, (width,)."""
+        out = self._run(np.zeros((1, 3 * self.state.c.structure.nv + 1), complex))[0].real
+        out[self.at["r"]] -= self.state.effort
+        return out
+
+    def block(self, name: str) -> np.ndarray:
+        """One block of the residuals at the state."""
+        return self.residual[self.at[name]]
+
+    @cached_property
+    def by_position(self):
+        """Derivatives by positions along the velocities, sparse (width, nv)."""
+        return self._jacobian(0)
+
+    @cached_property
+    def by_velocity(self):
+        """Derivatives by velocities, sparse (width, nv)."""
+        return self._jacobian(1)
+
+    @cached_property
+    def by_acceleration(self):
+        """Derivatives by accelerations, sparse (width, nv): the mass matrix in the rows of r."""
+        return self._jacobian(2)
+
+    @cached_property
+    def by_reactions(self) -> np.ndarray:
+        """Derivatives of r by the rows' multipliers besides -G^T: joint friction's, (nv, rows)."""
+        return friction_by_multipliers(self.state, *self.complex_tables)
+
+    def by_parameter(self, name: str) -> np.ndarray:
+        """Derivatives by a parameter of the model, (width,), the state's numbers held."""
+        return self.by_values(self.stepped(name))
+
+    def by_values(self, stepped: Values) -> np.ndarray:
+        """Derivatives along a complex step of the mechanism's numbers, (width,)."""
+        steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
+        return complex_step_derivative(self._run(steps, complex_system(stepped.system))[0])
+
+    def stepped(self, name: str) -> Values:
+        """Numbers of the mechanism, a complex step along a parameter."""
+        return values_with_complex_step(self.state.c, name)
+
+    def by_law(self, name: str) -> np.ndarray:
+        """Derivatives by a parameter that stands in laws only, (width,)."""
+        return self.by_values(self.stepped_law(name))
+
+    def stepped_law(self, name: str) -> Values:
+        """The same for a parameter that stands in laws only."""
+        c = self.state.c
+        system = complex_system(c.values.system)
+        system.const[list(c.structure.model.parameters).index(name)] += 1j * COMPLEX_STEP
+        return replace(c.values, system=system)
+
+    @cached_property
+    def complex_tables(self) -> tuple[System, Work]:
+        """Tables and scratch in complex numbers."""
+        return complex_tables(self.state.c)
+
+    def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
+        S, W = (
+            self.complex_tables if system is None else (system, allocate_work(self.state.c.structure, system, complex))
+        )
+        x = self.state
+        y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
+        out = np.zeros((len(steps), self.width), complex)
+        evaluate_residuals(S, W, complex(x.t), y, vdot, lam, steps, out)
+        if not np.isfinite(out.view(float)).all():
+            raise self._not_finite(W.stack)
+        return out
+
+    def _not_finite(self, stack: np.ndarray) -> AnalysisError:
+        """The error that names what is no number; ``stack`` is the laws' scratch."""
+        from ..simulation.diagnosis import force_fault
+
+        x = self.state
+        x.c.at(x.t, x.q, x.v, MOTION)
+        missed = x.c.structure.missed(stack)
+        why = (
+            missed.message
+            if missed
+            else force_fault(x.c, x.t) or "look for a law that divides by zero or leaves its range"
+        )
+        return AnalysisError(
+            f"the equations of {x.c.structure.model.name!r}, or their derivatives, are not finite at t = {x.t:.6g} s: "
+            f"{why}"
+        )
+
+    def _jacobian(self, what: int):
+        """Derivatives by positions (0), velocities (1) or accelerations (2)."""
+        import scipy.sparse as sp
+
+        nv = self.state.c.structure.nv
+        touched, group = self._groups
+        groups = int(group.max(initial=-1)) + 1
+        rows, columns = touched.indices, np.repeat(np.arange(nv), np.diff(touched.indptr))
+        entries = np.zeros(len(rows))
+        for first in range(0, groups, DIRECTIONS_PER_CALL):
+            count = min(DIRECTIONS_PER_CALL, groups - first)
+            steps = np.zeros((count, 3 * nv + 1), complex)
+            mine = np.flatnonzero((group >= first) & (group < first + count))
+            steps[group[mine] - first, what * nv + mine] = 1j * COMPLEX_STEP
+            found = complex_step_derivative(self._run(steps))
+            own = group[columns] - first
+            own = np.flatnonzero((own >= 0) & (own < count))
+            entries[own] = found[group[columns[own]] - first, rows[own]]
+        used = entries != 0.0
+        return sp.csr_matrix((entries[used], (rows[used], columns[used])), shape=(self.width, nv))
+
+    @property
+    def _groups(self):
+        """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together."""
+        return sparsity_and_groups(self.state.c.structure, self.width, self.state.c.values.system)
+
+
+def sparsity_and_groups(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
+    """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together, (nv,).
+
+    ``width`` is that of the residuals.
+    """
+    return s.kept.get("sparsity", None, 1, lambda: _sparsity(s, width, S))
+
+
+def _sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
+    import scipy.sparse as sp
+
+    if s.tree:
+        return sp.csc_matrix(np.ones((width, s.nv), bool)), np.arange(s.nv)
+    touched = sp.csc_matrix(sparsity_pattern(s, S))
+    return touched, column_groups(touched)
+
+
+def values_with_complex_step(c: CompiledMechanism, name: str) -> Values:
+    """Numbers of a mechanism, a complex step along a parameter."""
+    value = c.structure.model.environment(c.parameters)[name]
+    return values(c.structure, c.parameters | {name: complex(value, COMPLEX_STEP)})  # type: ignore[arg-type]
+
+
+def prescription_derivatives(x: MechanismState, stepped: Values) -> tuple[np.ndarray, np.ndarray]:
+    """What a complex step of the numbers does to prescribed coordinates: to q - f(t), and to v - f'(t); (n,) each."""
+    S = complex_system(stepped.system)
+    stack = np.zeros((x.c.structure.depth + 1, 3), complex)
+    out = []
+    for b in x.c.structure.prescribed.values():
+        law = int(S.tree.law[b])
+        f, f1, _ = evaluate_jet(S.code, S.const, law, stack, complex(x.t), np.zeros((3, 0), complex), BY_TIME)
+        out.append((-complex_step_derivative(f - S.bodies.offset[b]), -complex_step_derivative(f1)))
+    found = np.array(out).reshape(-1, 2)
+    return found[:, 0], found[:, 1]
+
+
+def refuse_function_laws(s: Structure) -> None:
+    """Laws that are Python functions have no derivatives."""
+    if s.functions:
+        raise ModelError(
+            f"law {s.functions[0].text!r} is a Python function, which has no derivatives; write it as an expression or "
+            f"give a table"
+        )
+
+
+def sparsity_pattern(s: Structure, S: System) -> Any:
+    """Which residuals can depend on which velocity's coordinate, in absolute coordinates; sparse (width, nv).
+
+    An element's equations and the equations of motion of the bodies it acts on depend on the bodies that it touches;
+    elements with laws that name sensors also on what these measure.
+    """
+    import scipy.sparse as sp
+
+    nb, nr, nm = len(S.tree.parent), len(s.rows), len(s.measured)
+    body = np.repeat(np.arange(nb), S.tree.nv)
+    of_row = [np.unique(body[S.column[S.row_start[k] : S.row_start[k + 1]]]) for k in range(nr + nm)]
+    named = sorted({m % nm for m in s.slots.values()}) if s.slots else []
+    also = np.unique(np.concatenate([of_row[nr + m] for m in named])) if named else np.zeros(0, int)
+    reach: list[tuple[np.ndarray, np.ndarray]] = [(np.arange(nb)[b : b + 1],) * 2 for b in range(nb)]
+    reach += [(at, at) for at in of_row[:nr]]
+    table = S.forces
+    for F, M, family, laws in zip(table.F, table.M, table.family, table.laws, strict=True):
+        if family == ALONG:
+            at = of_row[nr + F]
+        elif family == SLIDING:  # along one tangent or two
+            at = np.unique(np.concatenate([of_row[nr + m] for m in (F, M) if m >= 0]))
+        else:
+            at = S.frame_body[[F, M]]
+            at = at[at >= 0]
+        has_law = (laws >= 0).any()
+        reach.append((at, np.union1d(at, also) if has_law else at))
+    i = np.concatenate([np.repeat(a, len(b)) for a, b in reach])
+    j = np.concatenate([np.tile(b, len(a)) for a, b in reach])
+    bodies = sp.csr_matrix((np.ones(len(i)), (i, j)), shape=(nb, nb))
+    lines = sp.csr_matrix(
+        (
+            np.ones(sum(len(x) for x in of_row)),
+            (np.repeat(np.arange(nr + nm), [len(x) for x in of_row]), np.concatenate([*of_row, np.zeros(0, int)])),
+        ),
+        shape=(nr + nm, nb),
+    )
+    expand = sp.csr_matrix((np.ones(len(body)), (body, np.arange(len(body)))), shape=(nb, len(body)))
+    sensed, rows = lines[nr:], lines[:nr]
+    return sp.vstack([expand.T @ bodies @ expand, *(rows @ expand,) * 3, *(sensed @ expand,) * 3]).astype(bool)
+
+
+def column_groups(touched: Any) -> np.ndarray:
+    """Groups of columns no two of which have an entry in one row; each column's group, (n,)."""
+    rows = touched.tocsr()
+    group = np.full(touched.shape[1], -1)
+    for d in range(touched.shape[1]):
+        mine = touched.indices[touched.indptr[d] : touched.indptr[d + 1]]
+        near = np.concatenate([rows.indices[rows.indptr[r] : rows.indptr[r + 1]] for r in mine.tolist()] or [[]])
+        taken = set(group[near.astype(int)].tolist())
+        n = 0
+        while n in taken:
+            n += 1
+        group[d] = n
+    return group

@@ -1,0 +1,385 @@
+"""Nonsmooth points of forces: kinks, jumps and infinite slopes at the present state.
+
+Examples are a rope at its free length, ``abs`` at zero and the corner of a table. A law is evaluated a small offset
+to both sides of every quantity that it depends on, and at a tenth of that offset. What differs by as much at a
+tenth has a kink or a jump there; what is smooth differs by a tenth. The slopes on two sides of a kink differ across
+it only (Hadamard), so their difference gives its normal. Slopes that grow towards the point are infinite there:
+sqrt(abs(x)) at zero. Kinks that meet in a point, as in max(0, min(x, y)), are found from slopes in directions all
+around it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from ..engine.loads import force_row
+from ..errors import SingularityError
+from ..model.element import LawOf, fields_with
+from ..model.expressions import Expression
+from ..model.force import CoordinateForce
+from ..model.model import Model
+from .equation_derivatives import COMPLEX_STEP, EquationDerivatives, complex_step_derivative
+from .output_derivatives import curve_gradients, snapshot
+
+OFFSET = 1e-6  # the little way: of the mechanism's length, a radian, or these in a second
+NEAR_FRACTION = 0.1
+PERSISTENT_FRACTION = 0.5  # of the difference that far away
+LAW_ROUNDING = 16.0 * np.finfo(float).eps
+SLOPE_TOLERANCE = 1e-7  # differences of slopes below this part of them are none
+
+STEEPENING = 1.1  # what slopes to both sides grow by over the last nine tenths of the way, if the slope is infinite
+KINK, JUMP, STEEP, NO_VALUE = "has a kink", "jumps", "has an infinite slope", "has no value or no slope"
+
+LawFunction = Callable[[np.ndarray], complex]
+
+
+@dataclass(frozen=True)
+class NonsmoothPoint:
+    """Where a force or a driver's law has two slopes, or none.
+
+    Attributes
+    ----------
+    element : str
+    text : str
+        What has it, and where, in words.
+    jump : bool
+        Whether the value too is another on the other side, or there is none.
+    along : ndarray (nv,), (nv,)
+        How what decides changes with positions and velocities.
+    by_parameter : bool
+        Whether it changes with a parameter that was asked for.
+    """
+
+    element: str
+    text: str
+    jump: bool
+    along: tuple[np.ndarray, np.ndarray]
+    by_parameter: bool
+
+    def is_crossed_by(self, dq: np.ndarray | None, dv: np.ndarray | None) -> bool:
+        """Whether any of some changes of positions and velocities leads across it, (nv, n) each; any at all if None."""
+        if dq is None or dv is None:
+            return self.by_parameter or bool(np.any(self.along))
+        ways = np.abs(self.along[0]) @ np.abs(dq) + np.abs(self.along[1]) @ np.abs(dv)
+        moved = np.abs(self.along[0] @ dq + self.along[1] @ dv)
+        return self.by_parameter or bool((moved > SLOPE_TOLERANCE * ways).any())
+
+
+def refuse_nonsmooth(
+    e: EquationDerivatives, dq: np.ndarray | None = None, dv: np.ndarray | None = None, to: Sequence[str] = ()
+) -> None:
+    """Refuse a state where a force has no slope along changes of positions and velocities, or by a parameter.
+
+    Parameters
+    ----------
+    e : Equations
+    dq, dv : ndarray (nv, n)
+        Any at all if not given.
+    to : sequence of str
+        Parameters.
+
+    Raises
+    ------
+    SingularityError
+        Naming the elements and what they decide by.
+    """
+    found = [k for k in nonsmooth_points(e, to) if k.is_crossed_by(dq, dv)]
+    if found:
+        raise nonsmooth_error(found, e.state.t, "there are no linear equations")
+
+
+def nonsmooth_error(found: Sequence[NonsmoothPoint], t: float, so: str) -> SingularityError:
+    """The error that tells of kinks."""
+    texts = "; ".join(dict.fromkeys(k.text for k in found))
+    return SingularityError(
+        f"{texts}. What is so on one side only says nothing of the other, so {so}. Move the mechanism away from there, "
+        f"or write what is smooth: sqrt(x**2 + w**2) for abs(x), tanh(x/w) for sign(x), step(x, x0, y0, x1, y1), a "
+        f"table with interpolation 'cubic'",
+        t,
+        tuple(dict.fromkeys(k.element for k in found)),
+    )
+
+
+def nonsmooth_points(e: EquationDerivatives, to: Sequence[str] = ()) -> list[NonsmoothPoint]:
+    """All kinks and jumps of forces and drivers at a state.
+
+    Parameters
+    ----------
+    e : Equations
+    to : sequence of str
+        Parameters that laws are followed along too.
+    """
+    out: list[NonsmoothPoint] = []
+    shot = None
+    for element, text, names, law in _force_and_driver_functions(e, to):
+        shot = shot or snapshot(e.state)
+        values = [("", np.array([_parameter_value(e, n)])) if n in to else shot.curve(n) for n in names]
+        at = np.array([float(v[0]) for _, v in values])
+        sizes = np.array([e.state.c.values.length if unit.startswith("m") else 1.0 for unit, _ in values])
+        for normal, what in nonsmooth_directions(law, at, sizes):
+            out.append(_nonsmooth_point(e, element, text, [*zip(names, at, values, strict=True)], normal, what, to))
+    return out
+
+
+def nonsmooth_directions(law: LawFunction, at: np.ndarray, sizes: np.ndarray) -> list[tuple[np.ndarray, str]]:
+    """Kinks of a function of several quantities at a place: (direction that leads across, what it has there)."""
+    out: list[tuple[np.ndarray, str]] = []
+    for i, size in enumerate(sizes.tolist()):
+        step = np.zeros(len(at))
+        step[i] = OFFSET * size
+        far, near = (OneSidedDifferences.of(law, at, part * step, sizes) for part in (1.0, NEAR_FRACTION))
+        rounding = LAW_ROUNDING * near.slope * (OFFSET + float(np.abs(at / sizes).max()))  # of terms that cancel
+        jump = near.jump > max(PERSISTENT_FRACTION * far.jump, SLOPE_TOLERANCE * near.value) and near.jump > rounding
+        kink = near.bend > max(PERSISTENT_FRACTION * far.bend, SLOPE_TOLERANCE * near.slope)
+        known = np.isfinite([near.value, near.slope])
+        if known.all() and not jump and not kink:
+            continue
+        steep = near.steepest > STEEPENING * far.steepest
+        what = NO_VALUE if not known.all() else JUMP if jump else STEEP if steep else KINK
+        normal = (
+            near.across if what == KINK and np.abs(near.across).max() > SLOPE_TOLERANCE * near.slope else step / size
+        )
+        normal = normal / np.linalg.norm(normal)
+        if not any(what == w and abs(abs(normal @ n) - 1.0) < SLOPE_TOLERANCE**0.5 for n, w in out):
+            out.append((normal, what))
+    if not any(what != KINK for _, what in out):
+        between = face_normals(
+            lambda step: _value_and_slopes(law, at + sizes * step, sizes),
+            len(at),
+            OFFSET,
+            NEAR_FRACTION * OFFSET,
+            PERSISTENT_FRACTION,
+            SLOPE_TOLERANCE,
+        )
+        out += [(n, KINK) for n in between if not any(abs(abs(n @ m) - 1.0) < SLOPE_TOLERANCE**0.5 for m, _ in out)]
+    return out
+
+
+@dataclass(frozen=True)
+class OneSidedDifferences:
+    """What differs between a place and its two sides, slopes in units of the sizes.
+
+    ``jump`` of the value, ``bend`` of the slopes, ``across``: by what the slopes of one side exceed those of the other;
+    ``value`` and ``slope`` are how large these are, ``steepest`` the latter at the two sides.
+    """
+
+    jump: float
+    bend: float
+    across: np.ndarray
+    value: float
+    slope: float
+    steepest: float
+
+    @classmethod
+    def of(cls, law: LawFunction, at: np.ndarray, step: np.ndarray, sizes: np.ndarray) -> OneSidedDifferences:
+        """To both sides of a place by a step."""
+        (f, df), (g, dg), (h, dh) = (_value_and_slopes(law, at + way, sizes) for way in (step, -step, 0.0 * step))
+        middle = 0.5 * (f + g) - h, 0.5 * (df + dg) - dh
+        return cls(
+            max(abs(f - g), abs(middle[0])),
+            float(max(np.abs(df - dg).max(), np.abs(middle[1]).max())),
+            df - dg,
+            float(np.max(np.abs([f, g, h]))),  # nan if any is
+            float(np.max(np.abs([df, dg, dh]))),
+            float(np.max(np.abs([df, dg]))),
+        )
+
+
+def _value_and_slopes(law: LawFunction, at: np.ndarray, sizes: np.ndarray) -> tuple[float, np.ndarray]:
+    """A law's value and slopes in units of the sizes."""
+    steps = 1j * COMPLEX_STEP * np.diag(sizes)
+    with np.errstate(all="ignore"):
+        found = np.array([law(at + step) for step in steps])
+    return float(found[0].real), complex_step_derivative(found)
+
+
+def _force_and_driver_functions(
+    e: EquationDerivatives, to: Sequence[str]
+) -> Iterator[tuple[str, str, list[str], LawFunction]]:
+    """Forces and drivers as functions: (element, its title and law, names of what it depends on, the function)."""
+    c = e.state.c
+    s = c.structure
+    known = {name: complex(value) for name, value in s.model.environment(c.parameters).items()}
+    known["t"] = complex(e.state.t)
+    tables = {x.name: x for x in s.model.tables}
+    for d in s.model.drivers:
+        of = LawOf(s.model.unit(d.coordinate, d))
+        law = s.model.law(d.law, of, d.title, driver=True)
+        if names := _law_arguments(s.model, law, {}, to):
+            yield (
+                d.name,
+                f"{d.title}: its law '{law}'",
+                [*names.values()],
+                partial(_law_value, law, [*names], known, tables),
+            )
+    for k, force in enumerate(s.forces):
+        inputs: dict[str, str] = {}
+        laws: list[Expression] = []
+        for field, of in fields_with(force.__class__, LawOf).items():
+            value = getattr(force, field)
+            inputs = {name: f"{force.name}.{name}" for name in of.inputs}
+            for part in value if isinstance(value, tuple) else (value,):
+                if part is not None:
+                    laws.append(s.model.law(part, of, force.title))
+        if isinstance(force, CoordinateForce):
+            law = laws[0] if laws else Expression.constant(0.0)
+            both = [f"{force.name}.{name}" for name in [*force.outputs][:2]]
+            names = dict(zip([*inputs] or ["value", "rate"], both, strict=True))
+            names |= {n: c for n, c in _law_arguments(s.model, law, inputs, to).items() if n not in inputs}
+            text = f"{force.title}: its law '{law}'" if laws else force.title
+            par = force_row(c.values.system.force_parameters, k)
+            yield force.name, text, [*names.values()], partial(_effort_value, force, par, law, [*names], known, tables)
+            continue
+        for law in laws:
+            if names := _law_arguments(s.model, law, inputs, to):
+                text = f"{force.title}: its law '{law}'"
+                yield force.name, text, [*names.values()], partial(_law_value, law, [*names], known, tables)
+
+
+def _law_arguments(model: Model, law: Expression, inputs: dict[str, str], to: Sequence[str]) -> dict[str, str]:
+    """What a law depends on besides time: its names for it, and the curves' (a parameter's is its own)."""
+    sensors = {x.name: f"{x.name}.value" for x in model.sensors}
+    curves = sensors | inputs | {name: name for name in (*to, *law.names) if name in to or "." in name}
+    return {name: curves[name] for name in sorted(law.names) if name in curves}
+
+
+def _law_value(law: Expression, names: list[str], known: dict[str, complex], tables: dict, x: np.ndarray) -> complex:
+    try:
+        return complex(law.evaluate(known | dict(zip(names, x.tolist(), strict=True)), tables))
+    except ArithmeticError:
+        return complex(np.nan, np.nan)
+
+
+def _effort_value(
+    force: CoordinateForce, par: tuple, law: Expression, names: list[str], known: dict, tables: dict, x: np.ndarray
+) -> complex:
+    """The effort of a force along a coordinate; its first two names are the coordinate and its rate."""
+    o = 0.0 * x[0]
+    return complex(force.effort(par, x[0], x[1], (_law_value(law, names, known, tables, x), o, o), o))
+
+
+def _parameter_value(e: EquationDerivatives, name: str) -> float:
+    return float(e.state.c.structure.model.environment(e.state.c.parameters)[name])
+
+
+def _nonsmooth_point(
+    e: EquationDerivatives, element: str, text: str, at: Sequence[tuple[str, float, tuple]], normal: np.ndarray, what: str,
+    to: Sequence[str],
+) -> NonsmoothPoint:  # fmt: skip
+    x, nv = e.state, len(e.state.v)
+    curves = [name for name, _, _ in at if name not in to]
+    sizes = np.array([x.c.values.length if unit.startswith("m") else 1.0 for _, _, (unit, _) in at])
+    weights = np.array([normal[k] / sizes[k] for k, (name, _, _) in enumerate(at) if name not in to])
+    by_all = curve_gradients(x, curves).T @ weights
+    along = by_all[:nv], by_all[nv : 2 * nv]
+    where = ", ".join(
+        f"{name} = {value + 0.0:.6g} {unit}".strip()
+        for (name, value, (unit, _)), n in zip(at, normal, strict=True)
+        if abs(n) > SLOPE_TOLERANCE
+    )
+    by = any(name in to and abs(n) > SLOPE_TOLERANCE for (name, _, _), n in zip(at, normal, strict=True))
+    return NonsmoothPoint(element, f"{text} {what} at {where}", what not in (KINK, STEEP), along, by)
+
+
+# Kinks that meet in a place: the pieces of a function around it, seen from it in many directions.
+#
+# Along its quantities one by one a function may be smooth where it has kinks between them: max(0, min(x, y)). So it is
+# looked at a little way off in directions all around. Across a face between two pieces of a continuous function slopes
+# differ along the face's normal only (Hadamard), so the faces are found where, on the way from a direction in one piece
+# to one in another, the slopes change.
+
+
+PLANE_DIRECTIONS = 13  # directions around a place in a plane; odd, so that no two are opposite
+DIRECTIONS_PER_QUANTITY = 12  # directions for each of more quantities than two
+FIRST_ANGLE = 0.123  # angle of the first: faces are seldom there
+MAX_HALVINGS = 12  # times that the way between two pieces is parted
+MAX_SMOOTH_REGIONS = 8  # at most that are told apart
+
+ValueAndSlopes = Callable[[np.ndarray], tuple[float, np.ndarray]]  # value and slopes a scaled step from the place
+
+
+class SmoothPiece:
+    """A direction (n,), and value and slopes far and near along it."""
+
+    def __init__(self, of: ValueAndSlopes, way: np.ndarray, far: float, near: float, same: float, flat: float) -> None:
+        self.of, self.sizes, self.way, self.same, self.flat = of, (far, near), way / np.linalg.norm(way), same, flat
+
+    @cached_property
+    def far(self) -> np.ndarray:
+        """Slopes far away, (n,)."""
+        return self.of(self.sizes[0] * self.way)[1]
+
+    @cached_property
+    def near(self) -> np.ndarray:
+        """Slopes near the place, (n,)."""
+        return self.of(self.sizes[1] * self.way)[1]
+
+    def across(self, other: SmoothPiece) -> np.ndarray | None:
+        """By what the slopes of another exceed these, (n,); None if they are of one piece."""
+        near = other.near - self.near
+        size = max(np.abs(self.near).max(), np.abs(other.near).max())
+        if not np.abs(near).max() > self.flat * size:
+            return None
+        return near if np.abs(near).max() > self.same * np.abs(other.far - self.far).max() else None
+
+    def to(self, other: SmoothPiece, part: float) -> SmoothPiece:
+        """A direction between the two."""
+        return SmoothPiece(self.of, (1.0 - part) * self.way + part * other.way, *self.sizes, self.same, self.flat)
+
+
+def face_normals(of: ValueAndSlopes, n: int, far: float, near: float, same: float, flat: float) -> list[np.ndarray]:
+    """Normals (n,) of the faces between the pieces around a place.
+
+    Parameters
+    ----------
+    of : callable
+        Value and slopes a step away, in units of the sizes.
+    n : int
+        Quantities.
+    far, near : float
+        Two lengths of steps.
+    same : float
+        Slopes that differ near by less than this part of what they differ by far away are of one smooth piece.
+    flat : float
+        The same, of the slopes themselves.
+    """
+    found: list[SmoothPiece] = []
+    for way in _directions_around(n):
+        other = SmoothPiece(of, way, far, near, same, flat)
+        if len(found) <= MAX_SMOOTH_REGIONS and all(known.across(other) is not None for known in found):
+            found.append(other)
+    if len(found) > MAX_SMOOTH_REGIONS:  # slopes that change all around, as those of a cone do
+        return list(np.eye(n))
+    out: list[np.ndarray] = []
+    for a, b in itertools.combinations(found, 2):
+        for normal in _slope_differences_between(a, b, MAX_HALVINGS):
+            normal = normal / np.linalg.norm(normal)
+            if not any(abs(abs(normal @ m) - 1.0) < flat**0.5 for m in out):
+                out.append(normal)
+    return out
+
+
+def _directions_around(n: int) -> np.ndarray:
+    """Directions of n quantities, evenly around in a plane, else at random."""
+    if n < 2:
+        return np.zeros((0, n))
+    if n > 2:
+        return np.random.default_rng(0).standard_normal((DIRECTIONS_PER_QUANTITY * n, n))
+    angle = FIRST_ANGLE + 2.0 * np.pi * np.arange(PLANE_DIRECTIONS) / PLANE_DIRECTIONS
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _slope_differences_between(a: SmoothPiece, b: SmoothPiece, halvings: int) -> list[np.ndarray]:
+    """Differences of the slopes of all pieces that are passed on the way from one to another."""
+    across = a.across(b)
+    if across is None:
+        return []
+    if not halvings:
+        return [across]
+    middle = a.to(b, 0.4375)  # not where a face is likely to be
+    return _slope_differences_between(a, middle, halvings - 1) + _slope_differences_between(middle, b, halvings - 1)

@@ -1,0 +1,678 @@
+"""Linear equations of motion in free coordinates: the constraints are taken out.
+
+In this order: minimum-norm solutions of redundant equations; free coordinates (bases of the motions that
+constraints allow, the identity in the rows of named coordinates); force balance (what acts in each equation, what
+rounding may leave of it: Vignes 1993); bounds of what rounding may have made of coefficients (Parlett and Reinsch
+1969; Watkins 2006); the reduction itself.
+
+With x a change of position along the velocities, u one of velocity, both seen from an evenly turning frame (see
+`steady_motion`), and inputs w, the perturbed kinematics, equations of motion and constraints at a state are
+
+    x' + H x = u + N x,    M (u' + H u) + D u + K x + r_w w = G^T l,
+    G x + g_w w = 0,       G u + V x + n_w w + g_w w' = 0
+
+K holds everything that forces, inertia and *reactions* do when positions change: joint forces turn with the bodies,
+so it is not the stiffness of the springs. With x = Z a + X w and u = Zv b + P a + U w + U1 w' the multipliers drop
+out of the equations along Zv; joint friction follows the reactions, adds F to the -G^T that they act by, and needs
+another projection (``_multiplier_free_directions``). Inputs that move the mechanism act through their rates too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from ..assembly.compiled_mechanism import CompiledMechanism
+from ..engine.kinematics import count_plain_coordinates, retract
+from ..errors import ModelError, SingularityError
+from ..numerics.rank import RANK_TOLERANCE, column_space, fundamental_subspaces, null_space
+from ..numerics.sparse_rank import clearly_independent, null_basis
+from ..numerics.sparse_rank import sparse_matrix_rank as rank_of
+from ..tables.structure_definition import VelocityName, velocity_names
+from ..tables.table_definitions import with_numbers
+from .equation_derivatives import EquationDerivatives, MechanismState, refuse_undetermined_friction
+
+DENSE_UNKNOWNS = 400  # unknowns up to which singular values decide
+SINGULAR_VALUE_LIMIT = 1e-11  # singular values below this part of the largest are none
+REGULARISATION = 1e-10  # what is added to the sparse equations' diagonal, of their entries
+MAX_REFINEMENTS = 4  # times that a solution is improved, at most
+
+
+def minimum_norm_solution(A, b: np.ndarray) -> np.ndarray:
+    """The smallest x that leaves the least of A x = b; A is sparse, or an array if it is small.
+
+    It is refined: a part of b that has nothing to do with a larger one is met to its own last digits.
+    """
+    A = A.toarray() if max(A.shape) <= DENSE_UNKNOWNS and not isinstance(A, np.ndarray) else A
+    solve = _dense_solver(A) if max(A.shape) <= DENSE_UNKNOWNS else _sparse_solver(A)
+    x, left, before = np.zeros(A.shape[1]), b, np.inf
+    for _ in range(MAX_REFINEMENTS):
+        step = solve(left)
+        size = np.abs(step).max(initial=0.0)
+        if not size < 0.5 * before:
+            break
+        x, before = x + step, size
+        left = b - A @ x
+    return x
+
+
+def _dense_solver(A) -> Callable[[np.ndarray], np.ndarray]:
+    U, d, Vt = np.linalg.svd(A, full_matrices=False)
+    k = int((d > SINGULAR_VALUE_LIMIT * d.max(initial=0.0)).sum())
+    return lambda b: Vt[:k].T @ ((U[:, :k].T @ b) / d[:k])
+
+
+def _sparse_solver(A) -> Callable[[np.ndarray], np.ndarray]:
+    """By the normal form [-e I, A; A^T, e I]."""
+    import scipy.sparse as sp
+    from scipy.sparse.linalg import splu
+
+    m, n = A.shape
+    e = REGULARISATION * np.abs(A.data).max()
+    factor = splu(sp.bmat([[-e * sp.identity(m), A], [A.T, e * sp.identity(n)]]).tocsc())
+    return lambda b: factor.solve(np.r_[b, np.zeros(n)])[m:]
+
+
+DENSE_ROWS = 150  # rows up to which singular values decide; of more, where they may depend on one another
+BASIS_ROUNDING = 1e-14  # entries of a basis below this are none, where its largest are about 1
+VANISHING = 1e-13  # part of the largest that rounding makes of no force, or no constraint
+CLOSURE_TOLERANCE = 1e-10  # of the mechanism's length
+CLOSURE_ITERATIONS = 20
+NEARBY_STEP = 1e-2  # part of a radian that the mechanism is moved by to see whether its rank is the usual one
+
+
+@dataclass
+class FreeCoordinates:
+    """Freedoms at a state.
+
+    Attributes
+    ----------
+    names : list of Named
+        Of all velocities.
+    holonomic, rows : ndarray
+        Constraints on positions (n, nv), and those on velocities, which they are among (m, nv); prescribed coordinates
+        are constraints here.
+    Z, Zv : ndarray (nv, f), (nv, fv)
+        Bases of what they allow, turns that mean nothing (`massless_rotations`) left out: the identity in the rows ``chosen`` and
+        ``chosen_v``.
+    """
+
+    names: list[VelocityName]
+    holonomic: np.ndarray
+    rows: np.ndarray
+    Z: np.ndarray
+    Zv: np.ndarray
+    chosen: np.ndarray
+    chosen_v: np.ndarray
+    scale: np.ndarray
+    left: np.ndarray  # (f, nv): takes the chosen coordinates' changes from those of all
+    left_v: np.ndarray  # the same for velocities
+    on_positions: np.ndarray  # (m,): which rows are constraints on positions
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the chosen coordinates."""
+        return [self.names[d].name for d in self.chosen]
+
+    def turned(self, T: np.ndarray, later_equations: EquationDerivatives) -> FreeCoordinates:
+        """The same motions turned by T (nv, nv), under the constraints of a later instant."""
+        other = free_coordinates(later_equations)
+        back = np.linalg.inv(T)
+        bases = {"Z": T @ self.Z, "Zv": T @ self.Zv, "left": self.left @ back, "left_v": self.left_v @ back}
+        return replace(self, holonomic=other.holonomic, rows=other.rows, **bases)
+
+    def solve(self, right: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """The smallest x (nv, n) with rows x = right; the rows are all of them if not given."""
+        A = self.rows if rows is None else rows
+        return self.scale[:, None] * np.linalg.lstsq(A * self.scale, right, rcond=RANK_TOLERANCE)[0]
+
+    @staticmethod
+    def unseen(x: np.ndarray, basis: np.ndarray, left: np.ndarray) -> np.ndarray:
+        """The x that differs by the basis' motions and changes no chosen coordinate."""
+        return x - basis @ (left @ x)
+
+
+def free_coordinates(e: EquationDerivatives, like: FreeCoordinates | None = None) -> FreeCoordinates:
+    """Freedoms at the state of some equations, told by the coordinates that those of another are told by, if given."""
+    c = e.state.c
+    s = c.structure
+    names = velocity_names(s)
+    scale = c.sizes / c.values.length
+    G = e.by_velocity[e.at["n"]].toarray()
+    which = np.array([r.holonomic for r in s.rows], bool)
+    given = prescribed_rows(c)
+    holonomic, rows = np.vstack([G[which], given]), np.vstack([G, given])
+    still = _selection_rows(massless_rotations(e), s.nv)
+    Z, chosen = _free_basis(np.vstack([holonomic, still]), scale, None if like is None else like.chosen)
+    Zv, chosen_v = Z, chosen
+    if not which.all():
+        Zv, chosen_v = _free_basis(np.vstack([rows, still]), scale, None if like is None else like.chosen_v)
+    left = _selection_rows(chosen, s.nv)
+    left_v = left if chosen_v is chosen else _selection_rows(chosen_v, s.nv)
+    on_positions = np.r_[which, np.ones(len(given), bool)]
+    return FreeCoordinates(names, holonomic, rows, Z, Zv, chosen, chosen_v, scale, left, left_v, on_positions)
+
+
+def _selection_rows(which: np.ndarray, n: int) -> np.ndarray:
+    """Unit rows (m, n) that take some of n numbers."""
+    out = np.zeros((len(which), n))
+    out[np.arange(len(which)), which] = 1.0
+    return out
+
+
+def massless_rotations(e: EquationDerivatives) -> np.ndarray:
+    """Velocities that mean nothing: turns of point masses, which have no inertia and on which nothing acts."""
+    M, D, K = (X[e.at["r"]] for X in (e.by_acceleration, e.by_velocity, e.by_position))
+    none = np.flatnonzero(M.diagonal() == 0.0)
+    if not len(none):
+        return none
+    size, G = e.state.c.sizes, e.by_velocity[e.at["n"]]
+    force = abs(D) + abs(K)
+    acts = np.maximum((force @ size) * size, size * (force.T @ size))
+    held = (abs(G).T @ np.ones(G.shape[0])) * size
+    return np.array([d for d in none if all(x[d] <= VANISHING * x.max(initial=0.0) for x in (acts, held))], int)
+
+
+def prescribed_rows(c: CompiledMechanism) -> np.ndarray:
+    """Unit rows (n, nv) for the coordinates that drivers prescribe, in the order of the structure's."""
+    tree = c.structure.tables["tree"]
+    out = np.zeros((len(c.structure.prescribed), c.structure.nv))
+    for k, b in enumerate(c.structure.prescribed.values()):
+        assert tree.law[b] >= 0
+        out[k, tree.v[b]] = 1.0
+    return out
+
+
+def constraint_rank(G: np.ndarray, scale: np.ndarray) -> int:
+    """Rank of constraint rows."""
+    return rank_of(normalised_rows(G, scale)) if len(G) else 0
+
+
+def _null_space(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Orthonormal basis of the scaled motions that rows allow."""
+    import scipy.sparse as sp
+
+    A = normalised_rows(G, scale)
+    if DENSE_ROWS < len(A) < len(scale) and clearly_independent(own := sp.csr_matrix(A)):
+        return null_basis(own)
+    return null_space(A)
+
+
+def normalised_rows(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Rows of unit size, turns counted in lengths."""
+    A = G * scale
+    size = np.sqrt((A * A).sum(axis=1))
+    return A / np.where(size > 0.0, size, 1.0)[:, None]
+
+
+def gap_lengths(g: np.ndarray, G: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Values of rows as lengths, whatever they are in: what is left of each, by the size of its row."""
+    size = np.linalg.norm(G * scale, axis=1)
+    return np.asarray(g / np.where(size > 0.0, size, 1.0))
+
+
+def _free_basis(G: np.ndarray, scale: np.ndarray, chosen: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    N = _null_space(G, scale)
+    if not N.shape[1]:
+        return N, np.zeros(0, int)
+    if chosen is None or len(chosen) != N.shape[1]:
+        chosen = pivot_rows(N)
+    Z = scale[:, None] * N
+    Z = Z @ np.linalg.inv(Z[chosen])
+    Z[np.abs(Z) <= BASIS_ROUNDING * scale[:, None] / scale[chosen]] = 0.0
+    Z[chosen] = np.eye(len(chosen))
+    return Z, chosen
+
+
+def pivot_rows(N: np.ndarray) -> np.ndarray:
+    """Rows of an orthonormal basis (nv, f) that tell the others, (f,): as complete pivoting would choose them."""
+    from scipy.linalg import qr
+
+    if not N.shape[1]:
+        return np.zeros(0, int)
+    *_, order = qr(N.T, mode="economic", pivoting=True)
+    return np.sort(order[: N.shape[1]])
+
+
+def refuse_singular_position(e: EquationDerivatives, f: FreeCoordinates) -> None:
+    """Refuse a position where the constraints lose rank: nothing linear holds there.
+
+    Raises
+    ------
+    SingularityError
+        Naming the elements whose rows depend on each other here and do not nearby.
+    """
+    c, x = e.state.c, e.state
+    if not len(f.holonomic) or not f.Z.shape[1]:
+        return
+    here = constraint_rank(f.holonomic, f.scale)
+    rng = np.random.default_rng(0)
+    for _ in range(2):
+        a = f.Z @ (f.scale[f.chosen] * rng.standard_normal(f.Z.shape[1]))
+        a *= NEARBY_STEP / np.abs(a / f.scale).max()
+        G = _nearby_jacobian(c, x.t, x.q, a, f.scale)
+        if G is not None and constraint_rank(G, f.scale) > here:
+            names = _dependent_elements(f, G, c)
+            raise singular_position_error(x.t, names)
+
+
+def singular_position_error(t: float, names: tuple[str, ...]) -> SingularityError:
+    """The error that names the elements whose constraints lose rank at a position."""
+    return SingularityError(
+        f"the mechanism is in a singular position at t = {t:.6g} s: the constraints of {', '.join(names)} "
+        f"depend on each other here and not nearby, so that there is no linear model; move it away from there",
+        t,
+        names,
+    )
+
+
+def _nearby_jacobian(
+    c: CompiledMechanism, t: float, q: np.ndarray, step: np.ndarray, scale: np.ndarray
+) -> np.ndarray | None:
+    """Rows of the constraints on positions at the closed position near a step away; None if none is found."""
+    z, q, still = c.z.copy(), q.copy(), np.zeros(len(step))
+    which = np.array([r.holonomic for r in c.structure.rows], bool)
+    G = np.zeros((0, len(step)))
+    try:
+        for _ in range(CLOSURE_ITERATIONS):
+            retract(c.values.system, q, step)
+            c.at(t, q, still)
+            G, g = c.jacobian()[which], c.work.rows.value[which]
+            if np.abs(g).max(initial=0.0) < CLOSURE_TOLERANCE * c.values.length:
+                return np.vstack([G, prescribed_rows(c)])
+            step = (
+                -scale
+                * np.linalg.lstsq(
+                    np.vstack([G, prescribed_rows(c)]) * scale,
+                    np.r_[g, np.zeros(len(prescribed_rows(c)))],
+                    rcond=RANK_TOLERANCE,
+                )[0]
+            )
+        return None
+    finally:
+        c.z = z
+
+
+def _dependent_elements(f: FreeCoordinates, G: np.ndarray, c: CompiledMechanism) -> tuple[str, ...]:
+    """Elements whose rows take part in dependencies that are not there nearby."""
+    here, there = (
+        fundamental_subspaces(normalised_rows(f.holonomic, f.scale)).dependencies,
+        fundamental_subspaces(normalised_rows(G, f.scale)).span,
+    )
+    part = np.abs(here @ (here.T @ there)).max(axis=1)
+    of = [r.element.name for r in c.structure.rows if r.holonomic] + list(c.structure.prescribed)
+    return tuple(dict.fromkeys(n for n, p in zip(of, part, strict=True) if p > 1e-3))
+
+
+PERTURBED_SAMPLES = 4
+PERTURBATION = 4.0 * np.finfo(float).eps  # what positions and multipliers are changed by, of their size
+ROUNDING_MARGIN = 8.0  # than the samples: what is below so many times their spread is nothing
+
+
+def force_magnitudes(e: EquationDerivatives) -> np.ndarray:
+    """What acts in every equation of motion: the total force, and each constraint's, (nv,)."""
+    x, at = e.state, e.at
+    G = e.by_velocity[at["n"]]
+    M = e.by_acceleration[at["r"]]
+    force = e.residual[at["r"]] - M @ x.vdot + G.T @ x.lam
+    return np.abs(force) + abs(G).T @ np.abs(x.lam) + np.abs(x.effort)
+
+
+def force_rounding(e: EquationDerivatives) -> np.ndarray:
+    """What rounding may leave of every equation of motion, (nv,).
+
+    Constraints hand on what they carry: the largest of all that is connected, in energy, counts for each.
+    """
+    size = e.state.c.sizes
+    spread = np.zeros(len(size))
+    for other in perturbed_states(e.state):
+        np.maximum(spread, np.abs(EquationDerivatives(other).block("r") - e.block("r")), out=spread)
+    part = _connected_parts(e)
+    most = np.zeros(len(size))
+    np.maximum.at(most, part, size * np.maximum(spread, PERTURBATION * force_magnitudes(e)))
+    return ROUNDING_MARGIN * most[part] / size
+
+
+def _connected_parts(e: EquationDerivatives) -> np.ndarray:
+    """Numbers of the parts of the mechanism that nothing connects, for every velocity, (nv,).
+
+    All that a constraint can act on is connected, whether it does in this position or not: an equation may hold nothing
+    but a multiplier that is rounding itself, and what acts beside it tells of what.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    G, r = e.state.c.sparse_jacobian(), e.at["r"]
+    G.data[:] = 1.0
+    return connected_components(abs(e.by_position[r]) + abs(e.by_acceleration[r]) + G.T @ G, directed=False)[1]
+
+
+def stiffness_rounding(e: EquationDerivatives) -> list:
+    """What rounding makes of the stiffness: some samples, sparse (nv, nv)."""
+    K = e.by_position[e.at["r"]]
+    return [
+        ROUNDING_MARGIN * (EquationDerivatives(other).by_position[e.at["r"]] - K) for other in perturbed_states(e.state)
+    ]
+
+
+def static_equations(e: EquationDerivatives) -> EquationDerivatives:
+    """The equations without accelerations, under the multipliers and efforts that leave the least of them."""
+    import scipy.sparse as sp
+
+    x, c = e.state, e.state.c
+    rows = e.by_velocity[e.at["n"]]
+    still = replace(x, vdot=0.0 * x.vdot, lam=0.0 * x.lam, effort=0.0 * x.effort)
+    A = sp.diags(c.sizes) @ sp.vstack([rows, prescribed_rows(c)]).T.tocsr()
+    if not A.shape[1]:
+        return EquationDerivatives(still)
+    size = np.sqrt(np.asarray(A.multiply(A).sum(axis=0)).ravel())
+    size = 1.0 / np.where(size > 0.0, size, 1.0)
+    y = size * minimum_norm_solution(A @ sp.diags(size), c.sizes * EquationDerivatives(still).block("r"))
+    return EquationDerivatives(replace(still, lam=y[: len(x.lam)], effort=prescribed_rows(c).T @ y[len(x.lam) :]))
+
+
+def is_balanced(e: EquationDerivatives, part: float) -> bool:
+    """Whether every equation of motion is balanced, but for a part of what acts in it, and rounding."""
+    return is_balanced_beyond_rounding(e, part) or bool(
+        (np.abs(e.block("r")) <= part * force_magnitudes(e) + force_rounding(e)).all()
+    )
+
+
+def is_balanced_beyond_rounding(e: EquationDerivatives, part: float) -> bool:
+    """The same without rounding, which where a force jumps may be all of it."""
+    return bool((np.abs(e.block("r")) <= part * force_magnitudes(e)).all())
+
+
+def unbalanced_fraction(e: EquationDerivatives) -> float:
+    """The largest force that is left, of those that act in its equation; zero where rounding leaves as much."""
+    left, acts = np.abs(e.block("r")), force_magnitudes(e)
+    return float(np.where(left > force_rounding(e), left / np.where(acts > 0.0, acts, 1.0), 0.0).max(initial=0.0))
+
+
+def perturbed_states(x: MechanismState) -> Iterator[MechanismState]:
+    """The state and the mechanism's numbers with other last digits: the same for all that can be told."""
+    S = x.c.values.system
+    size = x.c.sizes
+    for b in range(len(S.tree.parent)):
+        q0, v0, n = int(S.tree.q[b]), int(S.tree.v[b]), count_plain_coordinates(S, b)
+        size[v0 : v0 + n] += np.abs(x.q[q0 : q0 + n])
+    rng = np.random.default_rng(0)
+    for _ in range(PERTURBED_SAMPLES):
+        digits = partial(rng.uniform, -PERTURBATION, PERTURBATION)
+        q = x.q.copy()
+        retract(S, q, size * digits(size=len(size)))
+        v, vdot, lam, effort = (a * (1.0 + digits(size=len(a))) for a in (x.v, x.vdot, x.lam, x.effort))
+        rounded = with_numbers(S, lambda _, a: np.where(a == np.rint(a), a, a * (1.0 + digits(size=a.shape))))  # noqa: B023
+        c = replace(x.c, values=replace(x.c.values, system=rounded))
+        yield replace(x, c=c, q=q, v=v, vdot=vdot, lam=lam, effort=effort)
+
+
+COEFFICIENT_ROUNDING = 2e-14  # of the largest term of an equation: what is uncertain of its coefficients
+DIRECTION_ROUNDING = 1e-15  # of the largest term of the equations of the same bodies
+SLOWEST_FRACTION = (
+    1e-3  # of the speed that the terms would give if nothing cancelled: that of the fastest motion at least
+)
+
+
+class TermSizes(NamedTuple):
+    """Sizes of what the coefficients of linear equations are sums of; n coordinates and velocities, p columns.
+
+    Attributes
+    ----------
+    mass : ndarray (fv, fv)
+        Mass matrix of the free velocities.
+    rates : ndarray (f, p)
+        In the rates of the free coordinates.
+    forces : ndarray (nv, p)
+        In the equations of motion.
+    Y, M : ndarray (nv, fv), (nv, nv)
+        Directions along which the multipliers drop out; mass matrix.
+    """
+
+    mass: np.ndarray
+    rates: np.ndarray
+    forces: np.ndarray
+    Y: np.ndarray
+    M: np.ndarray
+
+
+class MatrixUncertainty(NamedTuple):
+    """What is uncertain of a matrix: A + by X with any X no entry of which is larger than that of ``size``, (n, n)."""
+
+    by: np.ndarray
+    size: np.ndarray
+
+
+def remove_rounding(
+    terms: TermSizes,
+    a_dot: np.ndarray,
+    forces: np.ndarray,
+    e: EquationDerivatives,
+    f: FreeCoordinates,
+    speed_scales: np.ndarray | None = None,
+) -> MatrixUncertainty:
+    """Set coefficients that are rounding to 0, and say what is uncertain of the others.
+
+    The entries of an equation are compared in units of the coordinates' natural sizes, rates at the speed of the
+    fastest motion: the terms that cancel in one column are rounded as those that do not in another. What acts on a body
+    along one axis shows along the others by the rounding of its directions.
+
+    Parameters
+    ----------
+    terms : Terms
+        Its mass matrix loses its rounding, too.
+    a_dot : ndarray (f, p)
+        Rates of the free coordinates.
+    forces : ndarray (fv, p)
+        What acts along the directions in which the multipliers drop out.
+    speed_scales : ndarray (nv,), optional
+        Large speeds of what has a size of its own, because it stands for something else; 0 of all others.
+    """
+    (a, fv), nv = (len(a_dot), len(forces)), len(f.scale)
+    n = a + fv
+    scale, along = np.r_[f.scale[f.chosen], f.scale[f.chosen_v]], np.abs(terms.Y).T
+    inertia = np.sqrt(np.maximum(np.abs(np.diag(terms.mass)), 1e-300))
+    terms.mass[np.abs(terms.mass) <= COEFFICIENT_ROUNDING * np.outer(inertia, inertia)] = 0.0
+    inverse = np.linalg.inv(terms.mass) if fv else terms.mass
+    turned = _coupled_maximum(force_magnitudes(e), terms.M, e, f.scale)  # by a radian, or a length
+    unit = scale.copy()
+    large = np.zeros(fv) if speed_scales is None else speed_scales[f.chosen_v]
+    if fv:
+        A = np.abs(inverse @ forces[:, :n]) / scale[a:, None] * scale
+        most = np.hstack([along @ terms.forces[:, :n] * scale, (along @ turned)[:, None]])
+        moves = np.r_[np.ones(a, bool), large == 0.0]
+        uncancelled = most / inertia[:, None] ** 2 / scale[a:, None]
+        pushed = float((A[moves[a:]][:, ~moves] / scale[~moves] * large[large > 0.0]).max(initial=0.0))
+        fastest = _fastest_rate(A[moves[a:]][:, moves], uncancelled[moves[a:]][:, np.r_[moves, True]], a, pushed)
+        unit[a:] = np.where(large > 0.0, large, fastest * unit[a:])
+    rows = (terms.forces[:, :n] * unit).max(axis=1, initial=0.0) if n else np.zeros(nv)
+    first = COEFFICIENT_ROUNDING * (terms.rates[:, :n] * unit).max(axis=1, initial=0.0)
+    second = along @ (
+        COEFFICIENT_ROUNDING * rows + DIRECTION_ROUNDING * (_coupled_maximum(rows, terms.M, e, f.scale) + turned)
+    )
+    size = np.r_[first, second][:, None] / unit
+    for own, least in ((a_dot[:, :n], size[:a]), (forces[:, :n], size[a:])):
+        own[np.abs(own) <= least] = 0.0
+    by = np.eye(n)
+    by[a:, a:] = inverse
+    return MatrixUncertainty(by, size)
+
+
+def _fastest_rate(A: np.ndarray, uncancelled: np.ndarray, a: int, pushed: float) -> float:
+    """Rate [1/s] of the fastest motion, from accelerations and what cancels in them, (fv, n), in natural units.
+
+    ``pushed`` are accelerations by what has a size of its own: where nothing else acts all other is rounding.
+    """
+
+    def rate(by_position: np.ndarray, by_velocity: np.ndarray) -> float:
+        return max(float(np.sqrt(by_position.max(initial=0.0))), float(by_velocity.max(initial=0.0)))
+
+    n = A.shape[1]
+    static = np.hstack([uncancelled[:, :a], uncancelled[:, n:]])
+    return max(rate(A[:, :a], A[:, a:]), SLOWEST_FRACTION * rate(static, uncancelled[:, a:n]), np.sqrt(pushed)) or 1.0
+
+
+def _coupled_maximum(rows: np.ndarray, M: np.ndarray, e: EquationDerivatives, scale: np.ndarray) -> np.ndarray:
+    """The largest of what acts on the bodies that the mass matrix couples with each, as seen from each velocity."""
+    from scipy.sparse.csgraph import connected_components
+
+    nv = e.state.c.structure.tables["tree"].nv
+    body = np.repeat(np.arange(len(nv)), nv)
+    _, part = connected_components((M != 0.0) | (body[:, None] == body), directed=False)
+    most = np.zeros(part.max(initial=-1) + 1)
+    np.maximum.at(most, part, rows * scale)
+    return most[part] / scale
+
+
+@dataclass
+class TurningFrame:
+    """An evenly turning frame.
+
+    Attributes
+    ----------
+    turning : ndarray (3,) [rad/s]
+        Its angular velocity, along the world's axes.
+    H : ndarray (nv, nv) [1/s]
+        Rate at which co-moving changes of positions and velocities turn.
+    N : ndarray (nv, nv) [1/s]
+        (rate of a change of position) = (change of velocity) + N (change of position).
+    told : str
+        What it is, for people; empty at rest.
+    """
+
+    turning: np.ndarray
+    H: np.ndarray
+    N: np.ndarray
+    told: str = ""
+
+
+@dataclass
+class InputTerms:
+    """What m inputs do to the equations at a fixed state: r_w (nv, m), g_w (holonomic rows, m), n_w (all rows, m)."""
+
+    r: np.ndarray
+    g: np.ndarray
+    n: np.ndarray
+
+
+@dataclass
+class ReducedEquations:
+    """Linear equations in the changes s = (a, b) of the free coordinates and velocities, and the inputs.
+
+    Every array has columns for s (n), inputs, their first and their second rates (m each).
+
+    Attributes
+    ----------
+    rate : ndarray (n, n + 3 m)
+        s' as it follows from s and the inputs.
+    position, velocity, acceleration, multipliers : ndarray
+        Changes of all positions, velocities, accelerations, multipliers and efforts of prescribed coordinates.
+    M, D, K : ndarray (f, f) or None
+        M a'' + D a' + K a = 0 where all constraints are on positions.
+    doubt : Doubt
+        What is uncertain of A by rounding.
+    """
+
+    rate: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    multipliers: np.ndarray
+    M: np.ndarray | None = None
+    D: np.ndarray | None = None
+    K: np.ndarray | None = None
+    uncertainty: MatrixUncertainty | None = None
+
+    @property
+    def A(self) -> np.ndarray:
+        """System matrix, s' = A s without inputs."""
+        return self.rate[:, : len(self.rate)]
+
+    def inputs(self, part: np.ndarray) -> list[np.ndarray]:
+        """Columns of the inputs, of their first and of their second rates."""
+        return np.split(part[:, len(self.rate) :], 3, axis=1)
+
+
+def reduced_equations(
+    e: EquationDerivatives,
+    f: FreeCoordinates,
+    frame: TurningFrame,
+    w: InputTerms | None = None,
+    speed_scales: np.ndarray | None = None,
+) -> ReducedEquations:
+    """Take the constraints out; ``speed_scales`` is as in `reduced_equations.remove_rounding`.
+
+    Raises
+    ------
+    ModelError
+        If something free moves without inertia.
+    """
+    r, nv = e.at["r"], len(f.scale)
+    M, D, K = (X[r].toarray() for X in (e.by_acceleration, e.by_velocity, e.by_position))
+    H, N = frame.H, frame.N
+    given = len(f.rows) - e.block("n").size
+    V = np.vstack([e.by_position[e.at["n"]].toarray(), np.zeros((given, nv))])
+    w = w or InputTerms(np.zeros((nv, 0)), np.zeros((len(f.holonomic), 0)), np.zeros((len(f.rows), 0)))
+    none = np.zeros_like(w.r)
+    rates = np.zeros((len(f.rows), w.g.shape[1]))
+    rates[f.on_positions] = w.g
+    X = f.unseen(-f.solve(w.g, f.holonomic), f.Z, f.left)
+    P, U, U1 = (
+        f.unseen(-f.solve(b), f.Zv, f.left_v) if b.any() else np.zeros((nv, b.shape[1]))
+        for b in (V @ f.Z, V @ X + w.n, rates)
+    )
+    x = np.hstack([f.Z, np.zeros_like(f.Zv), X, none, none])
+    u = np.hstack([P, f.Zv, U, U1, none])
+    a_dot = f.left @ (u + (N - H) @ x)
+    known = P @ a_dot + np.hstack([np.zeros((nv, f.Z.shape[1] + f.Zv.shape[1])), none, U, U1])
+    acting = np.hstack([np.zeros((nv, f.Z.shape[1] + f.Zv.shape[1])), w.r, none, none])
+    others = (M @ H + D) @ u + K @ x + acting
+    by_multipliers = -f.rows.T
+    Y = f.Zv
+    if e.state.c.structure.loads:
+        by_multipliers[:, : e.block("n").size] += e.by_reactions
+        Y = _multiplier_free_directions(e, f)
+    size = abs(M @ H) @ abs(u) + abs(D) @ abs(u) + abs(K) @ abs(x) + abs(M) @ abs(known)
+    terms = TermSizes(Y.T @ M @ f.Zv, abs(f.left) @ (abs(u) + abs(N - H) @ abs(x)), size, Y, M)
+    forces = Y.T @ (M @ known + others)
+    try:
+        doubt = remove_rounding(terms, a_dot, forces, e, f, speed_scales)
+    except np.linalg.LinAlgError:
+        d = f.chosen_v[int(np.argmin(np.abs(np.diag(terms.mass))))]
+        raise massless_motion_error(f.names[d].name) from None
+    b_dot = np.linalg.solve(terms.mass, 0.0 - forces) if f.Zv.shape[1] else a_dot[:0]
+    acceleration = f.Zv @ b_dot + known + H @ u
+    left = M @ (acceleration - H @ u) + others
+    multipliers = np.linalg.lstsq(f.scale[:, None] * by_multipliers, -f.scale[:, None] * left, rcond=1e-12)[0]
+    out = ReducedEquations(np.vstack([a_dot, b_dot]), x, u, acceleration, multipliers, uncertainty=doubt)
+    if f.Zv.shape == f.Z.shape:
+        turned = (H - N) @ f.Z  # u = Z a' + turned a
+        out.M = terms.mass
+        out.D = Y.T @ (M @ turned + (M @ H + D) @ f.Z)
+        out.K = Y.T @ ((M @ H + D) @ turned + K @ f.Z)
+    return out
+
+
+def massless_motion_error(name: str) -> ModelError:
+    """The error that names what moves without inertia."""
+    return ModelError(
+        f"nothing with inertia moves along {name}: there is no linear equation of motion; give it a mass or a moment "
+        f"of inertia"
+    )
+
+
+def _multiplier_free_directions(e: EquationDerivatives, f: FreeCoordinates) -> np.ndarray:
+    """Y (nv, fv) with Y^T dr/dl = 0, so that the multipliers drop out; Zv where no friction follows the reactions.
+
+    Y is Zv less what the constraints' own directions C make up for: Y^T = Zv^T - Zv^T R (C^T R)^+ C^T.
+    """
+    F = np.zeros(f.rows.T.shape)
+    F[:, : e.block("n").size] = e.by_reactions
+    refuse_undetermined_friction(e.state.c.structure, (f.rows * f.scale)[: e.block("n").size], e.by_reactions)
+    R = f.scale[:, None] * (F - f.rows.T)
+    C = column_space((f.rows * f.scale).T)
+    Z = f.Zv / f.scale[:, None]
+    return f.scale[:, None] * (Z - C @ (Z.T @ R @ np.linalg.pinv(C.T @ R, rcond=1e-12)).T)

@@ -1,0 +1,328 @@
+"""Steady motions (relative equilibria): constant as seen from an evenly turning frame.
+
+Along such a motion the linear equations x' = A(t) x have coefficients that only turn: A(t) = T A(0) T^-1 with T =
+exp(t H). In co-moving coordinates y = T^-1 x they are constant, y' = (A(0) - H) y; in any others their eigenvalues
+mean nothing (a conical pendulum seen from the ground). H turns positions with the frame, and takes from the
+rotations, which have components along the bodies' axes, the spin of each body against the frame: a wheel that spins
+about its axis of symmetry is the same wheel. Where a motion is steady from several frames, that which stands still
+or turns least is taken.
+
+With B(t) the changes of the bodies' positions and rotations, seen from the frame they are T(t)^-1 B(t), T = exp(t
+H_B), whatever the coordinates. Coordinates x with B = J x turn by H where J H = H_B J - dJ/dt. So the choice of a
+frame does not depend on the coordinates, and neither do the eigenvalues that are seen from it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..engine.kinematics import coordinate_rates, normalise_quaternions, quaternion_at
+from ..errors import AnalysisError
+from ..laws.bytecode import INPUT
+from ..numerics.rank import fundamental_subspaces
+from ..results.recorded_kinematics import RecordedMotion
+from ..results.wording import tuple_text
+from ..tables.structure_definition import velocity_names
+from ..tables.table_definitions import System
+from .equation_derivatives import COMPLEX_STEP, EquationDerivatives, MechanismState, complex_step_derivative
+from .reduced_equations import (
+    FreeCoordinates,
+    TurningFrame,
+    force_magnitudes,
+    force_rounding,
+    reduced_equations,
+    static_equations,
+)
+
+TURNING_TOLERANCE = 1e-9  # singular values below this part of the largest leave the frame's turning open
+IN_PLANE = (0, 1, 5)  # x, y and the angle about z, of a body's six
+MATRIX_ROUNDING = 1e-13  # of the largest: entries of H that are none
+
+
+def kinematic_matrix(x: MechanismState) -> np.ndarray:
+    """N of `TurningFrame`: changes of rotations have components along axes that turn, (nv, nv)."""
+    S = x.c.values.system
+    N = np.zeros((len(x.v),) * 2)
+    for b in range(len(S.tree.parent)):
+        _, w0 = quaternion_at(S, b)
+        if w0 >= 0:
+            at = slice(w0, w0 + 3)
+            N[at, at] = -_cross_product_matrix(x.v[at])
+    return N
+
+
+def candidate_frames(x: MechanismState) -> list[TurningFrame]:
+    """Frames from which the motion may look steady, the most likely first.
+
+    All bodies' velocities and angular velocities then turn with the frame: a = W x v, alpha = W x w. What this leaves
+    open is chosen so that the frame stands still, or so that it turns with one of the bodies.
+    """
+    c = x.c
+    c.at(x.t, x.q, x.v)
+    r = RecordedMotion(c.values, x.q[None], x.v[None], x.vdot[None])
+    kept = [np.array([r.body(b)[k] for b in c.structure.place.values() if b >= 0])[..., 0] for k in (2, 3, 4, 5)]
+    w, v, alpha, a = kept
+    length = c.values.length
+    A = np.vstack([-_cross_product_matrix(u) for u in [*(v / length), *w]])
+    right = np.r_[(a / length).ravel(), alpha.ravel()]
+    p = fundamental_subspaces(A, TURNING_TOLERANCE)
+    least, open_ = p.seen @ ((p.span.T @ right) / p.values), p.null.T
+    turns = [least]
+    for spin in w:
+        other = least + open_.T @ (open_ @ (spin - least))
+        if min(np.abs(other - seen).max() for seen in turns) > TURNING_TOLERANCE * (1.0 + np.abs(w).max()):
+            turns.append(other)
+    fast = max(np.abs(w).max(), np.abs(v).max() / length)
+    turns = [np.where(np.abs(t) > TURNING_TOLERANCE * fast, t, 0.0) for t in turns]  # the rest is rounding
+    N = kinematic_matrix(x)
+    return [TurningFrame(turning, turning_matrix(x, turning), N) for turning in turns]
+
+
+def frame_description(x: MechanismState, frame: TurningFrame, frozen: bool) -> str:
+    """Where linear equations about a motion are seen from, for people; empty at rest."""
+    if not np.abs(x.v).max(initial=0.0) > 0.0:
+        return ""
+    if frozen:
+        return "the coordinates of this very instant"
+    if not frame.turning.any():
+        return "the ground"
+    return f"a frame that turns with {tuple_text(frame.turning)} rad/s"
+
+
+def turning_matrix(x: MechanismState, turning: np.ndarray) -> np.ndarray:
+    """H of `TurningFrame`: how changes of positions turn with a frame that turns with ``turning`` [rad/s], (nv, nv)."""
+    s, S = x.c.structure, x.c.values.system
+    if s.tree:
+        return _joint_turning_matrix(x, turning)
+    x.c.at(x.t, x.q, x.v)
+    H = np.zeros((len(x.v),) * 2)
+    for b in range(len(S.tree.parent)):
+        v0, n = int(S.tree.v[b]), int(S.tree.nv[b])
+        own = _body_turning_matrix(
+            np.array(x.c.work.BK[b, 3:12]).reshape(3, 3), np.array(x.c.work.BK[b, 12:15]), turning
+        )
+        kept = (IN_PLANE if s.model.planar else range(6))[:n]  # a point mass has no turn
+        H[v0 : v0 + n, v0 : v0 + n] = own[np.ix_(kept, kept)]
+    return H
+
+
+def _body_turning_matrix(R: np.ndarray, w: np.ndarray, turning: np.ndarray) -> np.ndarray:
+    """H_B of a body: its place turns with the frame; its rotation, along its axes, by its spin against the frame."""
+    H = np.zeros((6, 6))
+    H[:3, :3] = _cross_product_matrix(turning)
+    H[3:, 3:] = -_cross_product_matrix(R.T @ (w - turning))
+    return H
+
+
+def _joint_turning_matrix(x: MechanismState, turning: np.ndarray) -> np.ndarray:
+    """H in joint coordinates: J and dJ/dt from a complex step along the motion."""
+    c, nv = x.c, len(x.v)
+    S, one = c.values.system, np.eye(nv)
+    ahead = np.zeros_like(x.q)
+    c.at(x.t, x.q, x.v)
+    coordinate_rates(S, x.q, x.v, ahead)
+    r = RecordedMotion(c.values, np.tile(x.q + 1j * COMPLEX_STEP * ahead, (nv, 1)), one, 0.0 * one)
+    J, rate, turned = [], [], []
+    for b in c.structure.place.values():
+        if b < 0:
+            continue
+        R, w, v = (np.array(part) for part in r.body(b)[1:4])
+        own = np.vstack([v, np.einsum("jin,jn->in", R.reshape(3, 3, nv), w)])
+        H = _body_turning_matrix(R[:, 0].real.reshape(3, 3), w.real @ x.v, turning)
+        size = np.r_[np.full(3, c.values.length), np.ones(3)][:, None]
+        J.append(own.real / size)
+        rate.append(complex_step_derivative(own) / size)
+        turned.append(H @ own.real / size)
+    H = np.linalg.lstsq(np.vstack(J), np.vstack(turned) - np.vstack(rate), rcond=None)[0]
+    return np.where(np.abs(H) > MATRIX_ROUNDING * np.abs(H).max(initial=0.0), H, 0.0)
+
+
+def _cross_product_matrix(w: np.ndarray) -> np.ndarray:
+    """Matrix of the cross product w x ."""
+    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+
+
+COMPARISON_ANGLE = 0.1  # angle [rad] or part of the mechanism's length that it moves by between the instants compared
+COMPARISON_STEPS = 16
+BALANCE_TOLERANCE = 1e-6  # unbalanced forces of an equilibrium, of those that act
+POSITION_TOLERANCE = 1e-9  # step in radians, or parts of the mechanism's length, that an equilibrium may be off
+COEFFICIENT_TOLERANCE = 1e-5  # relative difference of linear equations that are the same
+REST_SPEED = 1e-9  # speed below which nothing moves, of what gravity or the fastest body gives
+
+
+def is_steady(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, frame: TurningFrame) -> bool:
+    """Whether a moment later, moved on with the frame, the accelerations and linear equations are the same."""
+    from scipy.linalg import expm
+
+    size = np.abs(x.v / f.scale).max() ** 2 + np.abs(x.vdot / f.scale).max()
+    if not np.abs((x.vdot - frame.H @ x.v) / f.scale).max() <= COEFFICIENT_TOLERANCE * size:
+        return False  # the velocities do more than turn with the frame
+    tau, later = _advanced_state(x, frame)
+    T = expm(tau * frame.H)
+    if not np.abs((later.vdot - T @ x.vdot) / f.scale).max() <= COEFFICIENT_TOLERANCE * size:
+        return False
+    then = EquationDerivatives(later)
+    g = f.turned(T, then)
+    if np.abs(g.rows @ g.Zv).max(initial=0.0) > COEFFICIENT_TOLERANCE * np.abs(g.rows).max(initial=0.0) * np.abs(
+        g.Zv
+    ).max(initial=0.0):
+        return False
+    now = reduced_equations(e, f, frame).A
+    other = reduced_equations(
+        then, g, TurningFrame(frame.turning, turning_matrix(later, frame.turning), kinematic_matrix(later))
+    ).A
+    return bool(np.abs(other - now).max(initial=0.0) <= COEFFICIENT_TOLERANCE * np.abs(now).max(initial=0.0))
+
+
+def is_still(x: MechanismState) -> bool:
+    """Whether nothing moves, compared with the mechanism's own rate, or with what forces give."""
+    scale, pace = x.c.sizes / x.c.values.length, float(x.c.values.system.scales.rate.real)
+    given = np.sqrt(pace**2 + np.abs(x.vdot / scale).max(initial=0.0))
+    return not (np.abs(x.v) / scale).max(initial=0.0) > REST_SPEED * given
+
+
+def steady_frame(
+    x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, speed_scales: np.ndarray | None = None
+) -> TurningFrame:
+    """The frame from which the state is steady: the world at an equilibrium; ``speed_scales`` is as in `refuse_unbalanced`.
+
+    Raises
+    ------
+    AnalysisError
+        If the state is neither an equilibrium nor a steady motion; the message says what is accelerated.
+    """
+    none = np.zeros((len(x.v),) * 2)
+    if not f.Zv.shape[1]:  # drivers leave no freedom: there is nothing to be steady
+        return TurningFrame(np.zeros(3), none, none)
+    if is_still(x):
+        refuse_unbalanced(x, e, speed_scales)
+        at_rest = TurningFrame(np.zeros(3), none, none)
+        if has_time_laws(x.c.values.system):
+            _refuse_time_dependence(x, e, f, at_rest)
+        return at_rest
+    for frame in candidate_frames(x):
+        if is_steady(x, e, f, frame):
+            return frame
+    raise AnalysisError(
+        f"the motion at t = {x.t:.6g} s is no steady one: from no evenly turning frame does it look the same a moment "
+        f"later. Linearise about an equilibrium (about=m.equilibrium()) or a steady motion, or ask for the equations "
+        f"of this very instant with frozen=True"
+    )
+
+
+def refuse_unbalanced(x: MechanismState, e: EquationDerivatives, speed_scales: np.ndarray | None = None) -> None:
+    """Refuse a state at rest that does not stay there.
+
+    Parameters
+    ----------
+    x : State
+    e : Equations
+        There.
+    speed_scales : ndarray (nv,), optional
+        Speeds of which the equilibrium may be off by a part, because they stand for something else.
+
+    Raises
+    ------
+    AnalysisError
+        Naming what is accelerated most.
+    """
+    left = remaining_accelerations(x, e, speed_scales)
+    if not left.any():
+        return
+    names, d = velocity_names(x.c.structure), int(np.argmax(left))
+    raise AnalysisError(
+        f"the mechanism is not in equilibrium where it is: {names[d].name} is accelerated with "
+        f"{x.vdot[d]:.3g} {names[d].unit}/s^2. Find an equilibrium first and linearise about it: "
+        f"about=m.equilibrium()"
+    )
+
+
+def remaining_accelerations(
+    x: MechanismState, e: EquationDerivatives, speed_scales: np.ndarray | None = None
+) -> np.ndarray:
+    """Accelerations (nv,) in natural units of what does not stay at rest, zero elsewhere; arguments of `refuse_unbalanced`."""
+    rest = static_equations(e)
+    left = np.abs(rest.block("r"))
+    may = BALANCE_TOLERANCE * force_magnitudes(rest) + POSITION_TOLERANCE * (abs(e.by_position[e.at["r"]]) @ x.c.sizes)
+    if speed_scales is not None:
+        may += POSITION_TOLERANCE * (abs(e.by_velocity[e.at["r"]]) @ speed_scales)
+    if (left <= may).all() or (left <= may + force_rounding(rest)).all():
+        return np.zeros(len(left))
+    return np.where(left > may, np.abs(x.vdot) * x.c.sizes, 0.0)
+
+
+def has_time_laws(S: System) -> bool:
+    """Whether a law of a force follows time."""
+    for law in S.forces.laws.ravel().tolist():
+        if law >= 0:
+            program = S.code[law + 2 : law + 2 + 2 * S.code[law]].reshape(-1, 2)
+            if (program == (INPUT, 0)).all(axis=1).any():
+                return True
+    return False
+
+
+def _refuse_time_dependence(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, frame: TurningFrame) -> None:
+    """Refuse linear equations that are others a moment later, though the mechanism rests."""
+    now = reduced_equations(e, f, frame).A
+    fastest = float(np.sqrt(np.abs(now).max(initial=0.0))) or 1.0
+    z = x.c.z.copy()
+    then = reduced_equations(
+        EquationDerivatives(MechanismState.moving(x.c, x.t + COMPARISON_ANGLE / fastest, x.q, x.v)), f, frame
+    ).A
+    x.c.at(x.t, x.q, x.v)
+    x.c.z = z
+    if np.abs(then - now).max(initial=0.0) > COEFFICIENT_TOLERANCE * np.abs(now).max(initial=0.0):
+        raise time_dependence_error()
+
+
+def time_dependence_error() -> AnalysisError:
+    """The error for linear equations that are others a moment later."""
+    return AnalysisError(
+        "the mechanism rests, but laws of its forces change with time, and its linear equations with them; ask for "
+        "those of this very instant with frozen=True"
+    )
+
+
+def advanced_equations(
+    x: MechanismState, f: FreeCoordinates, frame: TurningFrame
+) -> tuple[EquationDerivatives, FreeCoordinates, TurningFrame]:
+    """The same equations a short while later, the bases turned with the frame."""
+    from scipy.linalg import expm
+
+    tau, later = _advanced_state(x, frame)
+    then = EquationDerivatives(later)
+    own = TurningFrame(frame.turning, turning_matrix(later, frame.turning), kinematic_matrix(later))
+    return then, f.turned(expm(tau * frame.H), then), own
+
+
+def _advanced_state(x: MechanismState, frame: TurningFrame) -> tuple[float, MechanismState]:
+    """(time, state) a short while later if velocities turn with the frame: no forces are asked, so nothing is stiff."""
+    from scipy.linalg import expm
+
+    c, z, q = x.c, x.c.z.copy(), x.q.copy()
+    c.at(x.t, x.q, x.v)
+    S, W = c.values.system, c.work
+    h = (
+        COMPARISON_ANGLE
+        / max(np.abs(W.BK[:, 12:15]).max(), np.abs(W.BK[:, 15:18]).max() / c.values.length)
+        / COMPARISON_STEPS
+    )
+    half, v = expm(0.5 * h * frame.H), x.v
+
+    def rate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        out = np.zeros_like(q)
+        coordinate_rates(S, q, v, out)
+        return out
+
+    for _ in range(COMPARISON_STEPS):
+        middle = half @ v
+        end = half @ middle
+        k1 = rate(q, v)
+        k2 = rate(q + 0.5 * h * k1, middle)
+        k3 = rate(q + 0.5 * h * k2, middle)
+        k4 = rate(q + h * k3, end)
+        q, v = q + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), end
+    normalise_quaternions(S, q)
+    later = MechanismState.moving(c, x.t + COMPARISON_STEPS * h, q, v)
+    c.z = z
+    return COMPARISON_STEPS * h, later

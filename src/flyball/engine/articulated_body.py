@@ -1,0 +1,427 @@
+"""Mass matrix of a forest by composite bodies, and x = M^-1 f in O(n) by the articulated-body recursion.
+
+Composite rigid bodies: Walker and Orin 1982; Featherstone 2008, table 6.2. Articulated bodies: Featherstone 2008,
+chapter 7, as a factor and solves with it. Where every body is connected to ground by FREE, PLANAR or POINT, M is
+constant and block diagonal and none of this runs.
+
+Wrenches and twists are taken about the reference points of the tree joints, W.O, with components along the world's
+axes: from a body to its parent there is a shift and no rotation, and mechanisms far from the world's origin lose no
+accuracy. A joint of several velocities is a chain of joints with one each, all at its point: one twist column X is
+eliminated at a time. Of the inertia
+
+    I = [J H; H^T K]: (angular velocity, velocity of the point) -> (moment, force)
+
+of everything beyond the joint, with U = I X and D = X . U, the parent sees I - U U^T / D. M itself is not formed.
+Gravity, gyroscopic terms and bias accelerations are in f, so no velocity occurs here. A velocity that a driver
+prescribes is not eliminated: its acceleration is given, and the driver's effort results.
+
+Bodies are in the table after their parents. Where a body directly follows its parent, as in a chain, what goes from
+one to the other stays in registers; everything else is kept in W.IC[b]. W.X[d] holds, after the twist of velocity
+d, U, D and 1 / D.
+"""
+
+from __future__ import annotations
+
+from ..compiler.formulas import formula
+from ..math.scalar import positive
+from ..math.vec import add, cross, dot, load3, load9, mtv, mv, scale, store3, store9, sub, symmetric
+from ..tables.table_definitions import POINT, REVOLUTE
+from .kinematics import twist_column
+
+
+@formula
+def load_symmetric(A, k, o):
+    """Six neighbours of row k of a table, from column o: a symmetric matrix as xx, xy, xz, yy, yz, zz."""
+    return (A[k, o], A[k, o + 1], A[k, o + 2], A[k, o + 3], A[k, o + 4], A[k, o + 5])
+
+
+@formula
+def store_symmetric(A, k, o, a):
+    """Write a symmetric matrix into row k of a table, from column o."""
+    A[k, o] = a[0]
+    A[k, o + 1] = a[1]
+    A[k, o + 2] = a[2]
+    A[k, o + 3] = a[3]
+    A[k, o + 4] = a[4]
+    A[k, o + 5] = a[5]
+
+
+@formula
+def add_symmetric(a, b):
+    """Sum of two symmetric matrices."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
+
+
+@formula
+def rotated_inertia(R, I):
+    """R I R^T of a symmetric I: I_zz times the identity, and what the first two columns of R make of the rest."""
+    x, y = I[0] - I[8], I[4] - I[8]
+    u = (x * R[0], x * R[3], x * R[6])
+    w = (y * R[1], y * R[4], y * R[7])
+    if I[1] != 0.0 or I[2] != 0.0 or I[5] != 0.0:
+        a, b, c = I[1], 2.0 * I[2], 2.0 * I[5]
+        u = (u[0] + a * R[1] + b * R[2], u[1] + a * R[4] + b * R[5], u[2] + a * R[7] + b * R[8])
+        w = (w[0] + a * R[0] + c * R[2], w[1] + a * R[3] + c * R[5], w[2] + a * R[6] + c * R[8])
+        return (
+            u[0] * R[0] + w[0] * R[1] + I[8],
+            0.5 * (u[0] * R[3] + u[1] * R[0] + w[0] * R[4] + w[1] * R[1]),
+            0.5 * (u[0] * R[6] + u[2] * R[0] + w[0] * R[7] + w[2] * R[1]),
+            u[1] * R[3] + w[1] * R[4] + I[8],
+            0.5 * (u[1] * R[6] + u[2] * R[3] + w[1] * R[7] + w[2] * R[4]),
+            u[2] * R[6] + w[2] * R[7] + I[8],
+        )
+    return (
+        u[0] * R[0] + w[0] * R[1] + I[8],
+        u[0] * R[3] + w[0] * R[4],
+        u[0] * R[6] + w[0] * R[7],
+        u[1] * R[3] + w[1] * R[4] + I[8],
+        u[1] * R[6] + w[1] * R[7],
+        u[2] * R[6] + w[2] * R[7] + I[8],
+    )
+
+
+@formula
+def body_inertia(S, W, b):
+    """Mass, first moment and inertia of body b about W.O[b]."""
+    m = S.bodies.mass[b]
+    if m == 0.0:
+        return m, (m, m, m), (m, m, m, m, m, m)
+    J = rotated_inertia(load9(W.BK, b, 3), load9(S.bodies.inertia, b, 0))
+    r = sub(load3(W.BK, b, 0), load3(W.O, b, 0))
+    return m, scale(m, r), shifted_inertia(J, scale(0.5 * m, r), r)
+
+
+@formula
+def shifted_inertia(J, e, d):
+    """J + 2 (e . d) 1 - (e d^T + d e^T): inertia about a point that lies at -d from the one of J.
+
+    ``e`` is the first moment about the point halfway between the two.
+    """
+    x, y, z = 2.0 * e[0] * d[0], 2.0 * e[1] * d[1], 2.0 * e[2] * d[2]
+    return (
+        J[0] + (y + z),
+        J[1] - (e[0] * d[1] + e[1] * d[0]),
+        J[2] - (e[0] * d[2] + e[2] * d[0]),
+        J[3] + (x + z),
+        J[4] - (e[1] * d[2] + e[2] * d[1]),
+        J[5] + (x + y),
+    )
+
+
+@formula
+def store_root_twists(S, W, b):
+    """Twist columns of body b into W.X, where those of all others stand, if it is a root: FREE, PLANAR or POINT."""
+    if S.tree.joint[b] <= POINT:
+        for k in range(S.tree.nv[b]):
+            w, v = twist_column(S, W, b, k)
+            store3(W.X, S.tree.v[b] + k, 0, w)
+            store3(W.X, S.tree.v[b] + k, 3, v)
+
+
+@formula
+def update_composite_bodies(S, W):
+    """Mass, first moment and inertia of every subtree about the reference point of its root, and where that lies from
+    the one of the root's parent.
+    """
+    C = W.IC
+    n = S.tree.parent.shape[0]
+    for b in range(n):
+        store_root_twists(S, W, b)
+        m, h, J = body_inertia(S, W, b)
+        C[b, 0] = m
+        store3(C, b, 1, h)
+        store_symmetric(C, b, 4, J)
+    for b in range(n - 1, -1, -1):
+        a = S.tree.parent[b]
+        if a >= 0:
+            m, h = C[b, 0], load3(C, b, 1)
+            d = sub(load3(W.O, b, 0), load3(W.O, a, 0))
+            to = scale(m, d)
+            J = shifted_inertia(load_symmetric(C, b, 4), add(h, scale(0.5, to)), d)
+            C[a, 0] += m
+            store3(C, a, 1, add(load3(C, a, 1), add(h, to)))
+            store_symmetric(C, a, 4, add_symmetric(load_symmetric(C, a, 4), J))
+            store3(C, b, 10, d)
+
+
+@formula
+def mass_entries(S, W):
+    """Entries of M, in the order of `MassEntries`: for each velocity of each body, itself and those of its ancestors.
+
+    The momentum that a unit of the velocity gives all that hangs on the body, taken along the ancestors' columns.
+    """
+    update_composite_bodies(S, W)
+    C = W.IC
+    e = 0
+    for b in range(S.tree.parent.shape[0]):
+        h = load3(C, b, 1)
+        for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
+            w, v = load3(W.X, d, 0), load3(W.X, d, 3)
+            force = cross(w, h)
+            moment = symmetric(load_symmetric(C, b, 4), w)
+            if S.tree.joint[b] != REVOLUTE:
+                force, moment = add(force, scale(C[b, 0], v)), add(moment, cross(h, v))
+            a = b
+            while a >= 0:
+                a0 = S.tree.v[a]
+                if S.tree.joint[a] == REVOLUTE:
+                    W.M[e] = dot(load3(W.X, a0, 0), moment)
+                    e += 1
+                else:
+                    for i in range(a0, min(a0 + S.tree.nv[a], d + 1)):
+                        W.M[e] = dot(load3(W.X, i, 0), moment) + dot(load3(W.X, i, 3), force)
+                        e += 1
+                moment = add(moment, cross(load3(C, a, 10), force))
+                a = S.tree.parent[a]
+
+
+# columns of W.IC: parts of an inertia, after J; whether any waits there; a wrench or acceleration that does
+COUPLING, LINEAR, ELIMINATED, TOTAL_MASS, HAS_PENDING, PASSED_ON = 6, 15, 21, 22, 23, 24
+# columns of W.X
+RESPONSE, PIVOT, PIVOT_INVERSE = 6, 12, 13
+PIVOT_ROUNDING = 1e-14  # of what it would be with all joints beyond it held: a smaller inertia is none
+
+
+@formula
+def factor_articulated(S, W):
+    """Factor the equations of motion of a forest at the kinematics now in W.
+
+    Returns
+    -------
+    int
+        0, or 1 + the velocity that moves no inertia.
+    """
+    A = W.IC
+    n = S.tree.parent.shape[0]
+    o = 0.0 * W.O[0, 0]
+    for b in range(n):
+        A[b, HAS_PENDING] = o
+    I = zero_inertia(o)
+    for b in range(n - 1, -1, -1):
+        store_root_twists(S, W, b)
+        I = add_body_inertia(S, W, b, I)
+        status, I = eliminate_velocities(S, W, b, I)
+        if status != 0:
+            return status
+        a = S.tree.parent[b]
+        if a >= 0:
+            I = shifted_articulated(I, sub(load3(W.O, b, 0), load3(W.O, a, 0)))
+        if a != b - 1:
+            if a >= 0:
+                add_pending_inertia(A, a, I)
+            I = zero_inertia(o)
+    return 0
+
+
+@formula
+def zero_inertia(o):
+    """No inertia: J, H, K; how much was lost of the trace of J; mass."""
+    zero = (o, o, o, o, o, o)
+    return zero, (o, o, o, o, o, o, o, o, o), zero, o, o
+
+
+@formula
+def add_inertias(I, other):
+    """Sum of two inertias."""
+    J, H, K, lost, mass = I
+    J2, H2, K2, lost2, mass2 = other
+    x, y, z = add(H[0:3], H2[0:3]), add(H[3:6], H2[3:6]), add(H[6:9], H2[6:9])
+    return add_symmetric(J, J2), (*x, *y, *z), add_symmetric(K, K2), lost + lost2, mass + mass2
+
+
+@formula
+def pending_inertia(A, b):
+    """The inertia that others have left for body b."""
+    return (
+        load_symmetric(A, b, 0),
+        load9(A, b, COUPLING),
+        load_symmetric(A, b, LINEAR),
+        A[b, ELIMINATED],
+        A[b, TOTAL_MASS],
+    )
+
+
+@formula
+def add_pending_inertia(A, b, I):
+    """Leave an inertia for body b, beside what waits there."""
+    if A[b, HAS_PENDING].real > 0.0:
+        I = add_inertias(I, pending_inertia(A, b))
+    store_symmetric(A, b, 0, I[0])
+    store9(A, b, COUPLING, I[1])
+    store_symmetric(A, b, LINEAR, I[2])
+    A[b, ELIMINATED] = I[3]
+    A[b, TOTAL_MASS] = I[4]
+    A[b, HAS_PENDING] = 1.0
+
+
+@formula
+def add_body_inertia(S, W, b, I):
+    """The inertia handed to body b, with its own and what waits there."""
+    J, H, K, lost, mass = I
+    m, h, own = body_inertia(S, W, b)
+    H = (H[0], H[1] - h[2], H[2] + h[1], H[3] + h[2], H[4], H[5] - h[0], H[6] - h[1], H[7] + h[0], H[8])
+    I = add_symmetric(J, own), H, (K[0] + m, K[1], K[2], K[3] + m, K[4], K[5] + m), lost, mass + m
+    if W.IC[b, HAS_PENDING].real > 0.0:
+        I = add_inertias(I, pending_inertia(W.IC, b))
+    return I
+
+
+@formula
+def eliminate_velocities(S, W, b, I):
+    """Take the velocities of body b out of the inertia, the last one first. Returns (status, what is left).
+
+    An inertia along a velocity counts as none if it is but the rounding errors of those that were taken out before.
+    """
+    J, H, K, lost, mass = I
+    size = J[0] + J[3] + J[5] + lost
+    v0 = S.tree.v[b]
+    for d in range(v0 + S.tree.nv[b] - 1, v0 - 1, -1):
+        w, v = load3(W.X, d, 0), load3(W.X, d, 3)
+        t, f = symmetric(J, w), mtv(H, w)
+        D = dot(w, t)
+        least = size
+        if v[0] != 0.0 or v[1] != 0.0 or v[2] != 0.0:
+            t, f = add(t, mv(H, v)), add(f, symmetric(K, v))
+            D = dot(w, t) + dot(v, f)
+            least = dot(w, w) * size + dot(v, v) * mass
+        store3(W.X, d, RESPONSE, t)
+        store3(W.X, d, RESPONSE + 3, f)
+        W.X[d, PIVOT] = D
+        if S.tree.law[b] < 0:
+            if not positive(D - PIVOT_ROUNDING * least):
+                return 1 + d, (J, H, K, lost, mass)
+            r = 1.0 / D
+            W.X[d, PIVOT_INVERSE] = r
+            y, z = scale(r, t), scale(r, f)
+            J, H, K = downdate_symmetric(J, t, y), downdate_coupling(H, t, z), downdate_symmetric(K, f, z)
+            lost = lost + dot(t, y)
+    return 0, (J, H, K, lost, mass)
+
+
+@formula
+def downdate_symmetric(J, a, b):
+    """J - a b^T, symmetric."""
+    return (
+        J[0] - a[0] * b[0],
+        J[1] - a[0] * b[1],
+        J[2] - a[0] * b[2],
+        J[3] - a[1] * b[1],
+        J[4] - a[1] * b[2],
+        J[5] - a[2] * b[2],
+    )
+
+
+@formula
+def downdate_coupling(H, a, b):
+    """H - a b^T."""
+    return (
+        *sub(H[0:3], scale(a[0], b)),
+        *sub(H[3:6], scale(a[1], b)),
+        *sub(H[6:9], scale(a[2], b)),
+    )
+
+
+@formula
+def shifted_articulated(I, d):
+    """The inertia about a point that lies at -d from its own: H + d~ K, J + d~ (H + d~ K)^T - H d~."""
+    J, H, K, lost, mass = I
+    x = add((H[0], H[3], H[6]), cross(d, (K[0], K[1], K[2])))
+    y = add((H[1], H[4], H[7]), cross(d, (K[1], K[3], K[4])))
+    z = add((H[2], H[5], H[8]), cross(d, (K[2], K[4], K[5])))
+    J = (
+        J[0] + (d[1] * z[0] - d[2] * y[0]) + (d[1] * H[2] - d[2] * H[1]),
+        J[1] + (d[1] * z[1] - d[2] * y[1]) + (d[2] * H[0] - d[0] * H[2]),
+        J[2] + (d[1] * z[2] - d[2] * y[2]) + (d[0] * H[1] - d[1] * H[0]),
+        J[3] + (d[2] * x[1] - d[0] * z[1]) + (d[2] * H[3] - d[0] * H[5]),
+        J[4] + (d[2] * x[2] - d[0] * z[2]) + (d[0] * H[4] - d[1] * H[3]),
+        J[5] + (d[0] * y[2] - d[1] * x[2]) + (d[0] * H[7] - d[1] * H[6]),
+    )
+    return J, (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]), K, lost, mass
+
+
+@formula
+def solve_articulated(S, W, f, x, effort):
+    """Solve M x = f with the factor in W.
+
+    Parameters
+    ----------
+    S : System
+    W : Work
+    f : array, shape (nv,)
+        Generalised forces [N, N m], those of the drivers not among them; kept.
+    x : array, shape (nv,)
+        Accelerations, out. Where a driver prescribes one it is taken as it comes in.
+    effort : array, shape (nv,)
+        At the velocities that a driver prescribes: the generalised force (M x - f)[d] that it has to add. The other
+        entries are left alone.
+    """
+    A = W.IC
+    n = S.tree.parent.shape[0]
+    o = 0.0 * W.O[0, 0]
+    zero = (o, o, o)
+    for b in range(n):
+        if A[b, HAS_PENDING].real > 0.0:
+            store3(A, b, PASSED_ON, zero)
+            store3(A, b, PASSED_ON + 3, zero)
+    moment, force = zero, zero
+    for b in range(n - 1, -1, -1):
+        moment, force = pass_wrench_inwards(S, W, b, (moment, force), f, x, effort)
+        a = S.tree.parent[b]
+        if a >= 0:
+            moment = add(moment, cross(sub(load3(W.O, b, 0), load3(W.O, a, 0)), force))
+        if a != b - 1:
+            if a >= 0:
+                store3(A, a, PASSED_ON, add(load3(A, a, PASSED_ON), moment))
+                store3(A, a, PASSED_ON + 3, add(load3(A, a, PASSED_ON + 3), force))
+            moment, force = zero, zero
+    turn, shift = zero, zero
+    for b in range(n):
+        a = S.tree.parent[b]
+        if a < 0:
+            turn, shift = zero, zero
+        else:
+            if a != b - 1:
+                turn, shift = load3(A, a, PASSED_ON), load3(A, a, PASSED_ON + 3)
+            shift = add(shift, cross(turn, sub(load3(W.O, b, 0), load3(W.O, a, 0))))
+        turn, shift = pass_acceleration_outwards(S, W, b, (turn, shift), x, effort)
+        if A[b, HAS_PENDING].real > 0.0:
+            store3(A, b, PASSED_ON, turn)
+            store3(A, b, PASSED_ON + 3, shift)
+
+
+@formula
+def pass_wrench_inwards(S, W, b, wrench, f, x, effort):
+    """The wrench that goes from body b to its parent, from the one handed to it and what waits there.
+
+    Forces that are left for its own velocities go to x, or to effort where a driver prescribes them.
+    """
+    t, p = wrench
+    if W.IC[b, HAS_PENDING].real > 0.0:
+        t, p = add(t, load3(W.IC, b, PASSED_ON)), add(p, load3(W.IC, b, PASSED_ON + 3))
+    v0 = S.tree.v[b]
+    for d in range(v0 + S.tree.nv[b] - 1, v0 - 1, -1):
+        u = f[d] - (dot(load3(W.X, d, 0), t) + dot(load3(W.X, d, 3), p))
+        if S.tree.law[b] < 0:
+            x[d] = u
+            s = u * W.X[d, PIVOT_INVERSE]
+        else:
+            effort[d] = u
+            s = x[d]
+        t = add(t, scale(s, load3(W.X, d, RESPONSE)))
+        p = add(p, scale(s, load3(W.X, d, RESPONSE + 3)))
+    return t, p
+
+
+@formula
+def pass_acceleration_outwards(S, W, b, parent_acceleration, x, effort):
+    """Accelerations of body b's velocities into x, and of the body, from the one at which its parent carries it."""
+    w, v = parent_acceleration
+    for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
+        s = dot(load3(W.X, d, RESPONSE), w) + dot(load3(W.X, d, RESPONSE + 3), v)
+        if S.tree.law[b] < 0:
+            x[d] = (x[d] - s) * W.X[d, PIVOT_INVERSE]
+        else:
+            effort[d] = W.X[d, PIVOT] * x[d] + s - effort[d]
+        w = add(w, scale(x[d], load3(W.X, d, 0)))
+        v = add(v, scale(x[d], load3(W.X, d, 3)))
+    return w, v

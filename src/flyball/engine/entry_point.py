@@ -1,0 +1,412 @@
+"""The engine's kernel: everything that needs the right-hand side, compiled once, called by address with a task.
+
+Any loop may call it (an implicit method, time stepping with contact): it passes its own integrator state, with the
+time in ``real[T]`` and the state in ``y[0]``. A loop never contains the right-hand side, so that it compiles in
+half a second.
+
+Also here: the workspace of one run (`Work`) and the tables as compiled code takes them; and the dependent
+constraints at many states, in absolute coordinates, with one sparse factor of G M^-1 G^T's pattern each (rows are
+divided by their size and velocities counted in lengths).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..compiler.formulas import call, formula
+from ..compiler.kernels import PooledBuffer, StructBuffer, StructPool, kernel
+from ..compiler.struct_layout import Float1, Float2, Float3
+from ..laws.bytecode import STACK_RESERVE
+from ..numerics.integrators.butcher_tableaux import Tableau, tableau
+from ..numerics.integrators.explicit_runge_kutta import run_explicit_task
+from ..numerics.integrators.time_loop import (
+    STATE_ROWS,
+    StepCounts,
+    StepReals,
+    StepState,
+    advance,
+    finish_step,
+    no_segment_start,
+)
+from ..numerics.sparse_factorisation import ldl_factor
+from ..numerics.sparse_rank import largest_singular_value, smallest_singular_values
+from ..tables.law_inputs import force_reading_count
+from ..tables.structure_definition import Structure
+from ..tables.table_definitions import (
+    FLAT,
+    INVERSE_JACOBIAN,
+    SCRATCH,
+    Counts,
+    Modes,
+    Options,
+    RowScratch,
+    System,
+    VelocityScratch,
+    Work,
+)
+from .calls import (
+    ARRIVE,
+    COMPLETE,
+    FOLLOW,
+    GUARD_VALUES,
+    INSPECT,
+    INTEGRATE,
+    MOTION,
+    POSITION,
+    REPORT,
+    RESIDUAL,
+    SLOPES,
+    SOLVE,
+    TANGENT,
+    OutputBuffer,
+    select_generated_code,
+)
+from .element_dispatch import remember
+from .guards import evaluate_guards
+from .kinematics import store_ground_frames
+from .motion import derivative, follow_drivers, project_and_evaluate, report_state, solve_response
+from .projection import project_error, update_positions, update_velocities
+from .pulse_detection import INSPECTION_ROWS, inspect_step
+from .residual import force_slopes, residual
+
+MAX_KEPT_LAYOUTS = 4  # kinds of scratch, and tables, of a structure that are known
+
+
+def allocate_work(structure: Structure, system: System, dtype: Any = None) -> Work:
+    """Scratch arrays for one run: of the tables' own kind of numbers, if not told."""
+    dtype = np.dtype(system.const.dtype if dtype is None else dtype)
+    if dtype.kind in "fc":
+        return pooled_work(structure, system, dtype).fields  # type: ignore[no-any-return]
+    W = zero_work(structure, system, dtype)
+    W.modes.lower[:], W.modes.upper[:] = system.switch_numbers.lower, system.switch_numbers.upper
+    store_ground_frames(system, W)
+    return W
+
+
+def pooled_work(structure: Structure, system: System, dtype: Any) -> PooledBuffer:
+    """The same as compiled code has it."""
+    key = np.dtype(dtype).char, int(system.flat[SCRATCH])
+    made = structure.kept.get(
+        "scratch", key, MAX_KEPT_LAYOUTS, lambda: StructPool(zero_work(structure, system, dtype))
+    ).new()
+    initialise_work(structure, system, made.array)
+    return made
+
+
+def initialise_work(structure: Structure, system: System, array: Callable[[str], np.ndarray]) -> None:
+    """Put into blank scratch, whose arrays are found by name, what the tables say of it."""
+    if len(system.switch_numbers.lower):
+        array("modes.lower")[:], array("modes.upper")[:] = system.switch_numbers.lower, system.switch_numbers.upper
+    if n := system.sizes.ground_frames:
+        frames = system.frames  # told by their address
+        _, at_rest = structure.kept.get(
+            "ground", id(frames), MAX_KEPT_LAYOUTS, lambda: (frames, ground_records(system))
+        )
+        array("FK")[:n] = at_rest
+
+
+def struct_tables(structure: Structure, system: System) -> StructBuffer:
+    """The tables as compiled code has them."""
+    return structure.kept.get(
+        "written", id(system), MAX_KEPT_LAYOUTS, lambda: _new_struct_tables(structure, system)
+    )  # whose address it keeps from others
+
+
+def _new_struct_tables(structure: Structure, system: System) -> StructBuffer:
+    first = structure.kept.get("written first", None, 1, lambda: StructBuffer(system))
+    return first.of(system)
+
+
+def ground_records(system: System) -> np.ndarray:
+    """Records of the frames on ground: they stand first in `Work.FK`, and nothing writes them again."""
+    W = FrameRecords(np.zeros((system.sizes.ground_frames, 24), system.const.dtype))
+    store_ground_frames(system, W)
+    return W.FK
+
+
+class FrameRecords(NamedTuple):
+    """Of frames."""
+
+    FK: np.ndarray
+
+
+def zero_work(structure: Structure, system: System, dtype: Any) -> Work:
+    """Scratch of zeros."""
+    nb, nf, nr, nv = len(system.tree.parent), len(system.frame_body), len(system.rows.law), structure.nv
+    n, ny, nl, nw = (
+        len(system.ldl.perm),
+        structure.nq + nv + len(structure.states),
+        len(structure.loads),
+        len(structure.switches),
+    )
+    nc, ne = len(system.control_laws), force_reading_count(structure)
+
+    def z(*shape: int) -> np.ndarray:
+        return np.zeros(shape, dtype)
+
+    return Work(
+        z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_entries.row)),
+        z(len(system.column)), z(len(system.column)), z(len(structure.terms) if structure.loads or structure.reads else 0, 6),
+        RowScratch(*(z(nr) for _ in RowScratch._fields)), VelocityScratch(*(z(nv) for _ in VelocityScratch._fields)),
+        z(INVERSE_JACOBIAN + nl, 2 * len(structure.measured) + nl + ne + nc + nw),
+        Modes(*(z(nw) for _ in Modes._fields[:-1]), z(nw, nw)),  # type: ignore[call-arg]
+        z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n), z(structure.depth + 1 + STACK_RESERVE, 3), z(3, ny),
+        Options.blank(), Counts.blank(),
+        np.zeros(FLAT, np.int64), z(system.flat[SCRATCH]),
+    )  # fmt: skip
+
+
+@formula
+def perform_task(S, W, R, clock, out, task):
+    """One task; see `run_task`. A formula, so that callees have one caller's flags and are compiled once."""
+    t = clock.real.t
+    y = clock.y[0]
+    select_generated_code(S, W, task)
+    if task == POSITION:
+        nq = S.sizes.coordinates
+        z = y[nq + W.velocities.solved.shape[0] :]
+        update_positions(S, W, t, y[:nq], z)
+        update_velocities(S, W, t, y[nq : nq + W.velocities.solved.shape[0]], z)
+        remember(S, W, z)
+        return 0
+    if task == MOTION:
+        return derivative(t, y, clock.K[0], S, W)
+    if task == GUARD_VALUES:
+        status = derivative(t, y, clock.K[0], S, W)
+        evaluate_guards(S, W, t, out[0])
+        return status
+    if task == FOLLOW:
+        return follow_drivers(S, W, clock, out)
+    if task == ARRIVE:
+        status, moved = project_and_evaluate(t, y, clock.K[0], S, W)
+        out[0, 0] = moved
+        return status
+    if task == REPORT or task == COMPLETE:
+        status = 0
+        for n in range(out.shape[0] if task == COMPLETE else 1):
+            if task == COMPLETE:
+                t = out[n, 0]
+                for i in range(y.shape[0]):
+                    y[i] = out[n, 1 + i]
+            found = report_state(t, y, out[n], S, W)
+            status = max(status, found)
+            if found != 0 and task == COMPLETE:
+                for i in range(1 + y.shape[0], out.shape[1]):
+                    out[n, i] = np.nan
+        return status
+    if task == RESIDUAL:
+        for i in range(y.shape[0]):
+            W.y[0, i] = y[i]
+        residual(S, W, t, W.y[0], out[1], out[2], out[0])
+        return 0
+    if task == SOLVE:
+        nv = W.velocities.solved.shape[0]
+        nr = S.rows.law.shape[0]
+        solve_response(S, W, out[0, :nv], out[1, :nr], out[2, :nv], out[3, :nr])
+        return 0
+    if task == TANGENT:
+        project_error(y, clock.K[0], S, W)
+        return 0
+    if task == INSPECT:
+        at = inspect_step(t, clock.real.h, clock.real.span, clock.count.next, clock.seen, S, W)
+        clock.count.next, clock.real.h, clock.real.max_growth = at
+        return 0
+    if task == SLOPES:
+        force_slopes(S, W, t, out)
+        return 0
+    if task == INTEGRATE:
+        callbacks = (
+            run_explicit_task,
+            (derivative, project_and_evaluate, project_error, inspect_step),
+            report_state,
+            no_segment_start,
+            finish_step,
+        )
+        return advance(callbacks, S, W, R, clock, out)
+    return 0
+
+
+@kernel
+def engine(S: System, W: Work, R: Tableau, clock: StepState, output: OutputBuffer, task: int) -> int:
+    """`perform_task` behind an address."""
+    return perform_task(S, W, R, clock, output.rows, task)
+
+
+def run_task(S: System, W: Work, R: Tableau, clock: StepState, out: np.ndarray, task: int) -> int:
+    """Have the engine do a task.
+
+    Parameters
+    ----------
+    S, W : System, Work
+        Tables and scratch; kinematics and rows at the state are left in W.
+    R : Tableau
+        The integrator's coefficients; only INTEGRATE looks at them.
+    clock : Clock
+        Time and state.
+    out : (n, width)
+        Rows of output.
+    task : int
+        POSITION: kinematics and rows; the state's turns and places on curves are brought up to it. MOTION: also its
+        derivative, in ``clock.K[0]``. ARRIVE: the state is put on the constraints, and how far that moved it goes to
+        ``out[0, 0]``. REPORT: its row of output, in ``out[0]``. COMPLETE: rows of
+        ``out`` whose accelerations and multipliers were left for later. RESIDUAL: of the equations at the accelerations
+        ``out[1]`` and multipliers ``out[2]``, in ``out[0]``. SOLVE: at the state last evaluated, accelerations
+        ``out[2]`` and multipliers ``out[3]`` that other forces ``out[0]`` and right-hand sides of the rows ``out[1]``
+        make; see ``motion.respond``. TANGENT: an error ``clock.K[0]`` less what the projection takes off it. INSPECT:
+        see ``within.inspect``; in and out by the clock. SLOPES: of every force, see
+        ``slopes.slopes``. WATCH: MOTION, and what is watched, into ``out[0]``; see `guards`.
+        INTEGRATE: go on with the integration; FOLLOW: go on with what the drivers prescribe.
+
+    Returns
+    -------
+    int
+        Of INTEGRATE and FOLLOW the number of rows written, of the others a status.
+    """
+    return int(engine(S, W, R, clock, OutputBuffer(out), task))
+
+
+def evaluate_state(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[int, np.ndarray]:
+    """Evaluate at one state; returns (status, derivative) and leaves kinematics and rows in W.
+
+    With POSITION the turns and places in ``y`` are brought up to date.
+    """
+    clock = _clock_pool(len(y)).new()
+    clock.array("real").t = t
+    state = clock.array("y")[0]
+    state[:] = y
+    status = int(engine(S, W, _idle_tableau(), clock, _no_output(), task))
+    y[:] = state
+    return status, clock.array("K")[0]
+
+
+@lru_cache
+def _clock_pool(ny: int) -> StructPool:
+    """Clocks that stand, of states of so many numbers."""
+    none, one = np.zeros(0, np.int64), np.zeros((1, ny))
+    return StructPool(
+        StepState(StepReals.blank(), StepCounts.blank(), np.zeros(0), np.zeros((STATE_ROWS, ny)), one, none,
+              np.zeros((INSPECTION_ROWS, 0)))
+    )  # fmt: skip
+
+
+@cache
+def _idle_tableau() -> StructBuffer:
+    """Coefficients of an integrator, for tasks that integrate nothing."""
+    return StructBuffer(tableau("rk45"))
+
+
+@cache
+def _no_output() -> StructBuffer:
+    return StructBuffer(OutputBuffer(np.zeros((0, 0))))
+
+
+ADDED_DIAGONAL = 1e-13  # to the diagonal, where rows of unit length have 1
+
+
+@formula
+def unit_rows(S, W, scale):
+    """Rows of unit size in W.H, of velocities counted in lengths; what they were divided by in `W.rows.diagonal`."""
+    for k in range(S.rows.law.shape[0]):
+        s = 0.0
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            W.H[e] = W.G[e] * scale[S.column[e]]
+            s += W.H[e] * W.H[e]
+        s = s**0.5 if s > 0.0 else 1.0
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            W.H[e] /= s
+        W.rows.diagonal[k] = s
+
+
+@formula
+def factor_square(S, W):
+    """Factor H H^T and a little on its diagonal; as `ldl_factor`."""
+    for e in range(W.A.shape[0]):
+        W.A[e] = 0.0
+    for e in range(S.pairs.first.shape[0]):
+        i, j = S.pairs.first[e], S.pairs.second[e]
+        for k in range(S.pairs.length[e]):
+            W.A[S.pairs.place[e]] += W.H[i + k] * W.H[j + k]
+    for k in range(S.rows.law.shape[0]):
+        W.A[S.ldl.Ap[S.ldl.perm[k] + 1] - 1] += ADDED_DIAGONAL
+    return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
+
+
+@formula
+def dependencies_at_states(address, S, W, R, clock, output, states, scale, block, combinations, out):
+    """See `dependencies_kernel`."""
+    last = block.shape[0] - 2
+    for n in range(states.shape[0]):
+        clock.real.t = states[n, 0]
+        for i in range(clock.y.shape[1]):
+            if states[n, 1 + i] == states[n, 1 + i]:  # what is not told goes on from the state before
+                clock.y[0, i] = states[n, 1 + i]
+        call(address, S, W, R, clock, output, POSITION)
+        unit_rows(S, W, scale)
+        if factor_square(S, W) != 0:
+            for i in range(3):
+                out[n, i] = np.nan
+            continue
+        out[n, 0] = largest_singular_value(S.row_start, S.column, W.H, block[last + 1], W.velocities.scratch_1)
+        X = block[: last + 1]
+        out[n, 1], out[n, 2] = smallest_singular_values(
+            S.ldl, W.L, W.D[0], S.row_start, S.column, W.H, X, W.velocities.scratch_1, W.D[2]
+        )
+        for i in range(last):
+            for k in range(S.rows.law.shape[0]):
+                combinations[n, k, i] = X[i, k] / W.rows.diagonal[k]
+
+
+@kernel
+def dependencies_kernel(
+    address: int,
+    S: System,
+    W: Work,
+    R: Tableau,
+    clock: StepState,
+    output: OutputBuffer,
+    states: Float2,
+    scale: Float1,
+    block: Float2,
+    combinations: Float3,
+    out: Float2,
+) -> None:
+    """The weakest combinations of rows at every state; ``block`` ends with a vector for the largest singular value."""
+    dependencies_at_states(address, S, W, R, clock, output, states, scale, block, combinations, out)
+
+
+def dependent_rows(
+    S: System, W: Work, states: np.ndarray, scale: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The weakest combinations of the rows at many states, of which as many as ``count`` are to be dependencies.
+
+    Parameters
+    ----------
+    S, W : System, Work
+        In absolute coordinates, with rows.
+    states : ndarray (n, 1 + ny)
+        Times and states; nan: turns and places that are those nearest to the ones before.
+    scale : ndarray (nv,)
+        What velocities are counted in.
+    count : int
+
+    Returns
+    -------
+    multipliers : ndarray (n, nr, count)
+        What should act on nothing.
+    sizes : ndarray (n, 3)
+        The largest singular value of the rows of unit size; the least of those that are not to be dependencies; the
+        largest of those that are. nan where the rows are.
+    """
+    n, nr = len(states), len(S.rows.law)
+    ny = states.shape[1] - 1
+    real, y = StepReals.blank(), np.zeros((1, ny))
+    clock = StepState(real, StepCounts.blank(), np.zeros(0), y, np.zeros((1, ny)), np.zeros(0, np.int64))
+    block = np.random.default_rng(0).standard_normal((count + 2, nr))
+    kept, out = np.zeros((n, nr, count)), np.zeros((n, 3))
+    sheet, R = OutputBuffer(np.zeros((0, 0))), tableau("rk45")
+    dependencies_kernel(engine.address, S, W, R, clock, sheet, states, scale, block, kept, out)
+    return kept, out

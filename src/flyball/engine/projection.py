@@ -1,0 +1,265 @@
+"""Projection on the constraints: positions on g = 0, velocities on G v = nu, errors on the tangent space.
+
+Coordinates of tree joints that drivers prescribe are set from their laws first. What is projected, and when, is the
+choice of stabilisation (none, Baumgarte, at steps or stages, positions or velocities only, coordinate
+partitioning).
+"""
+
+from __future__ import annotations
+
+from ..compiler.formulas import formula
+from ..laws.bytecode import evaluate_jet
+from ..math.scalar import larger, magnitude
+from ..tables.table_definitions import DRIFT, MOVE, PLACE, PREPARE, SHOW, TERMS
+from .calls import call_generated
+from .element_dispatch import row_biases, row_values
+from .kinematics import (
+    coordinate_rates,
+    normalise_quaternions,
+    retract,
+    update_motions,
+    update_poses,
+    velocities_from_rates,
+)
+from .rows import BY_TIME, characteristic_speed, row_times
+from .solve import MAX_REFINEMENTS, factor, reuse_factor, solve
+
+
+@formula
+def set_prescribed(S, W, t, q, v):
+    """Unit quaternions; prescribed coordinates, velocities and accelerations as their laws say."""
+    if W.made[PREPARE] != 0:
+        call_generated(W.made[PREPARE], S, W, t, q, v, q, v)
+        return
+    normalise_quaternions(S, q)
+    for b in range(S.tree.parent.shape[0]):
+        law = S.tree.law[b]
+        if law >= 0:
+            f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
+            q[S.tree.q[b]] = f - S.bodies.offset[b]
+            v[S.tree.v[b]] = f1
+            W.velocities.prescribed[S.tree.v[b]] = f2
+
+
+NONE, BAUMGARTE, STEPS, STAGES, POSITIONS, VELOCITIES, PARTITIONING = range(7)
+NOT_CLOSED = 2  # a status
+FACTOR_OLD, FACTOR_NEAR, FACTOR_CURRENT = range(3)
+MAX_PASSES = 16
+TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
+METRE = 1.0  # [m] or, if less, the mechanism's length: at its own rate what slower rows are measured by
+CLOSED_POSITIONS = 1e-9  # a projection that comes to rest above this has failed, if rounding is less
+LAST_DIGIT = 1e-15  # times the distance from the origin: what rounding leaves of a violation
+SLOW_CONVERGENCE = 0.1  # a Newton step that gains less than this wants a new factor
+STALE_RESIDUAL = 10.0  # times the tolerance of the solve: a residual above this after refinement wants a new factor
+HOPELESS_VIOLATION = 1e3  # a state this far off is given up at once
+
+
+@formula
+def update_positions(S, W, t, q, z):
+    """Poses, and the constraint rows as far as they follow from them: g, G, nu. ``z`` tells angles their turns."""
+    W.counts.evaluations += 1
+    if W.made[PLACE] != 0:
+        call_generated(W.made[PLACE], S, W, t, q, z, q, z)
+    else:
+        update_poses(S, W, q)
+        row_values(S, W, t, z)
+
+
+@formula
+def update_velocities(S, W, t, v, z):
+    """Velocities and bias accelerations at the poses in W, and what follows from them: gamma, measured rates."""
+    if W.made[MOVE] != 0:
+        call_generated(W.made[MOVE], S, W, t, v, z, v, z)
+    else:
+        update_motions(S, W, v)
+        row_biases(S, W, t, v, z)
+
+
+@formula
+def position_violation(W, out):
+    """Largest |g| (its row goes to `W.counts.guilty_row`) and -g into ``out``."""
+    worst = 0.0
+    for k in range(out.shape[0]):
+        g = W.rows.value[k]
+        out[k] = -g
+        size = magnitude(g)
+        if not size <= worst:
+            worst = size
+            W.counts.guilty_row = k
+    return worst
+
+
+@formula
+def update_shown_frames(S, W, q):
+    """Poses of frames as far as others look at them, where code made for the mechanism has not needed them."""
+    if W.made[SHOW] != 0:
+        call_generated(W.made[SHOW], S, W, 0.0, q, q, q, q)
+
+
+@formula
+def position_rounding(S, W, q):
+    """What rounding leaves of the largest violation: the last digit of the frames' distances from the origin."""
+    update_shown_frames(S, W, q)
+    far = 0.0
+    for f in range(W.FK.shape[0]):
+        for i in range(3):
+            far = max(far, magnitude(W.FK[f, i]))
+    return LAST_DIGIT * far
+
+
+@formula
+def velocity_violation(S, W, v, out):
+    """Largest |G v - nu|, the size of its largest term, and nu - G v into ``out``."""
+    if W.made[DRIFT] != 0:
+        worst = call_generated(W.made[DRIFT], S, W, 0.0, v, out, v, out)
+        return worst, W.flat[TERMS]
+    worst = 0.0
+    size = 0.0
+    for k in range(out.shape[0]):
+        r = W.rows.nu[k]
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            p = W.G[e] * v[S.column[e]]
+            r -= p
+            size = larger(size, magnitude(p))
+        out[k] = r
+        worst = larger(worst, magnitude(r))
+    return worst, size
+
+
+@formula
+def project_state(S, W, t, q, v, z, tol_g, tol_v):
+    """Put q on g = 0 and v on G v = nu, in place, and leave kinematics and rows there.
+
+    Along M^-1 G^T, or along dependent coordinates alone. Accepted states are taken down to rounding: near a singular
+    position a violation e, left standing at a distance s, is a mechanism with other lengths, whose motion leaves the
+    true one with the acceleration 2 e v^2 / s^3. One factor serves as long as it does.
+
+    Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, what the factor in W is:
+    OLD, of poses NEARby or of those HERE).
+    """
+    W.options.partitioned = 1.0 if W.options.stabilization == PARTITIONING else 0.0
+    still = W.options.placed > 0.0  # nobody asks for accelerations there
+    if S.rows.law.shape[0] == 0 and still and S.angles.F.shape[0] == 0:
+        return 0, 0.0, FACTOR_OLD
+    update_positions(S, W, t, q, z)
+    if S.rows.law.shape[0] == 0:
+        if not still:
+            update_velocities(S, W, t, v, z)
+        return 0, 0.0, FACTOR_OLD
+    status = 0
+    found = 0.0
+    lost = 0.0
+    factored = FACTOR_OLD
+    if W.options.stabilization != VELOCITIES:
+        status, found, factored = project_positions(S, W, t, q, z, tol_g)
+        if status != 0:
+            return status, found, FACTOR_OLD
+    if W.options.stabilization != POSITIONS:
+        status, lost, factored = project_velocities(S, W, v, tol_v, factored)
+        if status != 0:
+            return status, found, FACTOR_OLD
+    else:  # positions follow the violated velocities and are put back: that is no error of the step
+        found = 0.0
+    if not still:
+        update_velocities(S, W, t, v, z)
+    return 0, max(found / S.scales.length, lost), factored
+
+
+@formula
+def project_positions(S, W, t, q, z, tol_g):
+    """Put q on g = 0 by Newton, until |g| passes, or until it is as small as rounding lets it be.
+
+    Kinematics and rows are those of q, before and after. Returns (status, the violation found, what the factor is).
+    """
+    none = W.velocities.applied
+    step = W.velocities.scratch_3
+    r = W.rows.scratch_2
+    worst = position_violation(W, r)
+    found = worst
+    last = 1e300
+    factored = FACTOR_OLD
+    for _ in range(MAX_PASSES):
+        if worst <= tol_g:
+            break
+        if worst > 0.7 * last and (worst <= CLOSED_POSITIONS or worst <= position_rounding(S, W, q)):
+            break
+        if not worst <= HOPELESS_VIOLATION:
+            return NOT_CLOSED, found, FACTOR_OLD
+        if factored == FACTOR_OLD or worst > SLOW_CONVERGENCE * last:
+            if factor(S, W) != 0:
+                return NOT_CLOSED, found, FACTOR_OLD
+            factored = FACTOR_CURRENT
+        else:
+            reuse_factor(S, W)
+        last = worst
+        left = solve(S, W, none, r, step, W.rows.residual, False, MAX_REFINEMENTS)
+        if factored == FACTOR_NEAR and left > SLOW_CONVERGENCE:  # too far from where it was made to serve
+            if factor(S, W) != 0:
+                return NOT_CLOSED, found, FACTOR_OLD
+            solve(S, W, none, r, step, W.rows.residual, False, MAX_REFINEMENTS)
+        factored = FACTOR_NEAR
+        retract(S, q, step)
+        update_positions(S, W, t, q, z)
+        worst = position_violation(W, r)
+        W.counts.projections += 1
+    if not worst <= CLOSED_POSITIONS and not worst <= tol_g and not worst <= position_rounding(S, W, q):
+        return NOT_CLOSED, found, FACTOR_OLD
+    return 0, found, factored
+
+
+@formula
+def project_velocities(S, W, v, tol_v, factored):
+    """Put v on G v = nu. Returns (status, the violation found relative to size and speed, what the factor is)."""
+    none = W.velocities.applied
+    step = W.velocities.scratch_3
+    r = W.rows.scratch_2
+    worst, size = velocity_violation(S, W, v, r)
+    if worst > tol_v * (min(METRE, S.scales.length) * S.scales.rate + size):
+        if factored == FACTOR_NEAR:
+            reuse_factor(S, W)
+        if (
+            factored == FACTOR_OLD
+            or solve(S, W, none, r, step, W.rows.residual, False, MAX_REFINEMENTS)
+            > STALE_RESIDUAL * W.options.solve_tolerance
+        ):
+            if factor(S, W) != 0:
+                return NOT_CLOSED, worst, FACTOR_OLD
+            factored = FACTOR_CURRENT
+            solve(S, W, none, r, step, W.rows.residual, False, MAX_REFINEMENTS)
+        for d in range(step.shape[0]):
+            v[d] += step[d]
+    return 0, worst / (characteristic_speed(S) + size), factored
+
+
+@formula
+def project_error(y, e, S, W):
+    """Take from an error e of the state y, where W was last evaluated, what its projection takes: what leads off.
+
+    Near a singular position rounding is large along what the constraints forbid, and small along what they allow.
+    """
+    choice = W.options.stabilization
+    if S.rows.law.shape[0] == 0 or choice < STEPS or choice == PARTITIONING:
+        return
+    nq = S.sizes.coordinates
+    way = W.velocities.applied
+    if choice != VELOCITIES:
+        velocities_from_rates(S, y, e, way)
+        project_tangent(S, W, way)
+        coordinate_rates(S, y, way, e)
+    if choice != POSITIONS:
+        project_tangent(S, W, e[nq : nq + way.shape[0]])
+
+
+@formula
+def project_tangent(S, W, v):
+    """Take from v what changes the constraints, with the factor in W."""
+    r = W.rows.scratch_2
+    for b in range(S.tree.parent.shape[0]):
+        if S.tree.law[b] >= 0:
+            v[S.tree.v[b]] = 0.0
+    for k in range(r.shape[0]):
+        r[k] = -row_times(S, W, k, v)
+    step = W.velocities.scratch_3
+    solve(S, W, W.velocities.applied, r, step, W.rows.residual, False, MAX_REFINEMENTS)
+    for d in range(step.shape[0]):
+        v[d] += step[d]

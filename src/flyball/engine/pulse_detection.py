@@ -1,0 +1,284 @@
+"""Inspection of laws within a step: a pulse, a thin wall, a table's corner that no stage of the step has met.
+
+Each law that can act briefly is sampled along the step, its inputs along the cubics through their values and rates
+at the ends. Where it departs from the polynomial through eight of its values, the place is reported; the integrator
+decides whether that matters. Samples are dense relative to the whole time span, so that their number is bounded:
+what is shorter than a `SAMPLES`-th of the span may fall between them. A force whose formula breaks somewhere (a
+rotation vector at half a turn) has to be on one branch of it at both ends of the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from ..compiler.formulas import formula
+from ..laws.bytecode import evaluate, evaluate_jet, may_be_brief
+from ..math.scalar import cos
+from ..numerics.integrators.time_loop import (
+    AT_END,
+    AT_START,
+    INSPECTED_END,
+    INSPECTED_END_RATE,
+    INSPECTED_START,
+    INSPECTED_START_RATE,
+)
+from ..tables.table_definitions import ALONG, BETWEEN, LAW_INPUT, LAW_INPUT_RATE, RATE, SAMPLED, SLIDING, VALUE
+from .calls import call_generated
+from .element_dispatch import branch, breaks, force_kind, inputs
+from .kinematics import load_record
+from .loads import force_row
+from .rows import BY_TIME, count_measured
+
+SAMPLES = 20000  # of a law over the whole time span, in steps that are wide
+MIN_SAMPLES = 8  # in any step
+NODES = 8  # values of a law that tell what to expect of it: at Chebyshev's points, ends included
+LAWS = 3  # of a force
+BRANCH_NUMBERS = 5  # numbers that say on which branch of its formula a force is, and how fast it turns
+MAX_TURN = 2.0  # turning within a step [rad] up to which the ends tell that
+UNBOUNDED = np.inf  # how long a place of no formula lasts: no width of step is right
+DEPARTURE = 1e-3  # part of a law's change over the step by which it may differ from what is expected
+LAW_ROUNDING = 1e-9  # part of its size that is nothing
+# rows of Clock.seen: sensors within the step; (sensors and inputs of forces, and rates, at its start and end;) nodes
+# (1 for each law that is looked at)
+INPUTS_WITHIN, NODE_VALUES, LAW_SELECTED, INSPECTION_ROWS = 0, 5, 6, 7
+
+
+def law_starts(S) -> np.ndarray:
+    """Where each law begins in the code, by its number (see `law_at`); -1 where there is none."""
+    return np.r_[S.forces.laws.ravel(), S.rows.law, S.tree.law]
+
+
+def count_law_inputs(S) -> int:
+    """How many numbers `store_law_inputs` keeps of each end."""
+    return count_measured(S) + (1 + BRANCH_NUMBERS) * len(S.forces.F)
+
+
+def any_formula_breaks(S) -> bool:
+    """Whether the formula of some force breaks somewhere."""
+    return any(breaks(force_kind(S, k)) for k in range(len(S.forces.F)))
+
+
+def inspection_buffer(S, sampled: Collection[int] | None = None) -> np.ndarray:
+    """What `inspect_step` writes on: no columns, and nothing is inspected, where no law can act briefly.
+
+    ``sampled`` are the starts of the laws that are to be looked at; without it all that can act briefly are.
+    """
+    laws = law_starts(S)
+    look = [at >= 0 and may_be_brief(S.code, at) and (sampled is None or at in sampled) for at in laws]
+    if not any(look) and not any_formula_breaks(S):
+        return np.zeros((INSPECTION_ROWS, 0))
+    loads = int((S.forces.load >= 0).sum())
+    sensed = 2 * count_measured(S) + loads + len(S.control_laws) + len(S.switches.row)
+    seen = np.zeros((INSPECTION_ROWS, max(sensed, count_law_inputs(S), NODES, len(laws))))
+    seen[LAW_SELECTED, : len(laws)] = look
+    return seen
+
+
+@formula
+def inspect_step(t, h, span, first, buffer, S, W):
+    """The next place within a step at which a law does something unexpected: (where to go on from, place, how long).
+
+    Place and how long are parts of the step; the first is 0 where there is none. Where a formula breaks it lasts
+    without end (`UNBOUNDED`): every step is too wide. Each such law has two places: where it departs most from its
+    polynomial, and where most from its mean, as a node may have met the pulse itself. With AT_START and AT_END the
+    inputs of the laws, at the state in W, are kept.
+    """
+    if buffer.shape[1] == 0:
+        return 0, 0.0, 0.0
+    if first == AT_START:
+        store_law_inputs(S, W, buffer, INSPECTED_START)
+        return 0, 0.0, 0.0
+    if first == AT_END:
+        store_law_inputs(S, W, buffer, INSPECTED_END)
+        return 0, 0.0, 0.0
+    if first == 0 and branch_changes(S, buffer, h):
+        return 1, 0.5, UNBOUNDED
+    again = first % 2 == 1  # the law that was named last has another place to look at
+    for k in range(first // 2, LAWS * S.forces.F.shape[0] + S.rows.law.shape[0] + S.tree.parent.shape[0]):
+        law = law_at(S, k)
+        if buffer[LAW_SELECTED, k] > 0.0:
+            n = max(MIN_SAMPLES, int(SAMPLES * min(1.0, h / span)))
+            if again:
+                x, share = farthest_from_mean(S, W, k, law, t, h, n, buffer)
+                return 2 * k + 2, x, share
+            x, share = largest_departure(S, W, k, law, t, h, n, buffer)
+            if share > 0.0:
+                return 2 * k + 1, x, share
+        again = False
+    return 0, 0.0, 0.0
+
+
+@formula
+def law_at(S, k):
+    """Law number k, of forces, of rows, of prescribed coordinates; -1 if it has none."""
+    if k < LAWS * S.forces.F.shape[0]:
+        return S.forces.laws[k // LAWS, k % LAWS]
+    k -= LAWS * S.forces.F.shape[0]
+    if k < S.rows.law.shape[0]:
+        return S.rows.law[k]
+    return S.tree.law[k - S.rows.law.shape[0]]
+
+
+@formula
+def store_law_inputs(S, W, buffer, row):
+    """Keep what laws depend on, and its rates, at the state in W."""
+    nm = count_measured(S)
+    for m in range(2 * nm, W.sensed.shape[1]):  # sides of corners do not change within a step
+        buffer[INPUTS_WITHIN, m] = W.sensed[VALUE, m]
+    for m in range(nm):
+        buffer[row, m] = W.sensed[VALUE, m]
+        buffer[row + 1, m] = W.sensed[RATE, m]
+    for f in range(S.forces.F.shape[0]):
+        if S.forces.family[f] == SLIDING:
+            continue
+        if S.forces.family[f] == ALONG:
+            a, b = W.sensed[VALUE, S.forces.F[f]], W.sensed[RATE, S.forces.F[f]]
+        else:
+            F = load_record(W.FK, S.forces.F[f])
+            M = load_record(W.FK, S.forces.M[f])
+            a, b = inputs(force_kind(S, f), force_row(S.force_parameters, f), F, M)
+            if S.forces.family[f] == BETWEEN and breaks(force_kind(S, f)):
+                side = branch(force_kind(S, f), force_row(S.force_parameters, f), F, M)
+                for i in range(BRANCH_NUMBERS):
+                    buffer[row, nm + S.forces.F.shape[0] + BRANCH_NUMBERS * f + i] = side[i]
+        buffer[row, nm + f] = a
+        buffer[row + 1, nm + f] = b
+
+
+@formula
+def branch_changes(S, buffer, h):
+    """Whether some force is on another branch of its formula at the end of the step than at its begin, or may be."""
+    nf = S.forces.F.shape[0]
+    for f in range(nf):
+        if S.forces.family[f] == BETWEEN and breaks(force_kind(S, f)):
+            at = count_measured(S) + nf + BRANCH_NUMBERS * f
+            s = 0.0
+            for i in range(BRANCH_NUMBERS - 1):
+                s += buffer[INSPECTED_START, at + i] * buffer[INSPECTED_END, at + i]
+            speed = max(
+                buffer[INSPECTED_START, at + BRANCH_NUMBERS - 1], buffer[INSPECTED_END, at + BRANCH_NUMBERS - 1]
+            )
+            if not (s > 0.0 and speed * h <= MAX_TURN):
+                return True
+    return False
+
+
+@formula
+def largest_departure(S, W, k, law, t, h, n, buffer):
+    """Where in the step, and for how long, a law is not what its values at the nodes let expect: parts of the step.
+
+    How long is 0 where it is as expected.
+    """
+    least = most = sample_law(S, W, k, law, t, h, 0.0, buffer)
+    size = 0.0
+    for j in range(NODES):
+        f = sample_law(S, W, k, law, t, h, chebyshev_node(j), buffer)
+        buffer[NODE_VALUES, j] = f
+        least = min(least, f)
+        most = max(most, f)
+        size = max(size, abs(f))
+    allowed = DEPARTURE * (most - least) + LAW_ROUNDING * size
+    worst = allowed
+    at = -1.0
+    total = 0.0
+    for i in range(n):
+        x = (i + 0.5) / n
+        gap = abs(sample_law(S, W, k, law, t, h, x, buffer) - law_polynomial(buffer, x))
+        total += gap
+        if gap > worst:
+            worst = gap
+            at = x
+    return at, (total / (n * worst) if at >= 0.0 else 0.0)
+
+
+@formula
+def farthest_from_mean(S, W, k, law, t, h, n, buffer):
+    """Where in the step a law is farthest from its mean, and for how long: parts of the step."""
+    mean = 0.0
+    for i in range(n):
+        mean += sample_law(S, W, k, law, t, h, (i + 0.5) / n, buffer) / n
+    worst = 0.0
+    at = 0.5
+    total = 0.0
+    for i in range(n):
+        gap = abs(sample_law(S, W, k, law, t, h, (i + 0.5) / n, buffer) - mean)
+        total += gap / n
+        if gap > worst:
+            worst = gap
+            at = (i + 0.5) / n
+    return at, (total / worst if worst > 0.0 else 0.0)
+
+
+@formula
+def chebyshev_node(j):
+    """Place of a node in the step."""
+    return 0.5 - 0.5 * cos(3.141592653589793 * j / (NODES - 1))
+
+
+@formula
+def law_polynomial(buffer, x):
+    """The polynomial through the values at the nodes (barycentric form)."""
+    above = 0.0
+    below = 0.0
+    for j in range(NODES):
+        w = 0.5 if j == 0 or j == NODES - 1 else 1.0
+        d = x - chebyshev_node(j)
+        if d == 0.0:
+            return buffer[NODE_VALUES, j]
+        w /= d if j % 2 == 0 else -d
+        above += w * buffer[NODE_VALUES, j]
+        below += w
+    return above / below
+
+
+@formula
+def sample_law(S, W, k, law, t, h, x, buffer):
+    """Value of a law at a place in the step; of drivers' the second derivative, which is what asks for force."""
+    nm = count_measured(S)
+    s = t + x * h
+    for m in range(nm):
+        buffer[INPUTS_WITHIN, m], buffer[INPUTS_WITHIN, nm + m] = input_within(buffer, m, x, h)
+    made = W.made[SAMPLED]
+    if k >= LAWS * S.forces.F.shape[0]:
+        if made != 0:
+            return call_generated(
+                S.flat[made + k],
+                S,
+                W,
+                s,
+                buffer[INPUTS_WITHIN],
+                buffer[INPUTS_WITHIN],
+                buffer[INPUTS_WITHIN],
+                buffer[INPUTS_WITHIN],
+            )
+        return evaluate_jet(S.code, S.const, law, W.stack, s, buffer, BY_TIME)[2]
+    a, b = input_within(buffer, nm + k // LAWS, x, h)
+    if made != 0:
+        W.flat[LAW_INPUT], W.flat[LAW_INPUT_RATE] = a, b
+        return call_generated(
+            S.flat[made + k],
+            S,
+            W,
+            s,
+            buffer[INPUTS_WITHIN],
+            buffer[INPUTS_WITHIN],
+            buffer[INPUTS_WITHIN],
+            buffer[INPUTS_WITHIN],
+        )
+    return evaluate(S.code, S.const, law, W.stack, (s, a, b), buffer)
+
+
+@formula
+def input_within(buffer, m, x, h):
+    """Value and rate of column m at a place in the step: the cubic through value and rate at its ends."""
+    f, g, u, v = (
+        buffer[INSPECTED_START, m],
+        buffer[INSPECTED_END, m],
+        buffer[INSPECTED_START_RATE, m] * h,
+        buffer[INSPECTED_END_RATE, m] * h,
+    )
+    a = 2.0 * (f - g) + u + v
+    b = 3.0 * (g - f) - 2.0 * u - v
+    return f + x * (u + x * (b + x * a)), (u + x * (2.0 * b + 3.0 * x * a)) / (h if h > 0.0 else 1.0)

@@ -1,1 +1,0 @@
-"""The equations of motion: formulas that loop over the tables, and the compiled entry points made of them."""

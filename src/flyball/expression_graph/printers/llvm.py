@@ -1,0 +1,485 @@
+"""Expressions as LLVM code: straight-line code that reads numbers from memory and writes values of expressions.
+
+A function takes addresses and the time. What is read and written are *places*: a base (an address that is an
+argument, or that is stored where an argument points) and the index of the double there. Numba does not process
+this code.
+
+Operations are ordered so that several independent chains are in progress and few registers are needed. The piece
+of a spline is searched once for all splines with the same breakpoints, beginning with the piece found last.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...math.spline import BREAKS
+from ..graph import ADD, DIVIDE, MULTIPLY, NUMBER, POWER, Node
+
+PARALLEL_CHAINS = 4  # of a long chain of comparisons, how many go on side by side
+
+
+def operands(x: Node) -> tuple[Node, ...]:
+    """What an operation is written with."""
+    return (x.op == "choose" and compared_pair(x)) or x.args
+
+
+def compared_pair(x: Node) -> tuple[Node, Node] | None:
+    """The two of which ``choose(a - b, a, b)`` is the larger; None if x is something else."""
+    by, a, b = x.args
+    if by.op != ADD:
+        return None
+    for first, second in (by.args, by.args[::-1]):
+        less = second.op == MULTIPLY and second.args[0].op == NUMBER and second.args[0].value == -1.0
+        if first is a and (
+            (less and second.args[1] is b) or (b.op == NUMBER == second.op and second.value == -b.value)
+        ):
+            return a, b
+    return None
+
+
+def ordered_operations(nodes: Iterable[Any], loaded: Collection[int]) -> list[Node]:
+    """What has to be reckoned, or read, for these expressions, in the order in which it was made."""
+    found: dict[int, Node] = {}
+    to_see = [x for x in nodes if isinstance(x, Node)]
+    while to_see:
+        x = to_see.pop()
+        if x.index not in found:
+            found[x.index] = x
+            if x.index not in loaded:
+                to_see.extend(operands(x))
+    return [found[k] for k in sorted(found)]
+
+
+def depth_first(nodes: Iterable[Any], loaded: Collection[int]) -> list[Node]:
+    """The same, each right before it is needed: values wait for less time, in registers."""
+    seen: set[int] = set()
+    order: list[Node] = []
+    for root in sorted({x.index: x for x in nodes if isinstance(x, Node)}.values(), key=lambda x: x.index):
+        stack = [(root, 0)]
+        while stack:
+            x, k = stack.pop()
+            if x.index in seen:
+                continue
+            args = () if x.index in loaded else operands(x)
+            if k < len(args):
+                stack += [(x, k + 1), (args[k], 0)]
+            else:
+                seen.add(x.index)
+                order.append(x)
+    return order
+
+
+def parallel_chains(order: Sequence[Node], loaded: Collection[int]) -> dict[int, tuple[Node | None, list[Node]]]:
+    """Comparisons one after the other, as several chains abreast.
+
+    For each of ``order`` that is the larger of two: an earlier one of its chain, or None, and what it is compared with.
+    """
+    larger = {x.index for x in order if x.index not in loaded and x.op == "choose" and compared_pair(x)}
+    uses: dict[int, int] = {}
+    for x in order:
+        for a in () if x.index in loaded else operands(x):
+            uses[a.index] = uses.get(a.index, 0) + 1
+    behind: dict[int, list[Node]] = {}  # of each, the chain that it ends
+    out: dict[int, tuple[Node | None, list[Node]]] = {}
+    follows: set[int] = set()
+    for x in order:
+        if x.index in larger:
+            first, second = operands(x)
+            chain = behind.get(first.index, []) if first.index in larger and uses[first.index] == 1 else []
+            follows |= {first.index} if chain else set()
+            behind[x.index] = [*chain, x]
+            out[x.index] = (None, [first, second])
+    for end in [k for k in behind if k not in follows]:
+        chain = behind[end]
+        for k, x in enumerate(chain[1:-1], 1):
+            begun = chain[k - PARALLEL_CHAINS] if k >= PARALLEL_CHAINS else None
+            out[x.index] = (begun, [operands(x)[1]])
+        if len(chain) > 1:
+            others = chain[-1 - PARALLEL_CHAINS : -1]
+            out[end] = (None, [*others, operands(chain[-1])[1]])
+    return out
+
+
+SearchKey = tuple[float, ...]
+"""Period, number of breaks, breaks."""
+
+
+def search_key(table: Sequence[float]) -> SearchKey:
+    """What of a spline's numbers says which piece holds."""
+    return tuple(table[: BREAKS + int(table[1])])
+
+
+def spline_of(data: Any) -> tuple[Sequence[float], int] | None:
+    """Numbers of a spline and the order of its derivative; None if a function is none, or its numbers move."""
+    told = getattr(data, "told", {})
+    return (told["table"], told["order"]) if "table" in told and not told["moved"] else None
+
+
+class SplineSegments:
+    """The pieces that one procedure has found.
+
+    Parameters
+    ----------
+    new : callable
+        Writes an instruction, returns the name of its value.
+    """
+
+    def __init__(self, new: Any) -> None:
+        self.new = new
+        self.found: dict[tuple[SearchKey, str], tuple[str, str]] = {}
+        self.last: dict[SearchKey, str] = {}
+        self.read: dict[tuple[str, str], list[str]] = {}
+
+    def value(self, table: tuple[str, Sequence[float]], order: int, x: str) -> str:
+        """A derivative of the spline of that name and those numbers at the number of that name."""
+        name, numbers = table
+        breaks = search_key(numbers)
+        if (breaks, x) not in self.found:
+            guess = self.last.get(breaks, "0")
+            both = self.new(f"call {{ i64, double }} @piece(ptr {name}, double {x}, i64 {guess})")
+            k, s = (self.new(f"extractvalue {{ i64, double }} {both}, {n}") for n in range(2))
+            self.found[breaks, x] = k, s
+            self.last[breaks] = k
+        k, s = self.found[breaks, x]
+        if (name, k) not in self.read:
+            at = self.new(f"getelementptr double, ptr {name}, i64 {len(breaks)}")
+            at = self.new(f"getelementptr [4 x double], ptr {at}, i64 {k}")
+            places = [self.new(f"getelementptr double, ptr {at}, i64 {n}") for n in range(4)]
+            self.read[name, k] = [self.new(f"load double, ptr {place}, !invariant.load !0") for place in places]
+        c = self.read[name, k]
+        factors = [[1.0, 1.0, 1.0, 1.0], [1.0, 2.0, 3.0], [2.0, 6.0], [6.0]][order]
+        terms = [a if f == 1.0 else self.two("fmul", a, f"{f:e}") for f, a in zip(factors, c[order:], strict=True)]
+        total = terms.pop()
+        while terms:
+            total = self.two("fadd", terms.pop(), self.two("fmul", s, total))
+        return total
+
+    def two(self, operation: str, a: str, b: str) -> str:
+        """An operation on two numbers."""
+        return self.new(f"{operation} double {a}, {b}")
+
+
+PIECE_SEARCH = """define internal { i64, double } @piece(ptr %d, double %x, i64 %guess) nounwind {
+entry:
+  %at_n = getelementptr double, ptr %d, i64 1
+  %m = load double, ptr %at_n
+  %count = fptosi double %m to i64
+  %period = load double, ptr %d
+  %breaks = getelementptr double, ptr %d, i64 2
+  %begin = load double, ptr %breaks
+  %periodic = fcmp ogt double %period, 0.0
+  %way = fsub double %x, %begin
+  %rounds = fdiv double %way, %period
+  %whole = call double @llvm.floor.f64(double %rounds)
+  %turns = select i1 %periodic, double %whole, double 0.0
+  %shift = fmul double %period, %turns
+  %y = fsub double %x, %shift
+  %before = sub i64 %guess, 1
+  %within = sub i64 %count, 1
+  %inside = icmp ult i64 %before, %within
+  br i1 %inside, label %try, label %bisect
+try:
+  %at_from = getelementptr double, ptr %breaks, i64 %before
+  %from = load double, ptr %at_from
+  %at_to = getelementptr double, ptr %breaks, i64 %guess
+  %to = load double, ptr %at_to
+  %not_before = fcmp ole double %from, %y
+  %not_behind = fcmp olt double %y, %to
+  %still = and i1 %not_before, %not_behind
+  br i1 %still, label %out, label %bisect
+bisect:
+  br label %loop
+loop:
+  %low = phi i64 [ 0, %bisect ], [ %low.next, %body ]
+  %high = phi i64 [ %count, %bisect ], [ %high.next, %body ]
+  %more = icmp slt i64 %low, %high
+  br i1 %more, label %body, label %done
+body:
+  %sum = add i64 %low, %high
+  %middle = ashr i64 %sum, 1
+  %at_b = getelementptr double, ptr %breaks, i64 %middle
+  %b = load double, ptr %at_b
+  %below = fcmp ole double %b, %y
+  %above = add i64 %middle, 1
+  %low.next = select i1 %below, i64 %above, i64 %low
+  %high.next = select i1 %below, i64 %high, i64 %middle
+  br label %loop
+done:
+  %last = sub i64 %count, 1
+  %at_l = getelementptr double, ptr %breaks, i64 %last
+  %l = load double, ptr %at_l
+  %is_l = fcmp oeq double %y, %l
+  %is_c = icmp eq i64 %low, %count
+  %end = and i1 %is_l, %is_c
+  %k = select i1 %end, i64 %last, i64 %low
+  %k1 = sub i64 %k, 1
+  %first = icmp slt i64 %k1, 0
+  %k0 = select i1 %first, i64 0, i64 %k1
+  %at_o = getelementptr double, ptr %breaks, i64 %k0
+  %start = load double, ptr %at_o
+  br label %out
+out:
+  %piece = phi i64 [ %guess, %try ], [ %k, %done ]
+  %o = phi double [ %from, %try ], [ %start, %done ]
+  %origin = fadd double %o, %shift
+  %s = fsub double %x, %origin
+  %one = insertvalue { i64, double } undef, i64 %piece, 0
+  %both = insertvalue { i64, double } %one, double %s, 1
+  ret { i64, double } %both
+}
+"""
+
+
+Place = tuple[str, int]
+"""A base and the number of the double there."""
+
+LIBRARY = {
+    "sin": "llvm.sin.f64", "cos": "llvm.cos.f64", "sqrt": "llvm.sqrt.f64", "exp": "llvm.exp.f64", "log": "llvm.log.f64",
+    "absolute": "llvm.fabs.f64", "tan": "tan", "asin": "asin", "acos": "acos", "atan": "atan", "sinh": "sinh",
+    "cosh": "cosh", "tanh": "tanh",
+}  # fmt: skip
+"""Functions of one argument: intrinsics, and those of C's library."""
+TWO_ARGUMENTS = {POWER: "llvm.pow.f64", "atan2": "atan2"}
+DECLARATIONS = "\n".join(
+    [
+        f"declare double @{name}(double) nounwind willreturn memory(none)"
+        for name in {*LIBRARY.values(), "llvm.floor.f64"}
+    ]
+    + [f"declare double @{name}(double, double) nounwind willreturn memory(none)" for name in TWO_ARGUMENTS.values()]
+)
+INFIX = {ADD: "fadd", MULTIPLY: "fmul", DIVIDE: "fdiv"}
+
+
+FAILED_CHECKS = {"positive": "ule", "nonzero": "ueq", "finite": "une"}  # against 0; "u": or no number
+
+
+class UnsupportedOperation(Exception):
+    """An expression has something in it that this language has no word for."""
+
+
+def constant(x: float) -> str:
+    """A number, to the last bit."""
+    return f"0x{struct.unpack('<Q', struct.pack('<d', x))[0]:016X}"
+
+
+@dataclass
+class Procedure:
+    """What a function does: it reads symbols at their places and puts expressions into theirs.
+
+    Attributes
+    ----------
+    name : str
+    reads : mapping of node number to place
+        What is there already: symbols, and what others have left.
+    stores : list of (place, expression)
+    returned : node or number
+    checks : list of (expressions, what, number)
+        Where one of these is not "positive", "nonzero" or "finite" the function returns that number, the first such.
+    deep : bool
+        Whether what goes into a store stands next to it, or in the order in which it was made.
+    """
+
+    name: str
+    reads: Mapping[int, Place]
+    stores: list[tuple[Place, Any]]
+    returned: Any = 0.0
+    checks: list[tuple[list[Any], str, float]] = field(default_factory=list)
+    deep: bool = True
+
+    @property
+    def results(self) -> list[Any]:
+        """All that is asked for."""
+        return [x for _, x in self.stores] + [self.returned] + [x for nodes, _, _ in self.checks for x in nodes]
+
+
+class Module:
+    """Procedures of one kind, as text.
+
+    Parameters
+    ----------
+    arguments : str
+        As in ``define double @name(arguments)``; ``%t`` is the base "t".
+    based : callable
+        Base -> lines that leave its address in ``%base``; none where it is an argument.
+    """
+
+    def __init__(self, arguments: str, based: Callable[[str], list[str]]) -> None:
+        self.arguments, self.based = arguments, based
+        self.texts: list[str] = []
+        self.bases: list[str] = []
+        self.tables: dict[bytes, Sequence[float]] = {}
+
+    def table(self, numbers: Sequence[float]) -> str:
+        """The name of a table's numbers."""
+        key = np.array(numbers, float).tobytes()
+        self.tables.setdefault(key, numbers)
+        return f"@table{list(self.tables).index(key)}"
+
+    def scope(self, base: str) -> str:
+        """What tells LLVM that places of other bases are others."""
+        if base not in self.bases:
+            self.bases.append(base)
+        k = 3 * self.bases.index(base)
+        return f"!alias.scope !{k + 2}, !noalias !{k + 3}"
+
+    def add(self, p: Procedure) -> None:
+        """Print a procedure."""
+        out = _Lines(self, p.reads)
+        order = depth_first(p.results, p.reads) if p.deep else ordered_operations(p.results, p.reads)
+        out.chains = parallel_chains(order, p.reads)
+        overwritten = {place for place, _ in p.stores}
+        for x in order:  # what is overwritten is read first
+            if p.reads.get(x.index) in overwritten:
+                out.value(x)
+        waiting: dict[int, list[Place]] = {}
+        for place, x in p.stores:
+            if isinstance(x, Node) and x.op != NUMBER:
+                waiting.setdefault(x.index, []).append(place)
+            else:
+                out.put(place, constant(float(x)))
+        for x in order:
+            if x.op != NUMBER:
+                name = out.value(x)
+                for place in waiting.pop(x.index, ()):
+                    out.put(place, name)
+        out.end(p)
+        head = [line for base in sorted(out.used) for line in self.based(base)]
+        lines = [f"define double @{p.name}({self.arguments}) nounwind {{", *head, *out.lines, "}"]
+        self.texts.append("\n".join(lines))
+
+    def __str__(self) -> str:
+        """The text."""
+        n = range(len(self.bases))
+        told = ["!0 = distinct !{!0}"] if self.bases else []
+        for k in n:
+            others = ", ".join(f"!{3 * i + 1}" for i in n if i != k)
+            told += [f"!{3 * k + 1} = distinct !{{!{3 * k + 1}, !0}}", f"!{3 * k + 2} = !{{!{3 * k + 1}}}"]
+            told += [f"!{3 * k + 3} = !{{{others}}}"]
+        data = []
+        for k, numbers in enumerate(self.tables.values()):
+            listed = ", ".join(f"double {constant(x)}" for x in numbers)
+            data.append(f"@table{k} = internal constant [{len(numbers)} x double] [{listed}]")
+        spline = [PIECE_SEARCH] if self.tables else []
+        return "\n\n".join([DECLARATIONS, *data, *spline, *self.texts, "\n".join(told)]) + "\n"
+
+
+class _Lines:
+    """The lines of one function."""
+
+    def __init__(self, module: Module, reads: Mapping[int, Place]) -> None:
+        self.module, self.reads = module, reads
+        self.lines: list[str] = []
+        self.names: dict[int, str] = {}
+        self.used: set[str] = set()
+        self.chains: Mapping[int, tuple[Node | None, Sequence[Node]]] = {}
+        self.pieces = SplineSegments(self.new)
+
+    def new(self, text: str) -> str:
+        name = f"%x{len(self.lines)}"
+        self.lines.append(f"{name} = {text}")
+        return name
+
+    def address(self, place: Place) -> str:
+        self.used.add(place[0])
+        return self.new(f"getelementptr inbounds double, ptr %{place[0]}, i64 {place[1]}")
+
+    def read(self, place: Place) -> str:
+        if place[0] == "t":
+            return "%t"
+        return self.new(f"load double, ptr {self.address(place)}, {self.module.scope(place[0])}")
+
+    def put(self, place: Place, name: str) -> None:
+        self.lines.append(f"store double {name}, ptr {self.address(place)}, {self.module.scope(place[0])}")
+
+    def name(self, x: Any) -> str:
+        if not isinstance(x, Node):
+            return constant(float(x))
+        return constant(x.value) if x.op == NUMBER else self.names[x.index]
+
+    def value(self, x: Node) -> str:
+        if x.index not in self.names:
+            found = self.reads.get(x.index)
+            self.names[x.index] = self.operation(x) if found is None else self.read(found)
+        return self.names[x.index]
+
+    def operation(self, x: Node) -> str:
+        if x.index in self.chains:
+            return self.largest(*self.chains[x.index])
+        a = [self.name(y) for y in x.args]
+        if x.op == MULTIPLY and x.args[0].op == NUMBER and x.args[0].value == -1.0:
+            return self.new(f"fneg double {a[1]}")
+        if x.op in INFIX:
+            return self.new(f"{INFIX[x.op]} double {a[0]}, {a[1]}")
+        if x.op in LIBRARY:
+            return self.new(f"call double @{LIBRARY[x.op]}(double {a[0]})")
+        if x.op in TWO_ARGUMENTS:
+            return self.new(f"call double @{TWO_ARGUMENTS[x.op]}(double {a[0]}, double {a[1]})")
+        if x.op in BRANCHING:
+            return BRANCHING[x.op](self, *a)
+        if (spline := spline_of(x.data)) is not None:
+            numbers, order = spline
+            return self.pieces.value((self.module.table(numbers), numbers), order, a[0])
+        told = getattr(x.data, "told", {})
+        if "constant" in told:
+            return constant(told["constant"])
+        raise UnsupportedOperation(getattr(x.data, "name", x.op))
+
+    def largest(self, started: Node | None, others: Sequence[Node]) -> str:
+        """The largest of some, one of which may be the largest of others already."""
+        names = [self.name(y) for y in (*((started,) if started is not None else ()), *others)]
+        while len(names) > 1:
+            a, b = names.pop(0), names.pop(0)
+            names.append(self.chosen(self.new(f"fcmp ogt double {a}, {b}"), a, b))
+        return names[0]
+
+    def chosen(self, condition: str, a: str, b: str) -> str:
+        return self.new(f"select i1 {condition}, double {a}, double {b}")
+
+    def end(self, p: Procedure) -> None:
+        value = self.name(p.returned)
+        for nodes, what, number in reversed(p.checks):
+            names = [self.name(x) for x in nodes]
+            if what == "finite":  # x - x is 0 if x is
+                names = [self.new(f"fsub double {x}, {x}") for x in names]
+                while len(names) > 1:
+                    pairs = zip(names[::2], names[1::2], strict=False)
+                    names = [self.new(f"fadd double {x}, {y}") for x, y in pairs] + names[len(names) // 2 * 2 :]
+            for x in names:
+                bad = self.new(f"fcmp {FAILED_CHECKS[what]} double {x}, {constant(0.0)}")
+                value = self.chosen(bad, constant(number), value)
+        self.lines.append(f"ret double {value}")
+
+
+def _minimum(o: _Lines, a: str, b: str) -> str:
+    first = o.new(f"fcmp ole double {a}, {b}")
+    return o.chosen(o.new(f"or i1 {first}, {o.new(f'fcmp uno double {a}, {a}')}"), a, b)
+
+
+def _maximum(o: _Lines, a: str, b: str) -> str:
+    first = o.new(f"fcmp oge double {a}, {b}")
+    return o.chosen(o.new(f"or i1 {first}, {o.new(f'fcmp uno double {a}, {a}')}"), a, b)
+
+
+def _sign(o: _Lines, a: str) -> str:
+    below = o.chosen(o.new(f"fcmp olt double {a}, {constant(0.0)}"), constant(-1.0), constant(0.0))
+    some = o.chosen(o.new(f"fcmp ogt double {a}, {constant(0.0)}"), constant(1.0), below)
+    return o.chosen(o.new(f"fcmp uno double {a}, {a}"), a, some)
+
+
+def _rounded(o: _Lines, a: str) -> str:
+    return o.new(f"call double @llvm.floor.f64(double {o.new(f'fadd double {a}, {constant(0.5)}')})")
+
+
+def _choose(o: _Lines, x: str, a: str, b: str) -> str:
+    return o.chosen(o.new(f"fcmp ogt double {x}, {constant(0.0)}"), a, b)
+
+
+BRANCHING: dict[str, Callable[..., str]] = {
+    "minimum": _minimum, "maximum": _maximum, "sign": _sign, "rounded": _rounded, "choose": _choose,
+}  # fmt: skip
+"""Functions that choose, as in `math/scalar.py`."""

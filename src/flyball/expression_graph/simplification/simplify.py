@@ -1,0 +1,418 @@
+"""Expansion of expressions into sums of terms, and the search for the shortest equivalent expression."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, cast
+
+import numpy as np
+
+from ..evaluation import nodes_in_order
+from ..graph import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Graph, Node
+from .factors import Factorizer, Term, factors_of, terms_of_sum
+from .reading_cost import reading_cost
+from .terms import (
+    CONSTANT_ATOM,
+    CONSTANT_TERM,
+    COS,
+    SIN,
+    Angle,
+    Powers,
+    Terms,
+    add_term,
+    combined_phases,
+    contracted_waves,
+    double_angles,
+    inverse_powers,
+    powers_product,
+    product_of_terms,
+    ratio_of_terms,
+    scaled_terms,
+    shortened_by_unit_norms,
+    sum_of_terms,
+    wave,
+    wave_node,
+    without_squares,
+)
+
+FEW_TERMS = 12  # that sums may have where expressions are large
+WORK_BUDGET = 100_000  # products of terms, or their like, after which they are
+
+
+class Expander:
+    """Nodes of one graph as sums of terms; each node once.
+
+    Parameters
+    ----------
+    parent : Simplifier
+        Makes what is no sum of terms short: arguments of functions, denominators, sums that are too long.
+    most : int
+        Terms that a sum may have.
+    """
+
+    def __init__(self, parent: Simplifier, most: int) -> None:
+        self.parent, self.graph, self.most = parent, parent.graph, most
+        self.known: dict[int, Terms] = {}
+        self.spent = 0
+
+    def __call__(self, x: Node) -> Terms:
+        """Terms of a node whose arguments are known, or become so."""
+        found = self.known.get(x.index)
+        if found is None:
+            found = self.known[x.index] = self._terms(x)
+        return found
+
+    def _terms(self, x: Node) -> Terms:
+        if x.index in self.parent.barriers or x.op == SYMBOL:
+            return self.atom(x)
+        if x.op == NUMBER:
+            return {CONSTANT_TERM: x.value} if x.value != 0.0 else {}
+        if x.op == ADD:
+            return self._sum(x)
+        if x.op == MULTIPLY:
+            return self._product(self(x.args[0]), self(x.args[1]))
+        if x.op == DIVIDE:
+            return self._quotient(x)
+        if x.op in ("cos", "sin"):
+            return self._wave(x)
+        if x.op in ("sqrt", "absolute"):
+            return self._root(x)
+        return self.atom(self.parent.inside(x))
+
+    def spend(self, work: int) -> None:
+        """Count work; from a certain amount on sums are kept shorter."""
+        self.spent += work
+        if self.spent > WORK_BUDGET:
+            self.most = min(self.most, FEW_TERMS)
+
+    def atom(self, x: Node) -> Terms:
+        """A node as it stands."""
+        return {(((x.index, 1),), ()): 1.0}
+
+    def factor(self, terms: Terms) -> Terms:
+        """A sum as one term: its factors are atoms."""
+        if len(terms) <= 1:
+            return terms
+        c, powers = factors_of(self.parent.short(terms), self.parent.barriers)
+        return {(tuple(sorted(powers.items())), ()): c}
+
+    def _sum(self, x: Node) -> Terms:
+        a, b = self(x.args[0]), self(x.args[1])
+        if len(a) + len(b) > 4 * self.most:
+            a, b = sorted((a, b), key=len)
+            b = self.factor(b)
+            a = self.factor(a) if len(a) > self.most else a
+        return sum_of_terms(a, b)
+
+    def _product(self, a: Terms, b: Terms) -> Terms:
+        self.spend(len(a) * len(b))
+        if len(a) * len(b) > 4 * self.most:
+            a, b = sorted((a, b), key=len)
+            b = self.factor(b)
+            a = self.factor(a) if len(a) > self.most else a
+        found = self.roots_squared(product_of_terms(a, b))
+        return without_squares(found, self.parent.units) if self.parent.units else found
+
+    def roots_squared(self, terms: Terms) -> Terms:
+        """Squares of roots and of absolute values are what stands in them."""
+        out: Terms = {}
+        for (powers, waves), c in terms.items():
+            rest: Terms = {(powers, waves): c}
+            for k, n in powers:
+                if (
+                    abs(n) > 1
+                    and (root := self.graph.nodes[k]).op in ("sqrt", "absolute")
+                    and k not in self.parent.barriers
+                ):
+                    inner = self(root.args[0])
+                    inner = inner if len(inner) <= 8 and n > 0 else self.factor(inner)
+                    even = n - n % 2 if n > 0 else n + n % 2
+                    gone: Terms = {(((k, -even),), ()): 1.0}
+                    if n < 0:
+                        if len(inner) != 1 or next(iter(inner))[1]:
+                            continue
+                        ((p, _), d) = next(iter(inner.items()))
+                        inner = {(inverse_powers(p), ()): 1.0 / d}
+                    rest = product_of_terms(rest, gone)
+                    for _ in range(abs(even) // 2 if root.op == "sqrt" else abs(even)):
+                        rest = product_of_terms(rest, inner)
+            out = sum_of_terms(out, rest)
+        return out
+
+    def _quotient(self, x: Node) -> Terms:
+        a, b = self(x.args[0]), self(x.args[1])
+        if not b:  # as it is: 1 / 0
+            return self.atom(self.parent.inside(x))
+        same = ratio_of_terms(a, b)
+        if same is not None:
+            return self.roots_squared({(same[0], ()): same[1]})
+        if len(b) > 1:
+            b = self.factor(b)
+        ((powers, waves), c) = next(iter(b.items()))
+        under: Powers = inverse_powers(powers)
+        out: Terms = {}
+        for (p, w), d in a.items():
+            if w and w == waves:
+                out = sum_of_terms(out, {(powers_product(p, under), ()): d / c})
+            else:
+                more = tuple((wave_node(self.graph, u).index, -1) for u in waves)
+                out = sum_of_terms(out, {(powers_product(powers_product(p, under), tuple(sorted(more))), w): d / c})
+        return self.roots_squared(out)
+
+    def angle(self, x: Node) -> Angle | None:
+        """An expression as a sum of atoms with factors; None if it has too many."""
+        terms = self(x)
+        if len(terms) > 8:
+            return None
+        found: dict[int, float] = {}
+        for (powers, waves), c in terms.items():
+            if powers == () and waves == ():
+                found[CONSTANT_ATOM] = found.get(CONSTANT_ATOM, 0.0) + c
+                continue
+            single = len(powers) == 1 and powers[0][1] == 1 and not waves
+            one = self.graph.nodes[powers[0][0]] if single else self.parent.short({(powers, waves): 1.0})
+            inner = self._wrapped(one) if c % 1.0 == 0.0 else None
+            for k, d in inner or ((one.index, 1.0),):
+                found[k] = found.get(k, 0.0) + c * d
+        return tuple(sorted((k, c) for k, c in found.items() if c))
+
+    def _wrapped(self, x: Node) -> Angle | None:
+        """U in atan2(sin u, cos u), which differs from it by whole turns."""
+        if x.op != "atan2" or x.index in self.parent.barriers:
+            return None
+        y, z = (self(a) for a in x.args)
+        if len(y) != 1 or len(z) != 1:
+            return None
+        ((p, u), c), ((r, w), d) = next(iter(y.items())), next(iter(z.items()))
+        if p or r or d != 1.0 or not u or not w or u[0][0] != SIN or w != ((COS, u[0][1]),) or abs(c) != 1.0:
+            return None
+        return tuple((k, c * e) for k, e in u[0][1])
+
+    def _wave(self, x: Node) -> Terms:
+        angle = self.angle(x.args[0])
+        if angle is None or not all(math.isfinite(c) for _, c in angle):
+            return self.atom(self.parent.inside(x))
+        kind = COS if x.op == "cos" else SIN
+        found = dict(angle)
+        quarter, c = right_angles(found.get(CONSTANT_ATOM, 0.0)), 1.0
+        if quarter:  # a whole number of right angles in front
+            del found[CONSTANT_ATOM]
+            steps = (quarter + (0 if kind == SIN else 1)) % 4  # sin(x + n pi/2)
+            kind, c = (SIN, COS, SIN, COS)[steps], (1.0, 1.0, -1.0, -1.0)[steps]
+        return shifted_wave(kind, found, found.pop(CONSTANT_ATOM, 0.0), c)
+
+    def _root(self, x: Node) -> Terms:
+        terms = self(x.args[0])
+        if len(terms) == 1:
+            ((powers, waves), c) = next(iter(terms.items()))
+            if not waves and c > 0.0 and (x.op == "absolute" or not any(n % 2 for _, n in powers)):
+                out: Terms = {((), ()): c if x.op == "absolute" else math.sqrt(c)}
+                for k, n in powers:
+                    size = self.graph.function("absolute", self.graph.nodes[k])
+                    n = n if x.op == "absolute" else n // 2
+                    out = product_of_terms(out, {(((k if n % 2 == 0 else size.index, n),), ()): 1.0})
+                return out
+        if not terms:
+            return {}
+        number, inner = factors_of(self.parent.shorter(x.args[0], self.parent.short(terms)), self.parent.barriers)
+        if number < 0.0 and x.op == "sqrt":
+            return self.atom(self.parent.inside(x))
+        if x.op == "absolute":
+            return scaled_terms(
+                self.atom(self.graph.function(x.op, self.parent.gathered.product(1.0, inner))), abs(number)
+            )
+        rest = {k: n % 2 if n > 0 else -(n % 2) for k, n in inner.items()}
+        found: Terms = {CONSTANT_TERM: math.sqrt(number)}
+        for k, n in inner.items():
+            half = (n - rest[k]) // 2
+            size = self.graph.nodes[k] if half % 2 == 0 else self.graph.function("absolute", self.graph.nodes[k])
+            found = product_of_terms(found, {(((size.index, half),) if half else (), ()): 1.0})
+        under = {k: n for k, n in rest.items() if n}
+        if not under:
+            return found
+        return product_of_terms(found, self.atom(self.graph.function("sqrt", self.parent.gathered.product(1.0, under))))
+
+
+def shifted_wave(kind: int, angle: dict[int, float], phase: float, c: float) -> Terms:
+    """C times cosine or sine of an angle and a number: cos(u + p) = cos p cos u - sin p sin u."""
+    out: Terms = {}
+    parts = [(kind, math.cos(phase))]
+    if phase:
+        parts.append((1 - kind, math.sin(phase) if kind == SIN else -math.sin(phase)))
+    for k, factor in parts:
+        waves, sign = wave(k, angle)
+        if sign * factor:
+            add_term(out, ((), waves), c * factor * sign)
+    return out
+
+
+def right_angles(constant: float) -> int:
+    """Right angles in a number, if it is a whole number of them."""
+    n = round(constant / (math.pi / 2.0))
+    return n if n and abs(constant - n * math.pi / 2.0) <= 4.0 * 2.0**-52 * abs(constant) else 0
+
+
+MAX_TERMS = 60  # of a sum that is multiplied out
+MANY_OPERATIONS = 2500  # operations from which on only short sums are
+UNREADABLE_COST = 3000.0  # symbols from which on nobody reads an expression: it stays as it is shared
+MAX_INNER_TERMS = 16  # terms up to which a part of an expression is gathered by itself
+SHORT_COST = 6.0  # what is as short as this is not looked at in another way
+
+
+def simplified(
+    nodes: Sequence[Any] | np.ndarray, units: Iterable[Sequence[Node]] = (), keep: Iterable[Node] = (), most: int = 0
+) -> Any:
+    """Expressions of the same value that are shorter to read, in the same graph.
+
+    Parameters
+    ----------
+    nodes : sequence or array of Node or number
+    units : sequence of sequences of Node
+        Symbols whose squares add up to one, such as the four of a unit quaternion.
+    keep : sequence of Node
+        Expressions that stay as they are, as if they were symbols.
+    most : int, optional
+        Terms up to which sums are multiplied out; fewer where expressions are large, if not given.
+
+    Returns
+    -------
+    list of Node, or array of the shape given
+        Numbers among the expressions stay numbers.
+    """
+    flat = list(nodes.ravel()) if isinstance(nodes, np.ndarray) else list(nodes)
+    graph = next((x.graph for x in flat if isinstance(x, Node)), None)
+    if graph is not None:
+        made = Simplifier(graph, flat, units, keep, most)
+        flat = [made(x) if isinstance(x, Node) else x for x in flat]
+    if not isinstance(nodes, np.ndarray):
+        return flat
+    out = np.empty(nodes.shape, object)
+    out.ravel()[:] = flat
+    return out
+
+
+class Barriers:
+    """Numbers of the nodes that are not looked into: those to keep, and operations on infinity or nan.
+
+    These are values that no law of algebra holds for: infinity times a sum is not the sum of infinity times its terms.
+    """
+
+    def __init__(self, graph: Graph, preserved: set[int]) -> None:
+        self.graph, self.kept = graph, preserved
+
+    def __contains__(self, k: object) -> bool:
+        return k in self.kept or any(
+            a.op == NUMBER and not math.isfinite(a.value) for a in self.graph.nodes[cast(int, k)].args
+        )
+
+
+class Simplifier:
+    """Makes expressions of one graph short; what it has found serves the next.
+
+    Parameters
+    ----------
+    graph : Graph
+    nodes : sequence of Node or number
+        Their number of operations decides how far sums are multiplied out.
+    units, keep, most
+        As of `simplified`.
+    """
+
+    def __init__(
+        self, graph: Graph, nodes: Sequence[Any], units: Iterable[Sequence[Node]], keep: Iterable[Node], most: int
+    ) -> None:
+        self.graph = graph
+        self.units = [tuple(x.index for x in unit) for unit in units]
+        self.barriers = Barriers(graph, {x.index for x in keep})
+        self.costs: dict[int, float] = {}
+        size = len(nodes_in_order(nodes))
+        self.expander = Expander(self, most or (MAX_TERMS if size < MANY_OPERATIONS else FEW_TERMS))
+        self.gathered = Factorizer(graph, self.costs)
+        self._short: dict[Any, Node] = {}
+        self._best: dict[int, Node] = {}  # of parts
+        self._whole: dict[int, Node] = {}  # of what was asked for
+
+    def __call__(self, x: Node) -> Node:
+        """The shortest expression found."""
+        for y in nodes_in_order([x]):
+            if y.index not in self._best:
+                self._best[y.index] = self._shortest(y) if len(self.expander(y)) <= MAX_INNER_TERMS else self._parts(y)
+        if x.index not in self._whole:
+            self._whole[x.index] = self._shortest(x)
+        return self._whole[x.index]
+
+    def cost(self, x: Node) -> float:
+        """How long it is to read."""
+        return reading_cost(x, self.costs)
+
+    def _shortest(self, x: Node) -> Node:
+        if x.op in (NUMBER, SYMBOL) or x.index in self.barriers:
+            return x
+        found = self.short(self.expander(x))
+        if x.op in (ADD, MULTIPLY, DIVIDE) and self.cost(found) > SHORT_COST:
+            parts = self._parts(x)
+            if x.op == ADD:
+                other = self.gathered(merge_equal_terms(terms_of_sum(parts, self.barriers)))
+                parts = min(other, parts, key=self.cost)
+            if min(self.cost(found), self.cost(parts)) > UNREADABLE_COST:
+                return parts
+            found = min(found, parts, key=self.cost)
+        return found
+
+    def _parts(self, x: Node) -> Node:
+        """The same operation on the best of its arguments."""
+        return self.graph.rebuilt(x, tuple(self._best[a.index] for a in x.args))
+
+    def shorter(self, x: Node, other: Node) -> Node:
+        """The best that is known for ``x``, or the other of the same value."""
+        return min(other, self._best.get(x.index, other), key=self.cost)
+
+    def inside(self, x: Node) -> Node:
+        """A function of short arguments."""
+        args = tuple(self._best[a.index] if a.index in self._best else self(a) for a in x.args)
+        return x if x.op == CALL and args == x.args else self.graph.rebuilt(x, args)
+
+    def short(self, terms: Terms) -> Node:
+        """A node for a sum of terms: with sums of angles, or products of waves, as is shorter."""
+        key = frozenset(terms.items())
+        found = self._short.get(key)
+        if found is None:
+            self.expander.spend(len(terms) ** 2 // 4)
+            terms = combined_phases(shortened_by_unit_norms(terms, self.units))
+            found = self._constructed([(c, p, w) for (p, w), c in sorted(terms.items())])
+            if sum(1 for _, w in terms if w) > 1 or (len(terms) > 1 and any(w for _, w in terms)):
+                for other in (contracted_waves(terms), double_angles(terms)):
+                    found = min(found, self._constructed(other), key=self.cost)
+            self._short[key] = found
+        return found
+
+    def _constructed(self, products: list[Any]) -> Node:
+        terms: list[Term] = []
+        for c, powers, waves in products:
+            found = dict(powers)
+            for w in waves:
+                k = wave_node(self.graph, w).index
+                found[k] = found.get(k, 0) + 1
+            terms.append((c, {k: n for k, n in found.items() if n}))
+        made = self.gathered(merge_equal_terms(terms))
+        if len(terms) < 4:
+            return made
+        again = self.gathered(
+            merge_equal_terms(terms_of_sum(made, self.barriers))
+        )  # sums that several terms have got for a factor
+        return min(made, again, key=self.cost)
+
+
+def merge_equal_terms(terms: list[Term]) -> list[Term]:
+    """Equal terms as one."""
+    found: dict[Any, tuple[float, dict[int, int]]] = {}
+    for c, p in terms:
+        key = tuple(sorted(p.items()))
+        before = found.get(key)
+        total = c + (before[0] if before else 0.0)
+        if before and abs(total) <= 1e-14 * max(abs(c), abs(before[0])):
+            del found[key]
+        else:
+            found[key] = (total, p)
+    return list(found.values())

@@ -1,0 +1,228 @@
+"""Equations of motion as expressions: the engine's own loops run in Python on symbols.
+
+    qdot = T v,  M vdot = f + G^T lam,  g = 0,  G v = nu,  G vdot = gamma
+
+Expressions may be the numbers in the tables (filled in by the same code, run on symbols of the parameters), the
+state and the time. Loads of joints with friction are symbols of their own; what they are when the reactions are
+known is in `TracedEquations.loads`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..engine.articulated_body import mass_entries
+from ..engine.element_dispatch import row_biases, row_values
+from ..engine.entry_point import allocate_work
+from ..engine.kinematics import coordinate_rates, update_motions, update_poses
+from ..engine.loads import apply_efforts, apply_forces, gather_forces, inertial_wrenches, reaction_loads
+from ..engine.rows import count_measured
+from ..model.expressions import is_number_text
+from ..model.model import Model
+from ..tables.structure import Choices, structure
+from ..tables.structure_definition import Structure
+from ..tables.table_definitions import LOAD, NUMBERS, PLANAR, RETURNED, VALUE, System, Work, named_arrays, with_numbers
+from ..tables.values import values
+from .graph import Graph, Node, Symbol
+
+TRACED_TABLES = tuple(name for name in NUMBERS if name != "switch_numbers")
+"""The tables of numbers in `System` that equations of motion without switches are made of."""
+
+
+def traced_arrays(S: System) -> dict[str, np.ndarray]:
+    """Their arrays by name, always in the same order."""
+    return {name: x for table in TRACED_TABLES for name, x in named_arrays(getattr(S, table), table)}
+
+
+@dataclass
+class TracedEquations:
+    """Equations of motion as expressions. Arrays of objects: nodes, or numbers where nothing moves."""
+
+    graph: Graph
+    structure: Structure
+    system: System  # its tables of numbers hold objects
+    work: Work  # kinematics of bodies and frames, rows, twist columns: as the engine leaves them
+    t: Node
+    q: list[Node]
+    v: list[Node]
+    z: list[Node]  # turns, places on curves, works
+    lam: list[Node]
+    loads: list[Node]  # of joints with friction
+    T: np.ndarray  # (nq, nv)
+    M: np.ndarray  # (nv, nv)
+    f: np.ndarray  # (nv,): applied and gyroscopic
+    g: np.ndarray  # (nr,)
+    nu: np.ndarray  # (nr,)
+    G: np.ndarray  # (nr, nv)
+    gamma: np.ndarray  # (nr,)
+    measured: np.ndarray  # (nm, 3): value, rate and bias of every measured quantity
+    gradients: np.ndarray  # (nm, nv): gradients of these
+    powers: np.ndarray  # rates of the works, in the order of ``z``; 0 elsewhere
+    returned: np.ndarray  # (nl,): loads that follow from the multipliers
+
+
+def object_tables(S: System) -> System:
+    """The tables of numbers as arrays of objects, of Python's own numbers."""
+
+    def objects(_: str, x: np.ndarray) -> np.ndarray:
+        out = np.empty(x.shape, object)
+        out.ravel()[:] = x.ravel().tolist()
+        return out
+
+    return with_numbers(S, objects, TRACED_TABLES)
+
+
+def trace_equations(
+    s: Structure, S: System, graph: Graph | None = None, names: Names | None = None, reference: Sequence[Any] = ()
+) -> TracedEquations:
+    """Run the engine's loops on symbols.
+
+    Parameters
+    ----------
+    s, S : Structure, System
+        A mechanism in some coordinates. The tables of numbers are `object_tables`, with expressions where wanted.
+    graph : Graph, optional
+        Where expressions in the tables live.
+    names : Names, optional
+        What the symbols are called.
+    reference : sequence, optional
+        What the coordinates are where the engine's are zero, (nq,): the equations are then in these.
+    """
+    graph = Graph() if graph is None else graph
+    names = names or numbered_symbols(s, len(S.rows.law))
+    graph.functions.names.update(tables_by_name(s, S))
+    W = allocate_work(s, S, dtype=object)
+    t = graph.symbol(Symbol("t", "time", "t", "s"))
+    q, v, z, lam, loads = ([graph.symbol(x) for x in names_] for names_ in names)
+    work_rates = np.zeros(len(z), object)
+    nv = s.nv
+    own = [x - at for x, at in zip(q, reference, strict=True)] if len(reference) else q
+    _kinematics(S, W, t, own, v, z)
+    nm = count_measured(S)
+    for n, load in enumerate(loads):
+        W.sensed[LOAD, 2 * nm + n] = load
+    T = np.array([[0.0] * nv] * s.nq, object).reshape(s.nq, nv)
+    _rates(S, q, v, T)
+    f = W.velocities.applied
+    inertial_wrenches(S, W)
+    apply_forces(S, W, t, work_rates)
+    gather_forces(S, W, f)
+    apply_efforts(S, W, t, work_rates, f)
+    M = mass_matrix(S, W, nv)
+    gradients, G = _rows(S, W, nm, nv)
+    W.rows.multiplier[:] = lam
+    reaction_loads(S, W)
+    return TracedEquations(
+        graph, s, S, W, t, q, v, z, lam, loads, T, M, f.copy(), W.rows.value.copy(), W.rows.nu.copy(), G,
+        W.rows.gamma.copy(), W.sensed[VALUE : VALUE + 3, :nm].T.copy(), gradients, work_rates,
+        W.sensed[RETURNED, 2 * nm :].copy(),
+    )  # fmt: skip
+
+
+def tables_by_name(s: Structure, S: System) -> dict[int, str]:
+    """What tables are called, by where they begin in the table of constants; curves of joints are x and y of these."""
+    found = {at: name for name, at in s.table_at.items()}
+    for k, t in enumerate(s.terms):
+        if t.formula.of_kind.place:
+            found |= {
+                int(S.term_parameters[k, 1].real): f"{t.element.name}.x",
+                int(S.term_parameters[k, 2].real): f"{t.element.name}.y",
+            }
+    return found
+
+
+Names = tuple[list[Symbol], list[Symbol], list[Symbol], list[Symbol], list[Symbol]]
+"""Symbols of q, v, z, lam and of the loads of joints."""
+
+
+def numbered_symbols(s: Structure, rows: int) -> Names:
+    """Symbols that are called by their numbers."""
+
+    def of(letter: str, kind: str, count: int) -> list[Symbol]:
+        return [Symbol(f"{letter}[{k}]", kind, f"{letter}_{{{k}}}") for k in range(count)]
+
+    return (
+        of("q", "coordinate", s.nq),
+        of("v", "velocity", s.nv),
+        of("z", "state", len(s.states)),
+        of("lam", "multiplier", rows),
+        of("load", "load", len(s.loads)),
+    )
+
+
+def _kinematics(S: System, W: Work, t: Node, q: list[Node], v: list[Node], z: list[Node]) -> None:
+    """Poses, rows, velocities and bias accelerations: as `projection.update_positions` and `projection.update_velocities`."""
+    update_poses(S, W, q)
+    row_values(S, W, t, z)
+    update_motions(S, W, v)
+    row_biases(S, W, t, v, z)
+
+
+def _rates(S: System, q: list[Node], v: list[Node], T: np.ndarray) -> None:
+    """Qdot = T v, column by column."""
+    for d in range(len(v)):
+        one = [1.0 if k == d else 0.0 for k in range(len(v))]
+        coordinate_rates(S, q, one, T[:, d])
+
+
+def _rows(S: System, W: Work, nm: int, nv: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gradients of what is measured and of the rows, dense."""
+    nr = len(S.rows.law)
+    dense = np.array([[0.0] * nv] * (nr + nm), object).reshape(nr + nm, nv)
+    for k in range(nr + nm):
+        for e in range(S.row_start[k], S.row_start[k + 1]):
+            dense[k, S.column[e]] = dense[k, S.column[e]] + W.G[e]
+    return dense[nr:], dense[:nr]
+
+
+def mass_matrix(S: System, W: Work, nv: int) -> np.ndarray:
+    """M, dense: of the bodies themselves where every one hangs on ground, else of composite bodies."""
+    M = np.array([[0.0] * nv] * nv, object).reshape(nv, nv)
+    if len(S.mass_entries.row):
+        mass_entries(S, W)
+        i, j = S.mass_entries.row, S.mass_entries.column
+        M[i, j] = M[j, i] = W.M
+        return M
+    for b in range(len(S.tree.parent)):
+        v0, n = S.tree.v[b], S.tree.nv[b]
+        for k in range(n):
+            M[v0 + k, v0 + k] = S.bodies.mass[b]
+        if n == 6:
+            M[v0 + 3 : v0 + 6, v0 + 3 : v0 + 6] = S.bodies.inertia[b].reshape(3, 3)
+        elif S.tree.joint[b] == PLANAR:
+            M[v0 + 2, v0 + 2] = S.bodies.inertia[b, 8]
+    return M
+
+
+def parameter_symbols(model: Model, graph: Graph) -> dict[str, Node]:
+    """Symbols of the parameters that have a value of their own; the others are expressions of these."""
+    told = model.environment()
+    own = [k for k, x in model.parameters.items() if not isinstance(x, str) or is_number_text(x)]
+    return {k: graph.symbol(Symbol(k, "parameter"), told[k]) for k in own}
+
+
+def trace_model(
+    model: Model, tree: tuple[str, ...] = (), symbols: bool = True, names: Names | None = None
+) -> TracedEquations:
+    """Trace a model in absolute coordinates, or in those of a forest.
+
+    Parameters
+    ----------
+    model : Model
+    tree : tuple of str
+        Names of the tree joints; none for absolute coordinates.
+    symbols : bool
+        Whether parameters are symbols; else they are numbers.
+    names : Names, optional
+        Symbols of the state.
+    """
+    model = model.snapshot()
+    graph = Graph()
+    given: dict[str, Any] = dict(parameter_symbols(model, graph)) if symbols else {}
+    s = structure(model, Choices(tree=tuple(tree), coupled=bool(tree)))
+    S = values(s, given).system
+    return trace_equations(s, S if given else object_tables(S), graph, names)

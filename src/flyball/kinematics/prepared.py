@@ -1,0 +1,340 @@
+"""The equations of motion on plain arrays, for robotics and control: what `Mechanism.prepare` returns.
+
+M(q) vdot = f(t, q, v) + G(t, q)^T lam + effort        g(t, q) = 0        qdot = T(q) v
+"""
+
+from __future__ import annotations
+
+import numbers
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..analysis_options import Options
+from ..assembly.assembled_state import Assembly
+from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from ..engine.entry_point import MOTION
+from ..engine.kinematics import coordinate_rates, retract, turned_angles, twist_column
+from ..engine.rows import BY_TIME
+from ..errors import AnalysisError, ModelError
+from ..laws.bytecode import evaluate_jet
+from ..laws.python_functions import function_fault
+from ..model.body import GROUND, Frame
+from ..model.model import Model
+from ..model.unsupported_elements import SLIDING, refuse_unsupported
+from ..results.recorded_kinematics import FULL_TURN
+from ..results.result import Result
+from ..simulation.initial_state import InitialState, find_initial_state
+from ..tables.forest import point_mass_obstacles
+from ..tables.structure_definition import velocity_names
+
+
+class Prepared:
+    """A mechanism in one kind of coordinates, at one set of values of its parameters. It does not change.
+
+    Threads may share it. Answers depend on nothing but the arguments. Whole turns of angles count, as far as q knows
+    them: of tree joints that turn about one axis, and of everything in the plane. In space other angles (all of them in
+    absolute coordinates, where a quaternion is the same after a turn) are those within half a turn of the start's.
+    Followers of cams are where the profile is nearest.
+
+    Attributes
+    ----------
+    model : Mechanism
+        As it was when it was prepared; additions to the original are not seen.
+    coordinates : str
+        Which they are, and why.
+    q, v : ndarray (nq,), (nv,)
+        The start: as described and assembled at t = 0. A spatial body that hangs freely has x, y, z of its centre of
+        mass and a quaternion (scalar first) in q, the velocity of that point in world axes and its angular velocity
+        in its own axes in v; a planar one x, y, angle. Tree joints have their coordinates, spherical ones a quaternion
+        and the angular velocity in the moved axes.
+    names : tuple of str
+        What each velocity is the rate of, (nv,).
+    rows : tuple of str
+        The element and what it restrains, for each constraint row, (nr,).
+    """
+
+    model: Any
+    coordinates: str
+    q: np.ndarray
+    v: np.ndarray
+    names: tuple[str, ...]
+    rows: tuple[str, ...]
+    _start: Assembly
+    _here: threading.local
+
+    def __init__(self, start: InitialState) -> None:
+        c = start.assembly.compiled
+        q, v = start.assembly.q.copy(), start.assembly.v.copy()
+        for a in (q, v):
+            a.setflags(write=False)
+        names = tuple(n.name for n in velocity_names(c.structure))
+        rows = tuple(f"{r.element.name}: {r.label}" for r in c.structure.rows)
+        vars(self).update(model=c.structure.model, coordinates=start.coordinates, q=q, v=v, names=names, rows=rows)
+        vars(self).update(_start=start.assembly.again(), _here=threading.local())
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refused."""
+        raise ModelError(f"{name!r} cannot be set: what is prepared does not change; prepare the changed mechanism")
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Values of its parameters [SI]."""
+        return self._start.compiled.values.told
+
+    def simulate(self, t_end: float | str, **options: Any) -> Result:
+        """The same as `Mechanism.simulate` in these coordinates, with these values of the parameters.
+
+        Parameters
+        ----------
+        t_end : float or str [s]
+            End of the motion.
+        **options
+            Those of `Mechanism.simulate`; ``parameters`` change further values.
+        """
+        if "coordinates" in options:
+            raise ModelError("coordinates were chosen when the mechanism was prepared: m.prepare(coordinates=...)")
+        layer = "joint" if self._start.compiled.structure.tree else "absolute"
+        values = self.parameters_given | dict(options.pop("parameters", None) or {})
+        return self.model.simulate(t_end, coordinates=layer, parameters=values, **options)
+
+    @property
+    def parameters_given(self) -> dict[str, Any]:
+        """Values that it was prepared with in place of the model's."""
+        return dict(self._start.compiled.parameters)
+
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+        """M, (nv, nv) [kg, kg m, kg m^2], symmetric."""
+        c = self._scratch("bare")
+        self._at(c, 0.0, q, np.zeros(len(self.v)), MOTION)
+        M = np.zeros((len(self.v), len(self.v)))
+        row, at, _ = c.values.system.mass_entries
+        M[row, at] = c.work.M
+        M[at, row] = c.work.M
+        return M
+
+    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Vdot, (nv,) [m/s^2, rad/s^2], with the constraints' reactions.
+
+        Coordinates that drivers prescribe are taken where these want them at t, also in `multipliers`, `efforts` and
+        `forces`.
+
+        Raises
+        ------
+        AnalysisError
+            If a law gives no finite number there, or the equations have no solution.
+        """
+        return self._moving(t, q, v).work.velocities.solved.copy()
+
+    def multipliers(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Lam, (nr,): reactions are G^T lam."""
+        return self._moving(t, q, v).work.rows.multiplier.copy()
+
+    def efforts(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """What drivers give along the coordinates that they prescribe, (nv,) [N, N m]; 0 for the others."""
+        return self._moving(t, q, v).work.velocities.effort.copy()
+
+    def forces(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """F, (nv,) [N, N m]: all forces but reactions, gyroscopic ones included."""
+        return self._moving(t, q, v).work.velocities.applied.copy()
+
+    def jacobian(self, t: float, q: np.ndarray) -> np.ndarray:
+        """G, (nr, nv): derivatives of the constraint rows along the velocities."""
+        return self._at(self._scratch(), t, q, np.zeros(len(self.v))).jacobian()
+
+    def constraint(self, t: float, q: np.ndarray) -> np.ndarray:
+        """How far the constraint rows are from closed, g, (nr,) [m, rad, 1]; 0 for those of velocities only."""
+        return self._at(self._scratch(), t, q, np.zeros(len(self.v))).work.rows.value.copy()
+
+    def constraint_rate(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """G v less what drivers ask for, (nr,) [m/s, rad/s]."""
+        c = self._at(self._scratch(), t, q, v)
+        return c.jacobian() @ np.asarray(v, float) - c.work.rows.nu
+
+    def rates(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Qdot, (nq,): v, where coordinates are no quaternions."""
+        q, v = self._state(q, v)
+        out = np.zeros(len(q))
+        coordinate_rates(self._start.compiled.values.system, q, v, out)
+        return out
+
+    def step(self, q: np.ndarray, d: np.ndarray) -> np.ndarray:
+        """Q moved by the finite step d (nv,) along the velocities, (nq,); quaternions keep their length."""
+        q, d = self._state(q, d)
+        retract(self._start.compiled.values.system, q, d)
+        return q
+
+    def pose(self, name: str, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Origin (3,) [m] of a body's reference frame or a named frame, and its axes as columns (3, 3); world axes."""
+        c = self._at(self._scratch(), 0.0, q, np.zeros(len(self.v)))
+        b, offset, turn = self._carried(c, name)
+        if b < 0:
+            return offset, turn
+        p, R = c.work.BK[b, :3].copy(), c.work.BK[b, 3:12].reshape(3, 3).copy()
+        return p + R @ offset, R @ turn
+
+    def frame_jacobian(self, name: str, q: np.ndarray) -> np.ndarray:
+        """Derivatives of velocity (rows 0 to 2) and angular velocity (3 to 5) of a frame, world axes, (6, nv)."""
+        c = self._at(self._scratch(), 0.0, q, np.zeros(len(self.v)))
+        S, W = c.values.system, c.work
+        b, offset, _ = self._carried(c, name)
+        J = np.zeros((6, len(self.v)))
+        point = W.BK[b, :3] + W.BK[b, 3:12].reshape(3, 3) @ offset
+        while b >= 0:
+            for k in range(int(S.tree.nv[b])):
+                turn, shift = (np.array(x) for x in twist_column(S, W, b, k))
+                at = int(S.tree.v[b]) + k
+                J[:3, at], J[3:, at] = shift + np.cross(turn, point - W.O[b]), turn
+            b = int(S.tree.parent[b])
+        return J
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {k: x for k, x in vars(self).items() if k != "_here"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _here=threading.local())
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people."""
+        s = self._start.compiled.structure
+        return [
+            ("prepared", f"{self.model.name}, {s.nv} velocities, {len(s.rows)} constraint rows"),
+            ("coordinates", self.coordinates),
+            ("velocities", ", ".join(self.names[:12]) + (", ..." if len(self.names) > 12 else "")),
+        ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data: the start, names of velocities and rows, values of the parameters."""
+        start = {"q": self.q.tolist(), "v": self.v.tolist()}
+        names = {"velocities": list(self.names), "rows": list(self.rows)}
+        return {"name": self.model.name, "coordinates": self.coordinates, "parameters": self.parameters} | names | start
+
+    def __repr__(self) -> str:
+        """The lines."""
+        return "\n".join(f"{label:<12} {text}" for label, text in self.lines())
+
+    def _scratch(self, which: str = "moving") -> CompiledMechanism:
+        """This thread's own scratch, with the turns of the start."""
+        found: CompiledMechanism | None = getattr(self._here, which, None)
+        if found is None:
+            found = self._start.compiled.again() if which == "moving" else self._bare()
+            setattr(self._here, which, found)
+        if which == "moving":
+            found.z = self._start.compiled.z.copy()
+        return found
+
+    def _bare(self) -> CompiledMechanism:
+        """Bodies and joints alone, with a mass matrix; drivers would put what they prescribe where they want it."""
+        c = self._start.compiled
+        bare = self.model.copy()
+        bare.drivers, bare.forces, bare.sensors, bare.initial = [], [], [], []
+        still = 0.0 if bare.planar else (0.0, 0.0, 0.0)  # told to spin, a body is no point mass without what turns it
+        rigid = {name for name, why in point_mass_obstacles(self.model).items() if why}
+        bare.bodies = [replace(b, angular_velocity=still) if b.name in rigid else b for b in bare.bodies]
+        return compile_mechanism(bare, parameters=c.parameters, tree=c.structure.tree, coupled=True)
+
+    def _moving(self, t: float, q: np.ndarray, v: np.ndarray) -> CompiledMechanism:
+        c = self._at(self._scratch(), t, q, v, MOTION)
+        if not np.isfinite(c.work.velocities.solved).all():
+            found = c.structure.missed(c.work.stack) or function_fault(c.work.stack, c.structure.functions)
+            why = found.message if found else "a force or a law gives no finite number, or the equations no solution"
+            raise AnalysisError(f"{self.model.name!r} at t = {float(t):.6g} s: {why}")
+        return c
+
+    def _at(
+        self, c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray, task: int | None = None
+    ) -> CompiledMechanism:
+        q, v = self._state(q, v)
+        if not (isinstance(t, numbers.Real) and np.isfinite(t)):
+            raise ModelError(f"t is a finite number of seconds, not {t!r}")
+        self._set_turn_counts(c, float(t), q)
+        if c.has_curves:
+            c.at(float(t), q, v)
+            c.find_places()
+        c.at(float(t), q, v) if task is None else c.at(float(t), q, v, task)
+        return c
+
+    def _set_turn_counts(self, c: CompiledMechanism, t: float, q: np.ndarray) -> None:
+        """Turned angles as the coordinates have them: whole turns from the start to q count, where q knows them."""
+        S = c.values.system
+        if not len(S.angles.F):
+            return
+        way = q - self.q
+        for b in np.flatnonzero(S.tree.law >= 0).tolist():  # a driver says where these are
+            law = evaluate_jet(S.code, S.const, int(S.tree.law[b]), c.work.stack, t, c.work.sensed, BY_TIME)
+            way[S.tree.q[b]] = law[0] - S.bodies.offset[b] - self.q[S.tree.q[b]]
+        at = S.angles.state
+        c.z[at] = self._start.compiled.z[at] + self._by_coordinates @ way
+
+    @property
+    def _by_coordinates(self) -> np.ndarray:
+        """How turned angles follow the coordinates, (angles, nq); found when first asked for.
+
+        Angles that are coordinates of tree joints are these; in the plane all others follow from how far bodies have
+        turned. In space the pose of a body that hangs freely is the same after a whole turn.
+        """
+        if "_turning" not in vars(self):
+            c = self._start.compiled.again()
+            before = self._turned(c, self.q)
+            columns = [(self._turned(c, self.q + FULL_TURN * e) - before) / FULL_TURN for e in np.eye(len(self.q))]
+            vars(self)["_turning"] = np.rint(np.array(columns)).T
+        return vars(self)["_turning"]  # type: ignore[no-any-return]
+
+    def _turned(self, c: CompiledMechanism, q: np.ndarray) -> np.ndarray:
+        """Turned angles as far as the coordinates tell them, (angles,); their differences are what counts."""
+        s, S = c.structure, c.values.system
+        if not s.model.planar:
+            known = {s.state_at[name]: angle for name, angle in c.turned(q).items() if name in s.state_at}
+            return np.array([known.get(state, 0.0) for state in S.angles.state.tolist()])
+        c.at(0.0, q, np.zeros(s.nv))
+        angles = turned_angles(c.values, c.work, q)
+        of = {-1: 0.0} | {s.place[name]: float(angle) for name, angle in angles.items()}
+        return np.array(
+            [of[int(S.frame_body[M])] - of[int(S.frame_body[F])] for F, M, _ in zip(*S.angles, strict=True)]
+        )
+
+    def _state(self, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Copies as floats, refused if there are more or less than there must be."""
+        out = []
+        for name, x, known in (("q", q, self.q), ("v", v, self.v)):
+            found = np.array(x)
+            if found.dtype.kind not in "iuf":
+                raise ModelError(f"{name} holds {found.dtype.name} numbers; coordinates and velocities are real")
+            if found.shape != known.shape:
+                raise ModelError(
+                    f"{name} has the shape {found.shape}; {self.model.name!r} has {len(known)} numbers there in these "
+                    f"coordinates, as p.{name} has"
+                )
+            if not np.isfinite(found).all():
+                raise ModelError(f"{name} of {self.model.name!r} is not finite: {found}")
+            out.append(found.astype(float))
+        return out[0], out[1]
+
+    def _carried(self, c: CompiledMechanism, name: str) -> tuple[int, np.ndarray, np.ndarray]:
+        """Row of the body that carries a frame (-1: ground), its origin and axes seen from there."""
+        if name == GROUND:
+            return -1, np.zeros(3), np.eye(3)
+        e = self.model[name]
+        if e.category not in ("bodies", "frames"):
+            raise ModelError(f"{e.title} has no pose; ask for a body or a frame")
+        p, R = c.values.poses.named(name)
+        body = c.values.bodies[e.body if isinstance(e, Frame) else name]
+        b = c.structure.place[e.body if isinstance(e, Frame) else name]
+        return b, body.R.T @ (p - body.c), body.R.T @ R
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrepareOptions(Options):
+    """What `Mechanism.prepare` is asked."""
+
+    coordinates: str
+    parameters: Mapping[str, float] | None
+
+
+def prepare(model: Model, o: PrepareOptions) -> Prepared:
+    """A mechanism made ready: see `Mechanism.prepare`."""
+    refuse_unsupported(model, "prepare", SLIDING)
+    return Prepared(find_initial_state(model.snapshot(), 0.0, o.parameters, None, o.coordinates))

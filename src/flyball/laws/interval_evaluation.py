@@ -1,0 +1,379 @@
+"""A law's program as a list of operations, evaluated over intervals of time: ranges of values and slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..math.scalar import integer_power
+from ..math.spline import BREAKS, PIECE, spline
+from .bytecode import (
+    ABS,
+    ACOS,
+    ADD,
+    ASIN,
+    ATAN2,
+    BLEND,
+    CALL,
+    CONSTANT,
+    COS,
+    COUNT,
+    DIVIDE,
+    FREEZE,
+    FUNCTION,
+    INPUT,
+    LESS,
+    LESS_EQUAL,
+    LOG,
+    LOW_DEGREE,
+    MAXIMUM,
+    MINIMUM,
+    MULTIPLY,
+    NEGATE,
+    NOT,
+    POWER,
+    SENSOR,
+    SIGN,
+    SIN,
+    SQRT,
+    SUBTRACT,
+    TABLE,
+    TAN,
+    WHERE,
+    WHOLE_POWER,
+    combine_values,
+    function_slopes,
+    function_value,
+    power_slopes,
+)
+from .interval_arithmetic import (
+    Range,
+    TableRanges,
+    atan2_ranges,
+    function_ranges,
+    integer_power_range,
+    range_difference,
+    range_hull,
+    range_product,
+    range_reciprocal,
+    range_sum,
+    real_power_ranges,
+)
+
+CONSTANT_IN_TIME, TIME_ONLY, STATE_DEPENDENT = range(3)  # what a step depends on
+SLOPE_JUMP_TOLERANCE = 1e-9  # part of their size by which pieces of a table may differ where they meet
+
+
+class Step(NamedTuple):
+    """One operation: on which earlier steps, what it depends on, whether it is true or false rather than a number."""
+
+    operation: int
+    operand: int
+    args: tuple[int, ...]
+    on: int
+    logical: bool = False
+
+
+class Corner(NamedTuple):
+    """Step ``at`` has a corner or jumps where step ``of`` reaches one of ``levels`` (repeated with ``period``).
+
+    ``touched``: also where the argument only touches the level.
+    """
+
+    at: int
+    of: int
+    levels: np.ndarray
+    period: float = 0.0
+    touched: bool = False
+
+
+def read_steps(code: Sequence[int], at: int) -> list[Step]:
+    """The steps of the law that starts at ``at``; comparisons have the difference that decides as a third argument."""
+    out: list[Step] = []
+    stack: list[int] = []
+    for i in range(at + 2, at + 2 + 2 * int(code[at]), 2):
+        operation, operand = int(code[i]), int(code[i + 1])
+        if operation in (CONSTANT, INPUT, SENSOR):
+            on = (
+                CONSTANT_IN_TIME
+                if operation == CONSTANT
+                else TIME_ONLY
+                if operation == INPUT and operand == 0
+                else STATE_DEPENDENT
+            )
+            out.append(Step(operation, operand, (), on))
+        else:
+            count = int(code[operand + COUNT]) if operation == FUNCTION else _operand_count(operation)
+            args = tuple(stack[len(stack) - count :])
+            del stack[len(stack) - count :]
+            out += _on(out, operation, operand, args)
+        stack.append(len(out) - 1)
+    return out
+
+
+def _operand_count(operation: int) -> int:
+    return 3 if operation in (WHERE, BLEND) else 2 if operation >= ADD else 1
+
+
+def _on(before: list[Step], operation: int, operand: int, args: tuple[int, ...]) -> list[Step]:
+    """A step, after the difference that decides where it compares."""
+    on = STATE_DEPENDENT if operation == FUNCTION else max(before[k].on for k in args)
+    logical = operation == CALL and operand == NOT
+    if operation in (LESS, LESS_EQUAL, MINIMUM, MAXIMUM):
+        logical = operation in (LESS, LESS_EQUAL) or before[args[0]].logical
+        if operation in (LESS, LESS_EQUAL) or not logical:
+            a, b = args if operation in (MINIMUM, MAXIMUM) else args[::-1]
+            difference = Step(SUBTRACT, 0, (a, b), on)
+            return [difference, Step(operation, operand, (*args, len(before)), on, logical)]
+    return [Step(operation, operand, args, on, logical)]
+
+
+def step_may_be_brief(step: Step, steps: Sequence[Step]) -> bool:
+    """Whether a step can do much within a short time, or a short way: see ``manner.brief``."""
+    if step.operation == CALL:
+        return step.operand not in (SIN, COS, NEGATE)
+    if step.operation == WHOLE_POWER:
+        return not 0 <= step.operand <= LOW_DEGREE
+    if step.operation == DIVIDE:
+        return steps[step.args[1]].on != CONSTANT_IN_TIME
+    return not (step.operation <= SENSOR or step.operation in (FREEZE, BLEND) or ADD <= step.operation <= MULTIPLY)
+
+
+def required_steps(steps: Sequence[Step], targets: Sequence[int]) -> list[int]:
+    """The steps that some steps are made from, these included, in order."""
+    found = set(targets)
+    for k in range(len(steps) - 1, -1, -1):
+        if k in found:
+            found.update(steps[k].args)
+    return sorted(found)
+
+
+def find_corners(steps: Sequence[Step], const: np.ndarray) -> list[Corner]:
+    """Where steps of time alone may have corners or jump, or an end of their domain; inner ones first."""
+    out = []
+    zero = np.zeros(1)
+    for k, s in enumerate(steps):
+        if s.on != TIME_ONLY:
+            continue
+        if s.operation == CALL and s.operand in (SIGN, ABS, LOG):
+            out.append(Corner(k, s.args[0], zero))
+        elif (s.operation == CALL and s.operand == SQRT) or s.operation == POWER:
+            out.append(Corner(k, s.args[0], zero, touched=True))
+        elif s.operation == CALL and s.operand in (ASIN, ACOS):
+            out.append(Corner(k, s.args[0], np.array([-1.0, 1.0]), touched=True))
+        elif s.operation == CALL and s.operand == TAN:
+            out.append(Corner(k, s.args[0], np.array([0.5 * np.pi]), np.pi))
+        elif s.operation in (DIVIDE, ATAN2) and steps[s.args[s.operation == DIVIDE]].on == TIME_ONLY:
+            out.append(Corner(k, s.args[s.operation == DIVIDE], zero))
+        elif s.operation == WHOLE_POWER and s.operand < 0:
+            out.append(Corner(k, s.args[0], zero))
+        elif s.operation == TABLE and len(levels := table_corners(const, s.operand)):
+            out.append(Corner(k, s.args[0], levels, float(const[s.operand])))
+        elif len(s.args) == 3 and s.operation not in (WHERE, BLEND):
+            out.append(Corner(k, s.args[2], zero))
+    return out
+
+
+def table_corners(const: np.ndarray, at: int) -> np.ndarray:
+    """Breaks of a table at which its slope or its curvature jumps."""
+    count = int(const[at + 1])
+    x = np.asarray(const[at + BREAKS : at + BREAKS + count], float)
+    first = at + BREAKS + count
+    c = np.asarray(const[first : first + PIECE * (count + 1)], float).reshape(count + 1, PIECE)
+    width = np.r_[0.0, np.diff(x)]  # what the piece before each break counts from its own origin
+    before, after = c[:-1], c[1:]
+    if const[at] > 0.0:  # the last break is the first again
+        before, after, x = np.vstack([c[count - 1], c[1 : count - 1]]), c[1:count], x[:-1]
+        width = np.r_[width[-1], width[1:-1]]
+    w = np.maximum(width, np.r_[width[1:], width[-1]])
+    slope = before[:, 1] + width * (2.0 * before[:, 2] + 3.0 * width * before[:, 3])
+    curve = 2.0 * before[:, 2] + 6.0 * width * before[:, 3]
+    size = sum((np.abs(before[:, k]) + np.abs(after[:, k])) * w**k for k in (1, 2, 3))
+    gap = np.abs(after[:, 1] - slope) * w + np.abs(2.0 * after[:, 2] - curve) * w * w
+    return x[~(gap <= SLOPE_JUMP_TOLERANCE * size)]
+
+
+JetRange = tuple[Range, Range]
+ZERO_RANGE: Range = (0.0, 0.0)
+Signs = Mapping[int, Any]
+NO_SIGNS: Signs = MappingProxyType({})
+
+
+class IntervalLaw:
+    """The steps of a law, and the constants and tables that they name."""
+
+    def __init__(self, steps: Sequence[Step], const: np.ndarray) -> None:
+        self.steps, self.const = steps, np.asarray(const, float)
+        self.curves = {s.operand: TableRanges(self.const, s.operand) for s in steps if s.operation == TABLE}
+        self.fixed: dict[int, float] = {}  # values of what depends on nothing
+        for k, s in enumerate(steps):
+            if s.on == CONSTANT_IN_TIME:
+                self.fixed[k] = float(self._point(s, self.fixed, np.zeros(1)))
+
+    def points(
+        self, requested: Sequence[int], t: np.ndarray, signs: Signs = NO_SIGNS
+    ) -> tuple[dict[int, Any], dict[int, Any]]:
+        """Values and slopes of steps at times; ``signs`` as in `enclose`, for times at which a step jumps."""
+        v: dict[int, Any] = {}
+        d: dict[int, Any] = {}
+        for k in requested:
+            s = self.steps[k]
+            if s.on == CONSTANT_IN_TIME:
+                v[k], d[k] = self.fixed[k], 0.0
+            else:
+                v[k] = _on_side(s, [v[n] for n in s.args], signs[k]) if k in signs else None
+                v[k] = self._point(s, v, t) if v[k] is None else v[k]
+                d[k] = self._slope(s, v, d, v[k])
+        return v, d
+
+    def _point(self, s: Step, v: Mapping[int, Any], t: np.ndarray) -> Any:
+        a = [v[k] for k in s.args]
+        if s.operation == CONSTANT:
+            return self.const[s.operand]
+        if s.operation == INPUT:
+            return t
+        if s.operation == CALL:
+            return function_value(s.operand, a[0])
+        if s.operation == WHOLE_POWER:
+            return integer_power(a[0], s.operand)
+        if s.operation == TABLE:
+            return spline(self.const, s.operand, a[0])[0]
+        if s.operation == WHERE:
+            return np.where(np.asarray(a[0]) > 0.5, a[1], a[2])
+        return a[0] if s.operation == FREEZE else np.asarray(combine_values(s.operation, a[0], a[1]))
+
+    def _slope(self, s: Step, v: Mapping[int, Any], d: Mapping[int, Any], f: Any) -> Any:
+        a, b = [v[k] for k in s.args], [d[k] for k in s.args]
+        o = s.operation
+        if o == INPUT:
+            return 1.0
+        if o == CALL:
+            return function_slopes(s.operand, a[0], f)[0] * b[0]
+        if o == WHOLE_POWER:
+            return power_slopes(a[0], s.operand)[0] * b[0]
+        if o == TABLE:
+            return spline(self.const, s.operand, a[0])[1] * b[0]
+        if o == WHERE:
+            return np.where(np.asarray(a[0]) > 0.5, b[1], b[2])
+        if o in (ADD, SUBTRACT):
+            return b[0] + b[1] if o == ADD else b[0] - b[1]
+        if o == MULTIPLY:
+            return b[0] * a[1] + a[0] * b[1]
+        if o == DIVIDE:
+            return (b[0] - f * b[1]) / a[1]
+        if o == POWER:
+            return power_slopes(a[0], a[1])[0] * b[0]
+        if o == ATAN2:
+            return (a[1] * b[0] - a[0] * b[1]) / (a[0] * a[0] + a[1] * a[1])
+        if o in (MINIMUM, MAXIMUM) and len(a) == 3:
+            return np.where(np.asarray(a[2]) > 0.0, b[o == MINIMUM], b[o == MAXIMUM])
+        return b[0] if o == FREEZE else 0.0
+
+    def enclose(self, requested: Sequence[int], t: Range, signs: Signs) -> dict[int, JetRange]:
+        """Ranges of steps and of their slopes over intervals of time.
+
+        ``signs`` are the signs, in each interval, of what decides at a step with a corner.
+        """
+        out: dict[int, JetRange] = {}
+        for k in requested:
+            s = self.steps[k]
+            if s.on == CONSTANT_IN_TIME:
+                out[k] = (self.fixed[k], self.fixed[k]), ZERO_RANGE
+            elif s.operation == INPUT:
+                out[k] = t, (1.0, 1.0)
+            else:
+                out[k] = self._range(s, [out[n] for n in s.args], signs.get(k))
+        return out
+
+    def _range(self, s: Step, a: list[JetRange], sign: Any) -> JetRange:
+        o = s.operation
+        f, d = a[0]
+        if o == FREEZE:
+            return f, d
+        if o == TABLE:
+            g, slope = self.curves[s.operand].ranges(f)
+            return g, range_product(slope, d)
+        if o == WHOLE_POWER:
+            n = s.operand
+            slope = range_product((float(n), float(n)), integer_power_range(f, n - 1)) if n != 0 else ZERO_RANGE
+            return integer_power_range(f, n), range_product(slope, d)
+        if o == CALL:
+            return _function_on_side(s.operand, f, d, sign)
+        if o == WHERE:
+            yes, no = f[0] > 0.5, f[1] < 0.5
+            return _condition_range(yes, no, a[1][0], a[2][0]), _condition_range(yes, no, a[1][1], a[2][1])
+        if o in (LESS, LESS_EQUAL):
+            return ((0.0, 1.0) if sign is None else (np.where(sign > 0, 1.0, 0.0),) * 2), ZERO_RANGE
+        if o in (MINIMUM, MAXIMUM):
+            return _extreme(o, a, sign)
+        return _arithmetic(o, a, sign)
+
+
+def _on_side(s: Step, a: list[Any], sign: Any) -> Any:
+    """Value of a step with a corner, on the side of it that a sign says; None where that makes no difference."""
+    if s.operation == CALL and s.operand in (ABS, SIGN):
+        return sign * a[0] if s.operand == ABS else sign
+    if s.operation in (LESS, LESS_EQUAL):
+        return np.where(sign > 0, 1.0, 0.0)
+    if s.operation in (MINIMUM, MAXIMUM):
+        return np.where((sign > 0) == (s.operation == MAXIMUM), a[0], a[1])
+    if s.operation == ATAN2:
+        return np.arctan2(np.where(a[0] * sign <= 0.0, np.copysign(0.0, sign), a[0]), a[1])
+    return None
+
+
+def _condition_range(yes: Any, no: Any, a: Range, b: Range) -> Range:
+    """The range a, b, or both."""
+    lo, hi = np.minimum(a[0], b[0]), np.maximum(a[1], b[1])
+    return np.where(yes, a[0], np.where(no, b[0], lo)), np.where(yes, a[1], np.where(no, b[1], hi))
+
+
+def _function_on_side(number: int, f: Range, d: Range, sign: Any) -> JetRange:
+    if number in (ABS, SIGN) and sign is not None:
+        s = (sign, sign)
+        if number == SIGN:
+            return s, ZERO_RANGE
+        lo, hi = range_product(s, f)
+        return (np.maximum(lo, 0.0), hi), range_product(s, d)
+    if number == NOT:
+        return (1.0 - f[1], 1.0 - f[0]), ZERO_RANGE
+    g, slope = function_ranges(number, f)
+    return g, range_product(slope, d)
+
+
+def _extreme(o: int, a: list[JetRange], sign: Any) -> JetRange:
+    """The lesser or greater of two; of truths, whether both or one holds."""
+    pick = np.minimum if o == MINIMUM else np.maximum
+    (f, d), (g, e) = a[0], a[1]
+    if len(a) == 2 or sign is None:
+        return (pick(f[0], g[0]), pick(f[1], g[1])), range_hull([*d, *e])
+    first = (sign > 0) == (o == MAXIMUM)
+    return _condition_range(first, ~first, f, g), _condition_range(first, ~first, d, e)
+
+
+def _arithmetic(o: int, a: list[JetRange], sign: Any) -> JetRange:
+    (f, d), (g, e) = a[0], a[1]
+    if o == ADD:
+        return range_sum(f, g), range_sum(d, e)
+    if o == SUBTRACT:
+        return range_difference(f, g), range_difference(d, e)
+    if o == MULTIPLY:
+        return range_product(f, g), range_sum(range_product(d, g), range_product(f, e))
+    if o == DIVIDE:
+        if sign is not None:
+            g = np.where(sign > 0, np.maximum(g[0], 0.0), g[0]), np.where(sign > 0, g[1], np.minimum(g[1], 0.0))
+        q = range_product(f, range_reciprocal(g))
+        return q, range_product(range_difference(d, range_product(q, e)), range_reciprocal(g))
+    if o == POWER:
+        p, slope = real_power_ranges(f, g[0])
+        return p, range_product(slope, d)
+    if o == ATAN2:
+        if sign is not None:
+            up, down = (sign > 0) & (f[0] <= 0.0), (sign < 0) & (f[1] >= 0.0)
+            f = np.where(up, 0.0, f[0]), np.where(down, -0.0, f[1])
+        p, by_y, by_x = atan2_ranges(f, g)
+        return p, range_sum(range_product(by_y, d), range_product(by_x, e))
+    return (-np.inf, np.inf), (-np.inf, np.inf)

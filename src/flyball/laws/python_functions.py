@@ -1,0 +1,394 @@
+"""Python functions of users compiled to code that laws can call, and the report of a call that failed.
+
+A function of numbers is compiled by Numba where Numba can; otherwise it is called back in Python, and a notice
+says so. The code is kept as long as the function lives. It is made again when something that the function reads
+from outside (a global name, an enclosing function) has changed.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import signal
+import threading
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from inspect import CO_VARARGS
+from types import CellType, CodeType, FunctionType, ModuleType
+from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import WeakKeyDictionary, WeakValueDictionary, ref
+
+import numpy as np
+
+from ..compiler.formulas import LOCK
+from ..compiler.kernels import short_reason
+from ..errors import ExpressionError, PerformanceNotice, warn_user
+from ..model.expression_parser import MAX_ARGUMENTS, FunctionCall, function_name
+from .bytecode import COMPILED_FUNCTIONS, STACK_RESERVE
+
+if TYPE_CHECKING:
+    from ..model.table import Table
+
+
+_compiled_functions: WeakKeyDictionary[FunctionType, dict[int, CompiledFunction]] = WeakKeyDictionary()
+_equal_functions: WeakValueDictionary[Any, CompiledFunction] = (
+    WeakValueDictionary()
+)  # compiled functions, by all that decides their code
+_notified: WeakValueDictionary[int, Any] = WeakValueDictionary()
+
+
+class CompiledFunction:
+    """Machine code for a Python function of ``count`` numbers, at ``address`` as long as this object lives.
+
+    ``python`` is the function itself, ``reason`` says why it is called back instead of compiled ("" if compiled).
+    """
+
+    def __init__(self, python: Callable[..., Any], count: int) -> None:
+        self.python, self.count = python, count
+        self.original: Callable[[], Any] = lambda: None  # the function that ``python`` is a twin of, if it lives
+        self.outside: tuple[Any, ...] = ()
+        self.equal: CompiledFunction | None = None
+        self._code: Any = None
+        key = None
+        self.reason = ""
+        self.raised: list[Exception] = []  # the last exception of a call from compiled code, where it can be known
+        if isinstance(python, FunctionType):
+            self.outside = _outside(python, set())
+            key = _decisive(python, count, self.outside)
+            self.equal = _equal_functions.get(key)  # its code serves this one, and lives as long
+            try:
+                self._code = self.equal._code if self.equal else _compiled(python, count)
+            except Exception as error:  # Numba gives up in many ways
+                self.reason = short_reason(error)
+        else:
+            self.reason = f"it is no plain function but a {type(python).__name__}"
+        if self.reason:
+            self._code = _callback(python, count, self.raised)
+        code = self._code
+        self.address = code.address if hasattr(code, "address") else ctypes.cast(code, ctypes.c_void_p).value or 0
+        COMPILED_FUNCTIONS.setdefault(self.address, self)
+        if key is not None and not self.reason and not self.equal:
+            _equal_functions[key] = self
+
+    @property
+    def stale(self) -> bool:
+        """Whether what the function takes from outside, or the function, is no longer what was compiled."""
+        plain = self.original()
+        return isinstance(plain, FunctionType) and not _same(self.outside, _outside(plain, set()))
+
+    def __reduce__(self) -> Any:
+        raise TypeError(
+            f"the code of the Python function '{function_name(self.python)}' stands at an address of this process and "
+            f"cannot be sent to another; send the mechanism, or use threads"
+        )
+
+
+def compile_function(request: FunctionCall) -> CompiledFunction:
+    """The code of a Python function that a law calls."""
+    count = len(request.names)
+    plain: Any = getattr(request.function, "py_func", request.function)  # the Python under Numba's decorators
+    with LOCK:
+        if not isinstance(plain, FunctionType):
+            made = CompiledFunction(plain, count)
+        else:
+            codes = _compiled_functions.setdefault(plain, {})
+            if count not in codes or not _same(codes[count].outside, _outside(plain, set())):
+                # the key must not be kept by what it leads to
+                codes[count] = CompiledFunction(_twin(plain, plain.__globals__, plain.__closure__), count)
+                codes[count].original = ref(plain)
+            made = codes[count]
+    if made.reason:
+        _notify_callback(request, plain, made.reason)
+    return made
+
+
+def _compiled(function: FunctionType, count: int) -> Any:
+    """The function compiled by Numba, behind the calling convention of `call`; a failure leaves nan."""
+    from numba import carray, cfunc, config, types
+    from numba.core.errors import NumbaWarning
+
+    if getattr(config, "DISABLE_JIT", False):
+        return _callback(function, count, [])
+    if MAX_ARGUMENTS != 6:
+        raise RuntimeError("the arguments below are six")
+    f = _translatable(function, {})
+    rows, last = max(count, 1), max(count - 1, 0)
+
+    def law(p):
+        x = carray(p, (rows, 3))[:, 0]
+        args = (x[0], x[min(1, last)], x[min(2, last)], x[min(3, last)], x[min(4, last)], x[min(5, last)])
+        try:
+            p[1] = f(*args[:count])
+        except Exception:  # `function_fault` runs the function again and finds it
+            p[1] = np.nan
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NumbaWarning)  # hints for those who write for Numba
+        return cfunc(types.void(types.CPointer(types.float64)))(law)
+
+
+def _callback(function: Callable[..., Any], count: int, raised: list[Exception]) -> Any:
+    """A way from compiled code back into Python; what the function raises last is kept in a list."""
+    places = [3 * k for k in range(count)]
+
+    def law(p: Any) -> None:
+        try:
+            p[1] = function(*[p[k] for k in places])
+        except (
+            BaseException
+        ) as error:  # nothing may escape into compiled code; `function_fault` runs the function again
+            raised[:] = [error] if isinstance(error, Exception) else raised
+            p[1] = np.nan
+
+    return ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_double))(law)
+
+
+def _translatable(function: FunctionType, done: dict[FunctionType, Any]) -> Any:
+    """The function for Numba, plain Python functions that it calls included."""
+    from numba import njit
+
+    if function in done:
+        return done[function]
+    scope: dict[str, Any] = {"__builtins__": __builtins__, "__name__": function.__module__}
+    closure = tuple(CellType() for _ in function.__closure__ or ())
+    made = done[function] = njit(boundscheck=True)(_by_place(_twin(function, scope, closure)))
+
+    def known(name: str, value: Any) -> Any:
+        if isinstance(value, list | set | dict):  # Numba would take a copy, for good
+            raise TypeError(f"'{name}' is a {type(value).__name__}, which may change; an array or a tuple would do")
+        if isinstance(value, FunctionType) and str(value.__module__).partition(".")[0] not in ("numpy", "flyball"):
+            return _translatable(value, done)
+        return value
+
+    names = _names(function.__code__)
+    scope.update({k: known(k, v) for k, v in function.__globals__.items() if k in names})
+    for name, cell, original in zip(function.__code__.co_freevars, closure, function.__closure__ or (), strict=True):
+        cell.cell_contents = known(name, original.cell_contents)
+    return made
+
+
+def _twin(function: FunctionType, scope: dict[str, Any], closure: tuple | None) -> FunctionType:
+    """The same function as another object."""
+    twin = FunctionType(function.__code__, scope, function.__name__, function.__defaults__, closure or None)
+    twin.__kwdefaults__ = function.__kwdefaults__
+    twin.__module__, twin.__qualname__ = function.__module__, function.__qualname__
+    return twin
+
+
+def _by_place(function: FunctionType) -> FunctionType:
+    """The function with arguments by keyword only made ordinary ones, as Numba wants them for a call by place."""
+    code, by_keyword = function.__code__, function.__kwdefaults__ or {}
+    count = code.co_kwonlyargcount
+    names = code.co_varnames[code.co_argcount : code.co_argcount + count]
+    if count and len(by_keyword) == count and not code.co_flags & CO_VARARGS:
+        function.__code__ = code.replace(co_argcount=code.co_argcount + count, co_kwonlyargcount=0)
+        function.__defaults__ = (*(function.__defaults__ or ()), *(by_keyword[name] for name in names))
+        function.__kwdefaults__ = None
+    return function
+
+
+def _names(code: CodeType) -> set[str]:
+    """Global names and attributes that code uses, functions inside it included."""
+    return set(code.co_names).union(*(_names(c) for c in code.co_consts if isinstance(c, CodeType)))
+
+
+def _outside(function: FunctionType, done: set[int]) -> tuple[Any, ...]:
+    """What a function takes from outside, in a form that can be compared later."""
+    if id(function) in done:
+        return ()
+    done.add(id(function))
+    names = _names(function.__code__)
+    found = [(k, v) for k, v in function.__globals__.items() if k in names]
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        with suppress(ValueError):  # not filled yet
+            found.append((name, cell.cell_contents))
+    out: list[Any] = [function.__code__, function.__defaults__]
+    for name, value in found:
+        if isinstance(value, FunctionType):
+            out.append((name, _outside(value, done)))
+        elif isinstance(value, ModuleType):
+            inside = [(k, value.__dict__[k]) for k in sorted(names) if k in value.__dict__]
+            out.append((name, value))
+            out += [(name, k, _frozen(v)) for k, v in inside if isinstance(v, bool | int | float | tuple | np.ndarray)]
+        else:
+            out.append((name, type(value), _frozen(value)))
+    return tuple(out)
+
+
+def _decisive(function: FunctionType, count: int, outside: tuple[Any, ...]) -> tuple[Any, ...] | None:
+    """All that decides what a function is compiled to, but not where it stands; None if that has no hash."""
+    code = function.__code__.replace(co_filename="", co_name="", co_qualname="", co_firstlineno=1, co_linetable=b"")
+    by_keyword = function.__kwdefaults__ or {}
+    given = (*(function.__defaults__ or ()), *by_keyword.values())
+    key = (count, code, tuple(by_keyword), *((type(x), _frozen(x)) for x in given), *outside[2:])
+    try:
+        hash(key)
+    except TypeError:
+        return None
+    return key
+
+
+def _frozen(value: Any) -> Any:
+    """A value as it is now: of an array a copy of its numbers, of a number all its bits and, in a tuple, its type."""
+    if isinstance(value, float):
+        return value.hex()
+    if isinstance(value, tuple):
+        return tuple((type(x), _frozen(x)) for x in value)
+    return (value.dtype, value.shape, value.tobytes()) if isinstance(value, np.ndarray) else value
+
+
+def _same(a: Any, b: Any) -> bool:
+    try:
+        return bool(a == b)
+    except Exception:  # things that do not compare
+        return False
+
+
+def _notify_callback(request: FunctionCall, function: Any, reason: str) -> None:
+    """Say once for each function that it is called back in Python."""
+    owner = getattr(function, "__func__", function)
+    owner = getattr(owner, "__code__", owner)  # a function made in a loop is one
+    if _notified.get(id(owner)) is owner:
+        return
+    with suppress(TypeError):  # of what cannot be referred to weakly it is told again
+        _notified[id(owner)] = owner
+    warn_user(
+        f"{request.where + ': ' if request.where else ''}the Python function '{function_name(function)}' cannot "
+        f"be compiled ({reason}). It is called back in Python: a call takes microseconds, with arrays tens of them, "
+        f"where compiled code takes some ten nanoseconds, and simulations on several threads wait for each other "
+        f"there. Use only numbers, arrays, math and NumPy in it, or give an expression or a Table",
+        PerformanceNotice,
+    )
+
+
+class CalledFunction(NamedTuple):
+    """A Python function as some law calls it."""
+
+    native: CompiledFunction
+    names: tuple[str, ...]  # its arguments; "" where a default is given
+    text: str
+    where: str  # what it is the law of
+
+    @property
+    def title(self) -> str:
+        """What it is, for messages."""
+        return f"{self.where + ': ' if self.where else ''}the Python function {self.text}"
+
+
+class FunctionFault(NamedTuple):
+    """A call of a Python function that gave no finite number: with which arguments, and what it raised, if it did."""
+
+    function: CalledFunction
+    arguments: tuple[float, ...]
+    exception: Exception | None
+    value: float
+
+    @property
+    def message(self) -> str:
+        """What happened, in words."""
+        given = zip(self.function.names, self.arguments, strict=True)
+        listed = ", ".join(f"{name} = {x:.6g}" for name, x in given if name)
+        at = f" for {listed}" if listed else ""
+        if isinstance(self.exception, ExpressionError):
+            return f"{self.function.title}{at}: {self.exception}"
+        if self.exception is None:
+            return f"{self.function.title} gives {self.value}{at}; it must give a finite number"
+        return f"{self.function.title} raises {type(self.exception).__name__}{at}: {self.exception}"
+
+
+class TableFault(NamedTuple):
+    """A table that a law asked for a value that it has not."""
+
+    where: str  # what it is the law of
+    table: Table
+    x: float
+    t: float
+    exception: None = None
+
+    @property
+    def message(self) -> str:
+        """What happened, in words."""
+        return f"{self.where}: at t = {self.t:.6g} s {self.table.out_of_range_message(self.x)}"
+
+
+def table_fault(stack: np.ndarray, laws: Mapping[int, str], tables: Mapping[int, Table]) -> TableFault | None:
+    """The last law that a table left without a value, or None.
+
+    Parameters
+    ----------
+    stack : array
+        Scratch of the laws after a run; its last `STACK_RESERVE` rows hold the record.
+    laws, tables : mapping
+        What each law is the law of, by its start in the code; tables by their place among the constants.
+    """
+    record = np.real(stack[-STACK_RESERVE:])
+    if not (record[0, 0] > 0.0 and record[0, 1] < 0.0):
+        return None
+    return TableFault(laws[int(record[0, 0]) - 1], tables[int(record[0, 2])], float(record[1, 0]), float(record[1, 1]))
+
+
+def function_fault(
+    stack: np.ndarray, functions: Sequence[CalledFunction], overcome: bool = False
+) -> FunctionFault | None:
+    """The last call of a Python function that gave no finite number, or None.
+
+    The Python function is run again with the same arguments, for the exception that compiled code does not tell. A
+    function with a memory may not raise it again; then it is the one that it raised last, if that is known.
+
+    Parameters
+    ----------
+    stack : array
+        Scratch of the laws after a run; its last `STACK_RESERVE` rows hold the record.
+    functions : sequence of Called
+        What `compile_law` appended to its list.
+    overcome : bool
+        Ask for a call in a step that was taken again, shorter, and then did without such a call.
+    """
+    record = np.real(stack[-STACK_RESERVE:])
+    at = -record[0, 0] if overcome else record[0, 0]
+    if not at > 0.0 or record[0, 1] < 0.0:
+        return None
+    function = functions[int(at) - 1]
+    arguments = tuple(record[1:].ravel()[: int(record[0, 1])].tolist())
+    value, error = float(record[0, 2]), None
+    try:
+        given = function.native.python(*arguments)
+    except Exception as raised:
+        error = raised
+    else:
+        try:
+            value = float(given)
+        except (TypeError, ValueError):
+            error = ExpressionError(f"it returned {given!r} ({type(given).__name__}); a law returns a number")
+    if error is None and np.isfinite(value) and function.native.raised:
+        error = function.native.raised[0]
+    return FunctionFault(function, arguments, error, value)
+
+
+def clear_faults(stack: np.ndarray) -> None:
+    """Wipe the record of a fault, as before a run: an analysis may try positions that a law is not made for."""
+    stack[-STACK_RESERVE:] = 0.0
+
+
+def deferred_interrupts(functions: Sequence[CalledFunction]) -> AbstractContextManager[None]:
+    """Keep the user's interrupt until compiled code has returned, where that calls back into Python.
+
+    Python would raise KeyboardInterrupt on entering the callback, and ctypes would swallow it.
+    """
+    return _deferring_interrupts(functions) if functions else nullcontext()
+
+
+@contextmanager
+def _deferring_interrupts(functions: Sequence[CalledFunction]) -> Iterator[None]:
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or not any(f.native.reason for f in functions) or signal.getsignal(signal.SIGINT) is None:
+        yield
+        return
+    asked: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: asked.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if asked:
+        signal.raise_signal(signal.SIGINT)

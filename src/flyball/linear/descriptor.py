@@ -1,0 +1,343 @@
+"""Linear equations with the constraints left in (descriptor form), sparse for large mechanisms.
+
+    M x'' + D x' + K x = G^T l,   G x = 0
+
+G has independent rows only, so that the equations have one solution. Large mechanisms at rest stay sparse, in
+absolute coordinates; refused is what `linearize` refuses of small ones, found by sparse means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..assembly.positions_and_velocities import closed_position_near
+from ..derivatives.equation_derivatives import (
+    EquationDerivatives,
+    MechanismState,
+    has_reaction_friction,
+    prescription_derivatives,
+)
+from ..derivatives.nonsmooth_points import nonsmooth_error, nonsmooth_points
+from ..derivatives.output_derivatives import curve_derivatives, curve_gradients, refuse_undetermined_outputs_sparse
+from ..derivatives.reduced_equations import NEARBY_STEP as AWAY
+from ..derivatives.reduced_equations import (
+    FreeCoordinates,
+    TurningFrame,
+    massless_motion_error,
+    massless_rotations,
+    minimum_norm_solution,
+    prescribed_rows,
+    singular_position_error,
+)
+from ..derivatives.steady_motion import (
+    COEFFICIENT_TOLERANCE,
+    COMPARISON_ANGLE,
+    has_time_laws,
+    refuse_unbalanced,
+    time_dependence_error,
+)
+from ..engine.kinematics import retract
+from ..errors import AnalysisError, SingularityError
+from ..mobility.null_spaces import scaled_jacobian
+from ..model.element_laws import Input
+from ..numerics.eigen import QuadraticPencil
+from ..numerics.sparse_rank import weak_pivots
+from ..results.linear_model import Descriptor
+from ..tables.structure_definition import velocity_names
+from ..tables.values import Values
+
+
+def values_with_input_step(e: EquationDerivatives, i: Input) -> Values:
+    """Numbers of the mechanism, a complex step along an input."""
+    return e.stepped_law(i.parameter) if i.parameter != i.name else e.stepped(i.name)
+
+
+def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Derivatives by the inputs of the equations of motion, of all constraints, and of these on velocities.
+
+    (nv, inputs), then (rows and prescribed coordinates, inputs) twice.
+    """
+    by, g, n = [], [], []
+    for i in inputs:
+        values = values_with_input_step(e, i)
+        by.append(e.by_values(values))
+        told = prescription_derivatives(e.state, values)
+        g.append(told[0])
+        n.append(told[1])
+    W = np.array(by).reshape(len(inputs), e.width).T
+    prescribed = len(e.state.c.structure.prescribed)
+    given, rates = (np.array(part).reshape(len(inputs), prescribed).T for part in (g, n))
+    return W[e.at["r"]], np.vstack([W[e.at["g"]], given]), np.vstack([W[e.at["n"]], rates])
+
+
+DENSE_VELOCITIES = 600  # velocities up to which the constraints are taken out and all is dense, and
+DENSE_FREEDOMS = 150  # freedoms, as counted: what is dense of more takes longer than all that is sparse
+PARTICIPATION = 1e-3  # of a dependency: elements with less have none in it
+LOST_DEPENDENCY = 1e-6  # of rows of unit size: dependencies that nearby rows change by as much are none there
+MASSLESS_MOTION = 1e12  # motion that forces make, where every inertia is one by itself: some motion has none
+
+
+def exceeds_dense_size(free: int, velocities: int, rows: int) -> bool:
+    """Whether there are more velocities, or freedoms as counted than ``free``, than dense equations are made for."""
+    return velocities > DENSE_VELOCITIES or velocities - rows > free
+
+
+def uses_sparse_equations(x: MechanismState, free: int) -> bool:
+    """Whether the linear equations at a state are sparse: of many velocities, at rest, constraints on positions."""
+    s = x.c.structure
+    many = exceeds_dense_size(
+        DENSE_VELOCITIES if s.loads else free, s.nv, len(s.rows)
+    )  # friction by reactions is for dense ones
+    return many and not s.tree and not np.any(x.v) and all(r.holonomic for r in s.rows)
+
+
+@dataclass
+class SparseEquations:
+    """Sparse linear equations.
+
+    Attributes
+    ----------
+    e : Equations
+    scale : ndarray (nv,)
+        1 for metres, 1 / length of the mechanism for radians: what velocities are divided by.
+    rows : ndarray (m,)
+        The constraint that each row of G is; beyond the constraints: that a turn which means nothing is none.
+    G : sparse (m, nv)
+    """
+
+    e: EquationDerivatives
+    scale: np.ndarray
+    rows: np.ndarray
+    G: Any
+
+    @cached_property
+    def matrices(self) -> tuple[Any, Any, Any]:
+        """M, D and K, sparse (nv, nv)."""
+        r = self.e.at["r"]
+        return tuple(X[r] for X in (self.e.by_acceleration, self.e.by_velocity, self.e.by_position))  # type: ignore
+
+    @cached_property
+    def pencil(self) -> QuadraticPencil:
+        """The same in units in which all compares."""
+        import scipy.sparse as sp
+
+        S = sp.diags(self.scale)
+        M, D, K = ((S @ X @ S).tocsr() for X in self.matrices)
+        return QuadraticPencil(M, D, K, unit_rows(self.G @ S)[0])
+
+    @classmethod
+    def at(cls, x: MechanismState, frozen: bool, to: Sequence[str] = ()) -> SparseEquations:
+        """At a state that `uses_sparse_equations`; ``to`` are parameters that inputs are.
+
+        Raises
+        ------
+        AnalysisError, SingularityError, ModelError
+            As `linearize`.
+        """
+        import scipy.sparse as sp
+
+        e = EquationDerivatives(x)
+        if x.c.structure.loads and has_reaction_friction(x, *e.complex_tables):
+            raise AnalysisError(
+                f"{x.c.structure.model.name!r} has {len(x.v)} velocities, and friction that follows its joints' "
+                f"reactions; linear equations of so large a mechanism are made without such friction only"
+            )
+        x.c.at(x.t, x.q, x.v)
+        G, _, scale = scaled_jacobian(x.c)
+        weak, vectors = weak_pivots(G @ G.T)
+        if len(weak):
+            _refuse_lost_rank(x, G, weak, vectors, scale)
+        rows = np.setdiff1d(np.arange(G.shape[0]), weak)
+        still = massless_rotations(e)
+        one = sp.csr_matrix((np.ones(len(still)), (np.arange(len(still)), still)), shape=(len(still), len(x.v)))
+        whole = sp.vstack([e.by_velocity[e.at["n"]][rows], one]).tocsr()
+        found = cls(e, scale, np.r_[rows, G.shape[0] + np.arange(len(still))], whole)
+        found._refuse_kinks(to)
+        if not frozen:
+            refuse_unbalanced(x, e)
+        found._refuse_massless()
+        if not frozen and has_time_laws(x.c.values.system):
+            found._refuse_changing()
+        return found
+
+    def freed(self, way: np.ndarray) -> np.ndarray:
+        """The part of changes of positions that the constraints allow."""
+        G = self.pencil.G
+        along = way / self.scale
+        return self.scale * (along - minimum_norm_solution(G, G @ along)) if G.shape[0] else way
+
+    def _refuse_kinks(self, to: Sequence[str]) -> None:
+        """Refuse forces with a kink that a free motion crosses."""
+        found = []
+        for k in nonsmooth_points(self.e, to):
+            ways = [self.scale**2 * part for part in k.along]  # steepest, in units that compare
+            dq, dv = (self.freed(way) for way in ways)
+            if k.is_crossed_by(np.stack([dq, 0.0 * dq], 1), np.stack([0.0 * dv, dv], 1)):
+                found.append(k)
+        if found:
+            raise nonsmooth_error(found, self.e.state.t, "there are no linear equations")
+
+    def _refuse_massless(self) -> None:
+        """Refuse free motions without inertia."""
+        import scipy.sparse as sp
+
+        p = self.pencil
+        if not p.freedoms:
+            return
+        own = p.M.diagonal()
+        unit = sp.diags(1.0 / np.sqrt(np.where(own > 0.0, own, own.max())))
+        M, G = (unit @ p.M @ unit).tocsr(), unit_rows(p.G @ unit)[0]
+        force = np.random.default_rng(0).standard_normal(len(own))
+        try:
+            moved = QuadraticPencil(M, M, M, G).solver(0.0)(force, np.zeros(G.shape[0]))
+        except AnalysisError:
+            moved = np.where(own > 0.0, 0.0, np.inf)
+        if not np.abs(moved).max() <= MASSLESS_MOTION:
+            d = int(np.argmax(np.abs(moved)))
+            raise massless_motion_error(velocity_names(self.e.state.c.structure)[d].name)
+
+    def _refuse_changing(self) -> None:
+        """Refuse equations that are others a moment later, though the mechanism rests."""
+        x, r = self.e.state, self.e.at["r"]
+        z = x.c.z.copy()
+        then = EquationDerivatives(MechanismState.moving(x.c, x.t + COMPARISON_ANGLE / self.pencil.fastest, x.q, x.v))
+        for now, later in ((self.e.by_velocity, then.by_velocity), (self.e.by_position, then.by_position)):
+            if abs(later[r] - now[r]).max() > COEFFICIENT_TOLERANCE * abs(now[r]).max():
+                raise time_dependence_error()
+        x.c.at(x.t, x.q, x.v)
+        x.c.z = z
+
+
+def unit_rows(G: Any) -> tuple[Any, np.ndarray]:
+    """Rows of unit size, and what they were divided by."""
+    import scipy.sparse as sp
+
+    size = np.sqrt(np.asarray(G.multiply(G).sum(axis=1)).ravel())
+    size = np.where(size > 0.0, size, 1.0)
+    return (sp.diags(1.0 / size) @ G).tocsr(), size
+
+
+def _refuse_lost_rank(x: MechanismState, G: Any, weak: np.ndarray, vectors: np.ndarray, scale: np.ndarray) -> None:
+    """Refuse a position where rows depend on one another that do not nearby."""
+    c = x.c
+    z, random = c.z.copy(), np.random.default_rng(0).standard_normal(len(x.v))
+    for _ in range(2):
+        way = random - minimum_norm_solution(G, G @ random)
+        q = x.q.copy()
+        retract(c.values.system, q, AWAY * scale * way * c.values.length / np.abs(way).max())
+        near = closed_position_near(c, x.t, q)
+        if near is not None:
+            c.at(x.t, near, 0.0 * x.v)
+            H = scaled_jacobian(c)[0]
+            if len(weak_pivots(H @ H.T)[0]) < len(weak):
+                raise _lost_rank_error(x, H.T @ vectors, vectors)
+        random = np.random.default_rng(1).standard_normal(len(x.v))
+    c.at(x.t, x.q, x.v)
+    c.z = z
+
+
+def _lost_rank_error(x: MechanismState, remaining: np.ndarray, vectors: np.ndarray) -> SingularityError:
+    """The error that names the elements of dependencies of which something is left nearby."""
+    _, d, Vt = np.linalg.svd(remaining, full_matrices=False)
+    lost = np.abs(vectors @ Vt[d > LOST_DEPENDENCY].T).max(axis=1, initial=0.0)
+    rows = x.c.structure.rows
+    names = tuple(dict.fromkeys(r.element.name for r, part in zip(rows, lost, strict=True) if part > PARTICIPATION))
+    return singular_position_error(x.t, names)
+
+
+def sparse_descriptor(whole: SparseEquations, inputs: Sequence[Input], outputs: Sequence[str]) -> Descriptor:
+    """Of a large mechanism at rest; errors as `refuse_undetermined`."""
+    import scipy.sparse as sp
+
+    nv = len(whole.scale)
+    none = sp.csr_matrix((nv, nv))
+    C = curve_gradients(whole.e.state, outputs)
+    refuse_undetermined_outputs_sparse(whole.e.state, outputs, C)
+    return _assembled_descriptor(whole.e, whole.rows, (none, none), inputs, outputs, C)
+
+
+def dense_descriptor(
+    e: EquationDerivatives, f: FreeCoordinates, frame: TurningFrame, inputs: Sequence[Input], outputs: Sequence[str]
+) -> Descriptor:
+    """Of any mechanism, in the coordinates of its equations."""
+    import scipy.sparse as sp
+
+    G = unit_rows(_all_rows(e) @ sp.diags(f.scale))[0]
+    return _assembled_descriptor(
+        e,
+        np.setdiff1d(np.arange(G.shape[0]), weak_pivots(G @ G.T)[0]) if G.shape[0] else np.zeros(0, int),
+        (sp.csr_matrix(frame.N - frame.H), sp.csr_matrix(frame.H)),
+        inputs,
+        outputs,
+        curve_gradients(e.state, outputs),
+    )
+
+
+def _all_rows(e: EquationDerivatives) -> Any:
+    """Constraints, then prescribed coordinates, then turns that mean nothing; sparse."""
+    import scipy.sparse as sp
+
+    nv, still = e.state.c.structure.nv, massless_rotations(e)
+    one = sp.csr_matrix((np.ones(len(still)), (np.arange(len(still)), still)), shape=(len(still), nv))
+    return sp.vstack([e.by_velocity[e.at["n"]], sp.csr_matrix(prescribed_rows(e.state.c)), one]).tocsr()
+
+
+def _assembled_descriptor(
+    e: EquationDerivatives,
+    rows: np.ndarray,
+    turning: tuple[Any, Any],
+    inputs: Sequence[Input],
+    outputs: Sequence[str],
+    C: Any,
+) -> Descriptor:
+    """With those of all rows that are independent."""
+    import scipy.sparse as sp
+
+    c, s, at = e.state.c, e.state.c.structure, e.at
+    names = velocity_names(s)
+    G = _all_rows(e)
+    others = G.shape[0] - len(s.rows)
+    holonomic = np.r_[[r.holonomic for r in s.rows], np.ones(others, bool)].astype(bool)
+    r, g, n = input_effects(e, inputs)
+    gaps = np.where(holonomic[: len(g), None], g, n)
+    gaps = np.vstack([gaps, np.zeros((G.shape[0] - len(g), len(inputs)))])
+    V = sp.vstack([e.by_position[at["n"]], sp.csr_matrix((others, s.nv))]).tocsr()
+    C = C.tocsc()
+    nv, held = s.nv, len(s.rows) + len(s.prescribed)
+    kept = rows[rows < held]  # what holds a turn that means nothing has no multiplier that anything depends on
+    by_rows = sp.hstack([C[:, 3 * nv + kept], sp.csr_matrix((len(outputs), len(rows) - len(kept)))])
+    D = np.array([_direct_feedthrough(e, outputs, i) for i in inputs]).reshape(len(inputs), len(outputs)).T
+    of = [x.element.name for x in s.rows] + list(s.prescribed) + [names[d].name for d in massless_rotations(e)]
+    M, W, K = (X[at["r"]] for X in (e.by_acceleration, e.by_velocity, e.by_position))
+    kinematic, turned = turning
+    return Descriptor(
+        mass=M,
+        damping=W,
+        stiffness=K,
+        constraints=G[rows].tocsr(),
+        on_positions=holonomic[rows],
+        by_position=V[rows].tocsr(),
+        kinematic=kinematic.tocsr(),
+        turning=turned.tocsr(),
+        forces=r,
+        gaps=gaps[rows],
+        C=sp.hstack([*(C[:, k * nv : (k + 1) * nv] for k in range(3)), by_rows]).tocsr(),
+        D=D,
+        coordinates=tuple(x.name for x in names),
+        units=tuple(x.unit for x in names),
+        rows=tuple(of[k] for k in rows),
+        scale=c.sizes / c.values.length,
+    )
+
+
+def _direct_feedthrough(e: EquationDerivatives, outputs: Sequence[str], i: Input) -> np.ndarray:
+    """What an input does to the outputs by itself."""
+    x = e.state
+    n = len(x.v)
+    still = [np.zeros((1, k)) for k in (n, n, n, len(x.lam) + len(x.c.structure.prescribed))]
+    return curve_derivatives(x, outputs, still, values_with_input_step(e, i))[0]

@@ -1,0 +1,390 @@
+"""Linear equations of motion about an equilibrium or a steady motion, with named inputs and outputs.
+
+Perturbed by inputs w, the reduced equations (see `reduced_equations`) read x' = A x + B0 w + B1 w' + B2 w''. Inputs
+that move the mechanism (drivers, lengths) act through their rates too, because the constraints hold for positions,
+velocities and accelerations; a change of the state, x~ = x - B2 w' - (B1 + A B2) w, takes the rates out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from ..analysis_options import Options
+from ..assembly.compiled_mechanism import compile_mechanism
+from ..derivatives.eigenvalues import spectrum
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
+from ..derivatives.nonsmooth_points import refuse_nonsmooth
+from ..derivatives.output_derivatives import curve_derivatives, refuse_undetermined_outputs, snapshot
+from ..derivatives.reduced_equations import (
+    FreeCoordinates,
+    InputTerms,
+    MatrixUncertainty,
+    ReducedEquations,
+    TurningFrame,
+    free_coordinates,
+    reduced_equations,
+    refuse_singular_position,
+)
+from ..derivatives.steady_motion import advanced_equations, frame_description, kinematic_matrix, steady_frame
+from ..errors import ModelError
+from ..model.contact import has_switching_elements
+from ..model.controller import Controller, Sensor
+from ..model.element_laws import Input, with_inputs
+from ..model.model import Model
+from ..model.quantities import ENERGY, single_quantity
+from ..results.equilibrium import Equilibrium
+from ..results.linear_model import Descriptor, LinearModel, StateSpace
+from ..results.phases import CUMULATIVE_ENERGIES
+from ..results.result import Result
+from ..statics.controller_states import (
+    SampledSignal,
+    auxiliary_instant,
+    cycle_equations,
+    refuse_unsettled,
+    without_auxiliary_positions,
+)
+from ..statics.stability import stability_by_eigenvalues
+from .descriptor import (
+    DENSE_FREEDOMS,
+    SparseEquations,
+    dense_descriptor,
+    exceeds_dense_size,
+    input_effects,
+    sparse_descriptor,
+    uses_sparse_equations,
+    values_with_input_step,
+)
+from .operating_point import SizeTest, contact_operating_point, operating_state
+
+FRAME_TOLERANCE = 1e-5  # relative change of coefficients a moment later that is none
+IMPROPER = 1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperatingPointOptions(Options):
+    """Where the mechanism is, that small motions are asked of."""
+
+    about: Result | Equilibrium | None
+    t: float | None
+    parameters: Mapping[str, float] | None
+    coordinates: str
+    frozen: bool
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.about is not None and self.t is not None:
+            raise ModelError("about has its own time: leave out t")
+        if self.frozen and isinstance(self.about, Equilibrium) and not self.about.speeds:
+            raise ModelError(
+                "frozen is about a motion: at an equilibrium nothing moves, and it does nothing; leave it out"
+            )
+
+    def state(self, model: Model, many: SizeTest | None = None) -> MechanismState:
+        """The state there; in absolute coordinates where velocities and rows are ``many``."""
+        return operating_state(
+            model, self.about, t=self.t or 0.0, parameters=self.parameters, coordinates=self.coordinates, many=many
+        )[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearizeOptions(OperatingPointOptions):
+    """What `Mechanism.linearize` is asked."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
+    """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
+    refuse_cumulative_outputs(model, o.outputs)
+    if model.controllers:
+        return controlled_linear_model(model, o)[0]
+    if has_switching_elements(model):
+        joined, there, notes = contact_operating_point(model, o, "linearize")
+        out = _smooth_linear_model(joined, there)
+        out.notes = notes
+        return out
+    return _smooth_linear_model(model, o)
+
+
+def _smooth_linear_model(model: Model, o: LinearizeOptions) -> LinearModel:
+    """Of a mechanism in which nothing holds at times any more, but friction that slides."""
+    for name in o.outputs:
+        single_quantity(model, name)  # refuses those that do not exist; inputs are looked up where they are added
+    here = model
+    if o.about is None:  # the copy with inputs is assembled at once
+        here, named = with_inputs(model, o.inputs)
+    x = o.state(here, partial(exceeds_dense_size, DENSE_FREEDOMS))
+    large = uses_sparse_equations(x, DENSE_FREEDOMS)
+    if not large and exceeds_dense_size(DENSE_FREEDOMS, len(x.v), len(x.c.structure.rows)):
+        x = o.state(here)
+    if o.about is not None:
+        x, named = _with_inputs(x, o.inputs)
+    if not large:
+        return _reduced_linear_model(x, o, named)[0]
+    whole = SparseEquations.at(x, o.frozen, _parameter_inputs(named))
+    later = partial(_dense_state_space, model.snapshot(), o)
+    return _linear_model(whole.e, named, o.outputs, later, sparse_descriptor(whole, named, o.outputs), None)
+
+
+def controlled_linear_model(model: Model, o: LinearizeOptions) -> tuple[LinearModel, str]:
+    """Linear equations of a mechanism with controllers, and their stability.
+
+    They are those of one that has bodies in their place; with sampled ones over a cycle.
+    """
+    d = auxiliary_instant(model, o.state(model), o.coordinates, o.outputs, frozen=o.frozen)
+    here, other = d.here, d.other
+    asked = replace(o, outputs=(*(other.outputs.get(name, name) for name in o.outputs), *other.laws.values()))
+    with d.errors_in_user_terms():
+        x, named = _with_inputs(d.state, o.inputs)
+        found, r = _reduced_linear_model(x, asked, named, d.off)
+        assert r.uncertainty is not None
+        space, own = without_auxiliary_positions(found.dense, r.uncertainty, other)
+    cycle = None
+    if other.laws:
+        samples = _sampled_signals(here, list(other.laws), len(o.outputs))
+        at = np.array([d.at[s.name] for s in samples])
+        sizes = np.array([other.scales[s.name].size for s in samples])
+        refuse_unsettled(samples, at, found.output_values[len(o.outputs) :], sizes, model.name)
+        space, own, cycle = cycle_equations(space, samples, len(o.outputs))
+    units = ["" if name in other.outputs else u for name, u in zip(o.outputs, found.output_units, strict=False)]
+    linear = LinearModel(
+        model.name,
+        list(zip(found.inputs, found.input_units, strict=True)),
+        list(zip(o.outputs, units, strict=True)),
+        found.output_values[: len(o.outputs)],
+        snapshot(here),
+        replace(space, eigenvalues=_sorted(np.asarray(space.eigenvalues))),
+        lambda: found.descriptor,
+        found.turning,
+        found.seen_from,
+        cycle,
+    )
+    return linear, stability_by_eigenvalues(own, discrete=cycle is not None)
+
+
+def _sampled_signals(here: MechanismState, names: Sequence[str], first: int) -> list[SampledSignal]:
+    """What is sampled, in the order in which it is; its laws are the outputs from ``first`` on."""
+    numbers, known = here.c.values.numbers, {x.name: x for x in here.c.structure.controls}
+    out = []
+    for k, name in enumerate(names):
+        n = numbers[known[name].controller.name]
+        out.append(SampledSignal(name, first + k, (float(n.period), float(n.offset)), known[name].signal))
+    return out
+
+
+def _reduced_linear_model(
+    x: MechanismState, o: LinearizeOptions, named: list[Input], speed_scales: np.ndarray | None = None
+) -> tuple[LinearModel, ReducedEquations]:
+    """Of mechanisms with few velocities: the constraints are taken out; ``speed_scales`` is as in `steady_motion.refuse_unbalanced`."""
+    e, f, frame = _reduction_at(x, o.frozen, to=_parameter_inputs(named), speed_scales=speed_scales)
+    r = reduced_equations(e, f, frame, _input_terms(e, f, named), speed_scales)
+    if frame.turning.any() and (named or o.outputs):
+        _refuse_frame_dependence(e, f, r, frame, named, o.outputs)
+    refuse_undetermined_outputs(x, o.outputs)
+    space = _state_space(e, f, r, named, o.outputs)
+    return _linear_model(e, named, o.outputs, space, partial(dense_descriptor, e, f, frame, named, o.outputs), frame), r
+
+
+def _dense_state_space(model: Model, o: LinearizeOptions) -> StateSpace:
+    """What is dense of a large mechanism."""
+    x, named = _with_inputs(o.state(model), o.inputs)
+    return _reduced_linear_model(x, o, named)[0].dense
+
+
+def _with_inputs(x: MechanismState, inputs: Sequence[str]) -> tuple[MechanismState, list[Input]]:
+    """The same state of a copy of the model, whose laws have the inputs."""
+    model, named = with_inputs(x.c.structure.model, inputs)
+    return _in_copy(model, x) if named else x, named
+
+
+def _parameter_inputs(inputs: list[Input]) -> list[str]:
+    """Those inputs that are parameters of the model."""
+    return [i.name for i in inputs if i.name == i.parameter]
+
+
+def _refuse_frame_dependence(
+    e: EquationDerivatives,
+    f: FreeCoordinates,
+    r: ReducedEquations,
+    frame: TurningFrame,
+    inputs: list[Input],
+    outputs: Sequence[str],
+) -> None:
+    """Refuse inputs and outputs that do not turn with the mechanism: their coefficients would change with time."""
+    then, g, own = advanced_equations(e.state, f, frame)
+    later = reduced_equations(then, g, own, _input_terms(then, g, inputs))
+    n = len(r.rate)
+    for what, names, now, other in (
+        ("output", outputs, _output_matrix(e, r, inputs, outputs), _output_matrix(then, later, inputs, outputs)),
+        ("input", [i.name for i in inputs], r.inputs(r.rate)[0].T, later.inputs(later.rate)[0].T),
+    ):
+        for k, name in enumerate(names):
+            if np.abs(other[k, :n] - now[k, :n]).max(initial=0.0) > FRAME_TOLERANCE * (
+                1e-300 + np.abs(now[k, :n]).max(initial=0.0)
+            ):
+                raise ModelError(
+                    f"{what} {name!r} does not turn with the mechanism: seen from the frame in which the motion is "
+                    f"steady it changes with time. Take one that does, such as a joint's coordinate or drive, or ask "
+                    f"for this very instant with frozen=True"
+                )
+
+
+def equations_without_inputs(
+    x: MechanismState, frozen: bool = False, like: FreeCoordinates | None = None, speed_scales: np.ndarray | None = None
+) -> tuple[FreeCoordinates, TurningFrame, ReducedEquations]:
+    """The reduced linear equations at a state, in the coordinates of others if given; errors as `linearize`."""
+    e, f, frame = _reduction_at(x, frozen, like, speed_scales=speed_scales)
+    return f, frame, reduced_equations(e, f, frame, None, speed_scales)
+
+
+def _reduction_at(
+    x: MechanismState,
+    frozen: bool,
+    like: FreeCoordinates | None = None,
+    to: Sequence[str] = (),
+    speed_scales: np.ndarray | None = None,
+) -> tuple[EquationDerivatives, FreeCoordinates, TurningFrame]:
+    e = EquationDerivatives(x)
+    f = free_coordinates(e, like)
+    refuse_singular_position(e, f)
+    both = np.hstack([f.Z, 0.0 * f.Zv]), np.hstack([0.0 * f.Z, f.Zv])
+    refuse_nonsmooth(e, *both, to)
+    still = np.zeros((len(x.v),) * 2)
+    frame = TurningFrame(np.zeros(3), still, kinematic_matrix(x)) if frozen else steady_frame(x, e, f, speed_scales)
+    frame.told = frame_description(x, frame, frozen)
+    return e, f, frame
+
+
+def _in_copy(model: Model, x: MechanismState) -> MechanismState:
+    """The same state of a copy of the model, whose laws have inputs."""
+    c = compile_mechanism(model, parameters=x.c.parameters, tree=x.c.structure.tree)
+    c.follow(x.c.hints)
+    return MechanismState.moving(c, x.t, x.q, x.v)
+
+
+def _input_terms(e: EquationDerivatives, f: FreeCoordinates, inputs: list[Input]) -> InputTerms:
+    """What the inputs do to the equations."""
+    r, g, n = input_effects(e, inputs)
+    return InputTerms(r, g[f.on_positions], n)
+
+
+def _output_matrix(
+    e: EquationDerivatives, r: ReducedEquations, inputs: list[Input], names: Sequence[str]
+) -> np.ndarray:
+    """Outputs by the states, the inputs and their rates, (outputs, n + 3 m)."""
+    n = len(r.rate)
+    parts = [part.T for part in (r.position, r.velocity, r.acceleration, r.multipliers)]
+    out = curve_derivatives(e.state, names, parts)
+    for k, i in enumerate(inputs):
+        out[n + k] = curve_derivatives(
+            e.state, names, [part[n + k : n + k + 1] for part in parts], values_with_input_step(e, i)
+        )[0]
+    return out.T
+
+
+def _matrices(r: ReducedEquations, y: np.ndarray, inputs: list[Input], outputs: Sequence[str]) -> list[np.ndarray]:
+    """A, B, C, D in the state in which rates of inputs do not appear."""
+    A, n = r.A, len(r.rate)
+    B, B1, B2 = r.inputs(r.rate)
+    C, (D, D1, D2) = y[:, :n], r.inputs(y)
+    shift = B1 + A @ B2
+    known = np.abs(D) + np.abs(D1) + np.abs(D2) + np.abs(C) @ (np.abs(B) + np.abs(B1) + np.abs(B2))
+    for rate, part in (("rate", D1 + C @ B2), ("second rate", D2)):
+        bad = np.argwhere(np.abs(part) > IMPROPER * known)
+        if len(bad):
+            k, i = bad[0]
+            raise ModelError(
+                f"output {outputs[k]!r} follows the {rate} of input {inputs[i].name!r}, which no state-space model "
+                f"can; leave out one of the two"
+            )
+    return [A, B + A @ shift, C, D + C @ shift]
+
+
+def _sorted(w: np.ndarray) -> np.ndarray:
+    """By imaginary, then real part; the upper one of a pair after the lower."""
+    return w[np.lexsort((w.imag, w.real, np.abs(w.imag)))]
+
+
+def _eigenvalues(A: np.ndarray, uncertainty: MatrixUncertainty | None) -> np.ndarray:
+    return _sorted(spectrum(A, uncertainty).values)
+
+
+def _state_space(
+    e: EquationDerivatives, f: FreeCoordinates, r: ReducedEquations, inputs: list[Input], outputs: Sequence[str]
+) -> StateSpace:
+    A, B, C, D = _matrices(r, _output_matrix(e, r, inputs, outputs), inputs, outputs)
+    named = [f.names[d] for d in f.chosen]
+    rates = [f.names[d] for d in f.chosen_v]
+    return StateSpace(
+        A=A,
+        B=B,
+        C=C,
+        D=D,
+        states=(*(n.name for n in named), *(f"{n.name} rate" for n in rates)),
+        state_units=(*(n.unit for n in named), *(f"{n.unit}/s" for n in rates)),
+        mass=r.M,
+        damping=r.D,
+        stiffness=r.K,
+        eigenvalues=partial(_eigenvalues, A, r.uncertainty),
+        motion=r.position[:, : len(A)],
+    )
+
+
+def _linear_model(
+    e: EquationDerivatives,
+    inputs: list[Input],
+    outputs: Sequence[str],
+    dense: StateSpace | Callable[[], StateSpace],
+    sparse: Descriptor | Callable[[], Descriptor],
+    frame: TurningFrame | None,
+) -> LinearModel:
+    shot = snapshot(e.state)
+    curves = [shot.curve(name) for name in outputs]
+    return LinearModel(
+        e.state.c.structure.model.name,
+        [(i.name, i.unit) for i in inputs],
+        [(name, unit) for name, (unit, _) in zip(outputs, curves, strict=True)],
+        np.array([float(values[0]) for _, values in curves]),
+        shot,
+        dense,
+        sparse,
+        np.zeros(3) if frame is None else frame.turning,
+        "" if frame is None else frame.told,
+    )
+
+
+# Quantities that count from the start of a motion on: works and what is lost. A state says nothing of them.
+
+
+CUMULATIVE_OUTPUTS_OF_ENERGY = ("balance", *CUMULATIVE_ENERGIES)
+WORK = "work"
+
+
+def refuse_cumulative_outputs(model: Model, names: Sequence[str]) -> None:
+    """Refuse outputs of a linear model that integrals over the motion are.
+
+    Raises
+    ------
+    ModelError
+        Naming the first of them.
+    """
+    for name in names:
+        of = str(name)
+        while "." not in of and isinstance(e := model.find(of), Sensor):
+            of = e.of
+        owner, _, what = of.partition(".")
+        if (
+            what in CUMULATIVE_OUTPUTS_OF_ENERGY
+            if owner == ENERGY
+            else what == WORK and not isinstance(model.find(owner), Controller)
+        ):
+            instead = "energy.total" if owner == ENERGY else f"{owner}.power"
+            raise ModelError(
+                f"output {name!r} counts from the start of a motion on, so no state of a linear model tells it; ask "
+                f"for {instead!r}"
+            )

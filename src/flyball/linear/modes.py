@@ -1,0 +1,165 @@
+"""Modes: eigenvalues and mode shapes of the linear equations, dense for all, sparse for the slowest of many."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from ..analysis_options import require_count as at_least
+from ..derivatives.eigenvalues import EQUAL_TOLERANCE, Spectrum, spectrum
+from ..derivatives.equation_derivatives import MechanismState
+from ..derivatives.output_derivatives import snapshot
+from ..derivatives.reduced_equations import TurningFrame
+from ..model.contact import has_switching_elements
+from ..model.model import Model
+from ..numerics.rank import column_space
+from ..results.modes import Modes, is_growing
+from ..statics.controller_states import (
+    auxiliary_instant,
+    is_auxiliary,
+    refuse_sampled_controllers,
+    without_auxiliary_coordinates,
+)
+from ..tables.structure_definition import velocity_names
+from .descriptor import DENSE_FREEDOMS, DENSE_VELOCITIES, SparseEquations, exceeds_dense_size, uses_sparse_equations
+from .linearize import OperatingPointOptions, equations_without_inputs
+from .operating_point import contact_operating_point
+
+DEFAULT_COUNT = 10
+FREEDOMS_PER_MODE = 4  # freedoms for each mode that is asked for, from which on these are found by themselves
+ZERO_EIGENVALUE = (
+    1e-6  # of the fastest: sparse eigenvalues below are zero; a double zero shows rounding by its square root
+)
+GROWTH_UNCERTAINTY = 1e-6  # of a sparse eigenvalue, whose own uncertainty is not known: growth below is none
+SHAPE_ROUNDING = 1e-11  # parts of a shape, or of an eigenvalue, below this part of its largest are rounding
+RIGID_TOLERANCE = 1e-7  # directions of rigid motions below this part of the largest are none
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModesOptions(OperatingPointOptions):
+    """What `Mechanism.modes` is asked."""
+
+    count: int | None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.count is not None:
+            at_least(self.count, "count")
+
+
+def modes(model: Model, o: ModesOptions) -> Modes:
+    """Natural motions about an equilibrium or a steady motion: see `Mechanism.modes`."""
+    if model.controllers:
+        return _controlled_modes(model, o)
+    if has_switching_elements(model):
+        joined, there, notes = contact_operating_point(model, o, "modes")
+        return replace(_smooth_modes(joined, there), notes=notes)
+    return _smooth_modes(model, o)
+
+
+def _smooth_modes(model: Model, o: ModesOptions) -> Modes:
+    """Of a mechanism in which nothing holds at times any more, but friction that slides."""
+    count, frozen = o.count, o.frozen
+    free = DENSE_VELOCITIES if count is None else max(DENSE_FREEDOMS, FREEDOMS_PER_MODE * count)
+    x = o.state(model, partial(exceeds_dense_size, free))
+    if uses_sparse_equations(x, free):
+        return _sparse_modes(x, count or DEFAULT_COUNT, frozen)
+    f, frame, r = equations_without_inputs(x, frozen)
+    own = spectrum(r.A, r.uncertainty)
+    one, rest = _selected_eigenvalues(own, count)
+    found = _normalised_modes(x, own, one, r.position[:, : len(r.A)] @ own.vectors[:, one])
+    return _with_eigenvalue_data(found, own, one, rest, frame)
+
+
+def _selected_eigenvalues(eigenvalues: Spectrum, count: int | None) -> tuple[np.ndarray, np.ndarray]:
+    """Indices of the eigenvalues that are told, one of each pair, slowest first; and of those left out."""
+    w = eigenvalues.values
+    listed = np.array([k for group in eigenvalues.groups for k in group[: eigenvalues.geometric[group[0]]]], int)
+    one = listed[w[listed].imag >= 0.0]
+    one = one[np.lexsort((-w[one].real, np.abs(w[one])))]
+    return one[:count], one[count:] if count is not None else one[:0]
+
+
+def _with_eigenvalue_data(
+    found: Modes, eigenvalues: Spectrum, one: np.ndarray, rest: np.ndarray, frame: TurningFrame
+) -> Modes:
+    """The same modes, with what the eigenvalues say besides."""
+    found.turning, found.seen_from = frame.turning, frame.told
+    found.multiplicity, found.geometric_multiplicity = eigenvalues.multiplicity[one], eigenvalues.geometric[one]
+    found.residual = eigenvalues.residual
+    found.growing = bool(is_growing(eigenvalues.values[rest]).any())
+    return found
+
+
+def _controlled_modes(model: Model, o: ModesOptions) -> Modes:
+    """Of a mechanism with continuous controllers: of one that has bodies in their place, less these."""
+    refuse_sampled_controllers(model, "modes")
+    d = auxiliary_instant(model, o.state(model), o.coordinates, (), frozen=o.frozen)
+    slides, x = d.other.slides, d.state
+    with d.errors_in_user_terms():
+        f, frame, r = equations_without_inputs(x, o.frozen, speed_scales=d.off)
+    r = without_auxiliary_coordinates(r, f, slides)
+    own = spectrum(r.A, r.uncertainty)
+    one, rest = _selected_eigenvalues(own, o.count)
+    mine = np.array([not is_auxiliary(n.name, slides) for n in velocity_names(x.c.structure)])
+    found = _normalised_modes(x, own, one, r.position @ own.vectors[:, one], mine)
+    found.point = snapshot(d.here)
+    return _with_eigenvalue_data(found, own, one, rest, frame)
+
+
+def _normalised_modes(
+    x: MechanismState, eigenvalues: Spectrum, which: np.ndarray, shapes: np.ndarray, selected: np.ndarray | None = None
+) -> Modes:
+    """Modes whose largest part is 1, seen from the ground; of the velocities ``selected`` only, if given."""
+    w, fastest = eigenvalues.values[which], float(np.abs(eigenvalues.values).max(initial=0.0))
+    selected = np.ones(len(shapes), bool) if selected is None else selected
+    return _scaled_modes(x, w, shapes[selected], fastest, selected)
+
+
+def _scaled_modes(x: MechanismState, w: np.ndarray, shapes: np.ndarray, fastest: float, selected: np.ndarray) -> Modes:
+    """The same of given eigenvalues, and parts of the shapes."""
+    names = [n for n, own in zip(velocity_names(x.c.structure), selected, strict=True) if own]
+    length = (x.c.values.length / x.c.sizes)[selected, None]
+    size = length * np.abs(shapes)
+    for k in range(shapes.shape[1]):
+        if size[:, k].max(initial=0.0) > 0.0:
+            shapes[:, k] /= shapes[np.argmax(size[:, k]), k]
+    least = SHAPE_ROUNDING * (length * np.abs(shapes)).max(axis=0, initial=0.0) / length
+    shapes = np.where(np.abs(shapes.real) > least, shapes.real, 0.0) + 1j * np.where(
+        np.abs(shapes.imag) > least, shapes.imag, 0.0
+    )
+    units = tuple(n.unit for n in names)
+    one = np.ones(len(w), int)
+    return Modes(
+        w, shapes, tuple(n.name for n in names), units, np.zeros(3), snapshot(x), fastest, False, one, one.copy()
+    )
+
+
+def _sparse_modes(x: MechanismState, count: int, frozen: bool) -> Modes:
+    """The slowest modes of a large mechanism at rest."""
+    whole = SparseEquations.at(x, frozen)
+    p = whole.pencil
+    w, X, residual = p.nearest(count + DEFAULT_COUNT)  # more: of pairs and rigid motions one is listed
+    w = np.where(np.abs(w) <= ZERO_EIGENVALUE * p.fastest, 0.0, w)
+    w = np.where(np.abs(w.imag) <= SHAPE_ROUNDING * np.abs(w), w.real, w)
+    w = np.where(is_growing(w) & (w.real <= GROWTH_UNCERTAINTY * np.abs(w)), 1j * w.imag, w)
+    left, values, often = np.flatnonzero(w.imag >= 0.0), list[complex](), list[tuple[int, int]]()
+    shapes = [np.zeros((len(X), 0), complex)]
+    while len(left) and len(values) < count:
+        one = np.abs(w[left] - w[left[0]]) <= EQUAL_TOLERANCE * abs(w[left[0]])
+        own, left = left[one], left[~one]
+        real = w[own[0]].imag == 0.0
+        own_shapes = column_space(np.hstack([X[:, own].real, X[:, own].imag]) if real else X[:, own], RIGID_TOLERANCE)
+        if len(own) == 1:
+            own_shapes = own_shapes[:, :1] if real else X[:, own]
+        values += [w[own].mean()] * own_shapes.shape[1]
+        often += [(len(own), own_shapes.shape[1])] * own_shapes.shape[1]
+        shapes.append(own_shapes)
+    every = np.ones(len(whole.scale), bool)
+    shape = whole.scale[:, None] * np.hstack(shapes)[:, :count]
+    found = _scaled_modes(x, np.array(values[:count], complex), shape, p.fastest, every)
+    found.residual = residual
+    found.multiplicity, found.geometric_multiplicity = np.array(often[:count], int).reshape(-1, 2).T
+    return found

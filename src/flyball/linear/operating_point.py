@@ -1,0 +1,286 @@
+"""The operating point of a linearisation: the described state, an equilibrium, or the end of a motion.
+
+Where contacts are closed or stops, ropes and friction are active, the operating point is that of a mechanism in
+which these are joints and constraints; in a motion each switching element keeps the mode that it has at that
+instant.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from ..assembly.assemble import assemble
+from ..assembly.assembled_state import Assembly
+from ..assembly.compiled_mechanism import compile_mechanism
+from ..constraints.switch_kinds import BRANCH, ELASTIC, FRICTION
+from ..derivatives.equation_derivatives import MechanismState
+from ..errors import AnalysisError, ModelError, SingularityError
+from ..model.element import Element
+from ..model.expressions import number
+from ..model.model import Model
+from ..model.unsupported_elements import unsupported_elements
+from ..results.equilibrium import ABOUT_TO_PART, AT_FRICTION_LIMIT, NOT_JUDGED, Equilibrium, Touch
+from ..results.result import Result
+from ..simulation.initial_state import choose_coordinates, find_initial_state
+from ..statics.closed_contacts import find_closed_contacts
+from ..statics.contact_equilibrium import REST_BALANCE, refuse_bulk_and_events, touch_states
+from ..statics.replacement_joints import (
+    holding_constraint,
+    model_with_contact_joints,
+    model_without_contacts,
+    support_with_friction,
+)
+from ..statics.stability import RestState
+from ..tables.table_definitions import OFF, VALUE
+
+if TYPE_CHECKING:
+    from .linearize import OperatingPointOptions
+
+
+SizeTest = Callable[[int, int], bool]
+SPARSE_REASON = "absolute: of so many velocities the equations are sparse there"
+
+
+def operating_state(
+    model: Model,
+    about: Any = None,
+    *,
+    t: float | str = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    coordinates: str = "auto",
+    many: SizeTest | None = None,
+) -> tuple[MechanismState, str]:
+    """State of a mechanism, and the coordinates that it is in and why.
+
+    Parameters
+    ----------
+    model : Model
+    about : None, Result or Equilibrium
+        Where: as described and assembled at ``t``, where a motion ended, or an equilibrium.
+    t : float [s]
+        Time, where ``about`` does not tell it.
+    parameters : mapping, optional
+        Values in SI units in place of the model's, and of those that an equilibrium was found with.
+    coordinates : str
+        ``"auto"``, ``"absolute"`` or ``"joint"``.
+    many : callable, optional
+        Whether absolute coordinates are taken, in which large mechanisms are sparse, by numbers of velocities and rows.
+
+    Raises
+    ------
+    AssemblyError
+        If the mechanism cannot be assembled there.
+    ModelError
+        If ``about`` is none of these.
+    """
+    if isinstance(about, Result):
+        start = find_initial_state(model, about.final[0], parameters, about, coordinates)
+        base, a, why = start.base, start.assembly, start.coordinates
+    elif isinstance(about, Equilibrium):
+        told = {**about.parameters, **(parameters or {})}
+        base = _assembly_at_equilibrium(model, about, told)
+        a, why = _in_requested_coordinates(base, coordinates, told, many)
+    elif about is None:
+        base = assemble(model, t=number(t, {}, "s", "t"), parameters=parameters)
+        a, why = _in_requested_coordinates(base, coordinates, parameters, many)
+    else:
+        raise ModelError(f"about must be a result or an equilibrium, got {type(about).__name__}")
+    s = a.compiled.structure
+    if many is not None and many(s.nv, len(s.rows)):
+        a, why = base, SPARSE_REASON
+    return MechanismState.moving(a.compiled, a.t, a.q, a.v), why
+
+
+def _in_requested_coordinates(
+    base: Assembly,
+    coordinates: str,
+    parameters: Mapping[str, float] | None,
+    many: SizeTest | None,
+) -> tuple[Assembly, str]:
+    """The assembly in the coordinates asked for; where none have few velocities, these are not made."""
+    s = base.compiled.structure
+    if many is not None and coordinates == "auto" and many(s.nv - len(s.rows), 0):
+        return base, SPARSE_REASON
+    return choose_coordinates(base, coordinates, parameters)
+
+
+def _assembly_at_equilibrium(model: Model, about: Equilibrium, parameters: Mapping[str, float]) -> Assembly:
+    """The mechanism where an equilibrium found it; whether it rests there now is for others to see.
+
+    Raises
+    ------
+    ModelError
+        If the equilibrium is of another mechanism, or a preload of one that has been changed.
+    """
+    old = about.assembly.compiled
+    if about.preload:
+        own = old.structure.model
+        loaded = {name.partition(".")[0] for name in about.preload}
+        parts, others = ([e for e in m.elements() if e.name not in loaded] for m in (model, own))
+        if parts != others:
+            raise ModelError(f"{model.name!r} is not what it was when its preload was found; find it again")
+        model = own
+    if [b.name for b in model.bodies] != [b.name for b in old.structure.model.bodies]:
+        raise ModelError(f"about is an equilibrium of {old.structure.model.name!r}, which has other bodies")
+    c = compile_mechanism(model.snapshot(), parameters=parameters)
+    t, q, v = about.assembly.t, about.assembly.q, about.assembly.v
+    q, v = c.take(old, t, q, v)
+    return Assembly(c, t, q, v)
+
+
+O = TypeVar("O", bound="OperatingPointOptions")
+
+
+def contact_operating_point(model: Model, o: O, analysis: str) -> tuple[Model, O, tuple[str, ...]]:
+    """The mechanism with closed contacts as joints, the options about where it rests, and what has to be said.
+
+    Raises
+    ------
+    AnalysisError
+        If forces do not balance there.
+    ModelError
+        If a closed contact moves in a way that no joint does, it is asked about a motion, or an input is a parameter.
+    SingularityError
+        If a contact is at its friction limit.
+    """
+    refuse_bulk_and_events(model, analysis)
+    model = model.snapshot()
+    _refuse_parameter_inputs(model, getattr(o, "inputs", ()), analysis)
+    if isinstance(o.about, Result):
+        joined, at, notes = frozen_mode_model(model, o.about, o.parameters or {}, analysis)
+        return joined, dataclasses.replace(o, about=_equilibrium_at(at), t=None), notes
+    base = _rest_assembly(model, o, analysis)
+    own = base.compiled.parameters
+    place = find_closed_contacts(model, base)
+    bare, held = model_without_contacts(model, base)
+    joined, missing = model_with_contact_joints(bare, place)
+    if missing:
+        raise ModelError(f"{analysis} does not know how contacts move: {'; '.join(missing.values())}")
+    c = compile_mechanism(bare, parameters=own)
+    x = RestState(c, base.t, c.take(base.compiled, base.t, base.q, base.v)[0], np.zeros(len(c.structure.rows)))
+    found, bears = support_with_friction(model, place, x, held)
+    if found.unbalanced > REST_BALANCE:
+        raise AnalysisError(
+            f"{model.name!r} does not rest there: contacts, joints and what holds leave {found.unbalanced:.2g} of what "
+            f"acts unbalanced. Ask about=m.equilibrium()"
+        )
+    notes = _contact_notes(touch_states(place, found, x, held, bears), base.t)
+    joined = joined.changed({name: None for name, most in bears.items() if most == 0.0}).snapshot()
+    c = compile_mechanism(joined, parameters=own)
+    q, v = c.take(base.compiled, base.t, base.q, base.v)
+    return joined, dataclasses.replace(o, about=_equilibrium_at(Assembly(c, base.t, q, v)), t=None), notes
+
+
+def _refuse_parameter_inputs(model: Model, inputs: tuple[str, ...], analysis: str) -> None:
+    for name in inputs:
+        if name in model.parameters:
+            raise ModelError(f"{analysis}: input {name!r} is a parameter, which may move contacts; give a force's law")
+
+
+def _rest_assembly(model: Model, o: Any, analysis: str) -> Assembly:
+    """Where it rests."""
+    if o.about is None:
+        base = assemble(model, t=o.t or 0.0, parameters=o.parameters)
+        if np.abs(base.v).max(initial=0.0) > 0.0:
+            raise moving_error(model, analysis)
+        return base
+    if not isinstance(o.about, Equilibrium):
+        raise ModelError(f"{analysis} with contact is about rest: give about=m.equilibrium(), not a motion")
+    old = o.about.assembly
+    if [b.name for b in model.bodies] != [b.name for b in old.compiled.structure.model.bodies]:
+        raise ModelError(f"about is an equilibrium of {old.compiled.structure.model.name!r}, which has other bodies")
+    c = compile_mechanism(model, parameters={**o.about.parameters, **(o.parameters or {})})
+    return Assembly(c, old.t, *c.take(old.compiled, old.t, old.q, 0.0 * old.v))
+
+
+def moving_error(model: Model, analysis: str) -> ModelError:
+    """What to say of parts that hold at times, where a mechanism is described in motion."""
+    other = "" if model.contacts or model.bulk else ", or about the end of a motion: about=m.simulate(...)"
+    parts = ", ".join(e.title for e in unsupported_elements(model))
+    return ModelError(
+        f"{analysis} with {parts} is about rest, and {model.name!r} moves: ask about=m.equilibrium(){other}"
+    )
+
+
+def _contact_notes(touches: tuple[Touch, ...], t: float) -> tuple[str, ...]:
+    """What holds for one side only.
+
+    Raises
+    ------
+    SingularityError
+        If friction is at its limit: one way it sticks, the other way it slides.
+    """
+    limit = tuple(k.name for k in touches if k.state == AT_FRICTION_LIMIT)
+    if limit:
+        raise SingularityError(
+            f"{', '.join(limit)}: friction is at its limit, so that it sticks one way and slides the other, and there "
+            f"is no linear model",
+            t,
+            limit,
+        )
+    parting = [k.name for k in touches if k.state == ABOUT_TO_PART]
+    return (f"{', '.join(parting)} about to part: what is said holds while it stays closed",) if parting else ()
+
+
+def _equilibrium_at(at: Assembly) -> Equilibrium:
+    """The place, for those who look at nothing else of an equilibrium."""
+    none: Any = None
+    return Equilibrium(
+        t=at.t, stability=NOT_JUDGED, freedoms=(), stiffness=np.zeros((0, 0)), weakest={}, least=float("nan"),
+        unbalanced=0.0, method="", parameters=dict(at.compiled.parameters), result=none, assembly=at, speeds=motion_speed(at),
+    )  # fmt: skip
+
+
+# A mechanism in motion at an instant, with the modes of then: what held is a constraint, what slid goes on sliding.
+
+
+def frozen_mode_model(
+    model: Model, about: Result, parameters: Mapping[str, float], analysis: str
+) -> tuple[Model, Assembly, tuple]:
+    """The model with what held where a motion ended as constraints, that state of it, and what has to be said.
+
+    Raises
+    ------
+    ModelError
+        If the motion does not tell what held, or something of another kind did.
+    """
+    if about.phases is None or model.contacts or model.bulk:
+        raise ModelError(f"{analysis} with contact is about rest: give about=m.equilibrium(), not a motion")
+    base = find_initial_state(model, about.final[0], parameters, about, "absolute").base
+    own, last = about.values.structure, about.phases.all[-1]
+    c = compile_mechanism(model, parameters=base.compiled.parameters, switches=True)
+    c.at(base.t, *c.take(base.compiled, base.t, base.q, base.v))
+    gone: dict[str, None] = {e.name: None for e in unsupported_elements(model)}
+    parts, slides = list[Element](), list[str]()
+    for k, x in enumerate(own.switches):
+        e, off = model[x.element.name], last.modes.mode[k] == OFF
+        if x.switch.kind in (ELASTIC, BRANCH):
+            continue
+        if off and x.switch.kind == FRICTION:
+            gone.pop(e.name, None)
+            slides.append(e.title)
+        elif not off:
+            value = float(c.work.sensed[VALUE, c.structure.switches[k].measured])
+            parts.append(holding_constraint(e, x.switch, c.values, value))
+    out = model.changed(gone)
+    out.add(*parts)
+    joined = compile_mechanism(out.snapshot(), parameters=base.compiled.parameters)
+    q, v = joined.take(base.compiled, base.t, base.q, base.v)
+    return joined.structure.model, Assembly(joined, base.t, q, v), _mode_notes(model, gone, parts, slides)
+
+
+def _mode_notes(model: Model, removed: dict[str, None], parts: list[Element], slides: list[str]) -> tuple[str, ...]:
+    held = {p.name for p in parts}
+    said = ((", ".join(model[n].title for n in held), "held"), (", ".join(slides), "taken to slide on as it does"),
+            (", ".join(model[n].title for n in removed if n not in held), "open, and left out"))  # fmt: skip
+    return tuple(f"{names}: {what}" for names, what in said if names)
+
+
+def motion_speed(at: Assembly) -> dict[str, float]:
+    """A word for it that the state moves, if it does."""
+    fastest = float(np.abs(at.v).max(initial=0.0))
+    return {"motion": fastest} if fastest > 0.0 else {}

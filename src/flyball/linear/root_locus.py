@@ -1,0 +1,641 @@
+"""Root loci: eigenvalues over a parameter as branches, and the values at which stability changes.
+
+Branches are continued by eigenvalue and by mode shape (modal assurance criterion: Allemang and Brown 1982).
+Eigenvalues are no smooth functions where they meet: there they move as a square root does. What is smooth are
+symmetric functions of those that meet, such as the square of half their difference (Kato 1966, II.1). So an event
+is first bracketed by counting eigenvalues by where they lie, then found as the zero of the smooth function that
+belongs to it:
+
+    a real one through zero           itself
+    a pair through the imaginary axis its real part
+    a pair on the axis parts at zero  (half the difference)^2, from -w^2 to +s^2
+    two pairs on the axis meet        (half the difference)^2, from -d^2 to +s^2 (Krein collision)
+    two real ones become a pair       (half the difference)^2
+
+Eigenvalues that are always zero, of motions that nothing restrains, are left out.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby, pairwise
+
+import numpy as np
+
+from ..derivatives.eigenvalues import spectrum
+from ..derivatives.reduced_equations import FreeCoordinates, ReducedEquations, TurningFrame
+from ..errors import AnalysisError, ModelError
+from ..model.model import Model
+from ..model.unsupported_elements import refuse_unsupported
+from ..progress import ReportProgress, progress_bar
+from ..results.equilibrium import Equilibrium
+from ..results.modes import Crossing, RootLocus, half_plane
+from ..statics.controller_states import auxiliary_instant, refuse_sampled_controllers, without_auxiliary_coordinates
+from ..statics.equilibrium import equilibrium, rest_options
+from ..statics.equilibrium_series import EquilibriaOptions, checked_values, equilibria, series_error
+from .linearize import OperatingPointOptions, equations_without_inputs
+
+
+@dataclass
+class EigenvalueSample:
+    """Eigenvalues at a place along the values of a parameter.
+
+    Attributes
+    ----------
+    place : float
+        Index in the values; between two a fraction.
+    value : float
+        The parameter's.
+    w, raw : ndarray (n,) complex
+        Eigenvalues without what is rounding, and as computed.
+    shapes : ndarray (2 nv, n) complex
+        Unit vectors of changes of positions and velocities in natural units.
+    told : str
+        The frame that they are seen from.
+    """
+
+    place: float
+    value: float
+    w: np.ndarray
+    raw: np.ndarray
+    shapes: np.ndarray
+    told: str
+
+    @cached_property
+    def kinds(self) -> np.ndarray:
+        """Where each eigenvalue lies: ``"zero"``, ``"+real"``, ``"-real"``, ``"axis"``, ``"+pair"``, ``"-pair"``, (n,).
+
+        ``""`` stands for the lower one of a pair.
+        """
+        w = self.w
+        real = half_plane(w)
+        alone = np.where(real > 0, "+real", "-real")
+        pair = np.where(real > 0, "+pair", np.where(real < 0, "-pair", "axis"))
+        return np.where(w == 0.0, "zero", np.where(w.imag == 0.0, alone, np.where(w.imag > 0.0, pair, "")))
+
+    @cached_property
+    def sides(self) -> np.ndarray:
+        """Which half plane each eigenvalue lies in, (n,): 1, -1, or 0 for the axis."""
+        return half_plane(self.w)
+
+    @cached_property
+    def counts(self) -> dict[str, int]:
+        """How many eigenvalues, one of each pair, lie where."""
+        names, n = np.unique(self.kinds[self.kinds != ""], return_counts=True)
+        return dict(zip(names.tolist(), n.tolist(), strict=True))
+
+    @property
+    def growing(self) -> int:
+        """How many eigenvalues have a positive real part."""
+        return self.counts.get("+real", 0) + 2 * self.counts.get("+pair", 0)
+
+
+def eigenvalue_sample(
+    place: float, value: float, f: FreeCoordinates, frame: TurningFrame, r: ReducedEquations
+) -> EigenvalueSample:
+    """Eigenvalues and shapes of reduced linear equations."""
+    own = spectrum(r.A, r.uncertainty)
+    n = len(r.A)
+    fast = float(np.abs(own.values).max(initial=0.0)) or 1.0
+    shapes = np.vstack([r.position[:, :n] / f.scale[:, None], r.velocity[:, :n] / f.scale[:, None] / fast])
+    shapes = shapes @ own.vectors
+    shapes /= np.maximum(np.linalg.norm(shapes, axis=0), 1e-300)
+    return EigenvalueSample(place, value, own.values, own.raw, shapes, frame.told)
+
+
+def matching_branches(a: EigenvalueSample, b: EigenvalueSample) -> np.ndarray:
+    """Indices (n,) of b's eigenvalues that a's go on as."""
+    from scipy.optimize import linear_sum_assignment
+
+    size = np.abs(a.w)[:, None] + np.abs(b.w)
+    apart = np.abs(a.w[:, None] - b.w) / np.where(size > 0.0, size, 1.0)
+    alike = np.abs(a.shapes.conj().T @ b.shapes) ** 2
+    return linear_sum_assignment(apart + 1.0 - alike)[1]
+
+
+MIN_CROSSING_SLOPE = (
+    1e-3  # part of its usual change that the real part of an eigenvalue makes at least, on its way through
+)
+
+
+def crosses_axis(samples: Sequence[EigenvalueSample]) -> np.ndarray:
+    """Whether at each of some samples, in order, an eigenvalue is on the axis and off it before and after, (m,) bool.
+
+    Where several in a row are on the axis, the real part must go on changing from one to the next.
+    """
+    branch = [np.arange(len(samples[0].w))]
+    for a, b in pairwise(samples):
+        branch.append(matching_branches(a, b)[branch[-1]])
+    sides = np.array([x.sides[k] for x, k in zip(samples, branch, strict=True)])
+    real = np.array([x.raw.real[k] for x, k in zip(samples, branch, strict=True)])
+    place = np.array([x.place for x in samples])
+    out = np.zeros(len(samples), bool)
+    for j in range(sides.shape[1]):
+        for off, run in groupby(range(len(samples)), (sides[:, j] != 0).tolist().__getitem__):
+            own = list(run)
+            first, last = own[0], own[-1]
+            if off or first == 0 or last == len(samples) - 1:
+                continue
+            if first != last:
+                usual = np.abs(real[last + 1, j] - real[first - 1, j]) / (place[last + 1] - place[first - 1])
+                steps = np.abs(np.diff(real[own, j])) / np.diff(place[own])
+                if sides[first - 1, j] == sides[last + 1, j] or not (steps >= MIN_CROSSING_SLOPE * usual).all():
+                    continue
+            out[own] = True
+    return out
+
+
+ROOT_TOLERANCE = 1e-14  # of the stretch between two values, and of the value
+MAX_BISECTIONS = 48  # halvings after which what is left is taken for one event
+MAX_EVALUATIONS = 200  # evaluations between two values, after which only the change of stability is sought
+ZERO_TOLERANCE = 1e-6  # of what it is at the ends: what a smooth function may be at its zero
+SPLIT_FRACTIONS = (0.4375, 0.609375, 0.234375)  # where a stretch is parted: not where a round value is likely to lie
+
+END_OFFSETS = (1e-6, 1e-3)  # parts of a stretch that are next to its end
+SLOPE_VARIATION = 0.1  # by what part of itself the slope of a real part may differ between these
+MAX_FOLLOWED_HALVINGS = 6  # halvings in which eigenvalues that seem to change places with others are followed
+
+MEETING_KINDS = {  # what happens -> change of counts, of how many eigenvalues with a positive real part
+    "parting at zero": ({"axis": -1, "+real": 1, "-real": 1}, 1),
+    "pairs meet": ({"axis": -2, "+pair": 1, "-pair": 1}, 2),
+    "+ real ones meet": ({"+real": -2, "+pair": 1}, 0),
+    "- real ones meet": ({"-real": -2, "-pair": 1}, 0),
+}
+
+SmoothFunction = Callable[
+    [EigenvalueSample], tuple[float, complex]
+]  # a function that is zero at an event, and the eigenvalue
+
+
+@dataclass
+class StabilityEvent:
+    """A change of where eigenvalues lie, and how many more have a positive real part after it."""
+
+    what: str
+    at: EigenvalueSample
+    eigenvalue: complex
+    change: int
+
+
+class CrossingSearch:
+    """Finds events between samples.
+
+    Parameters
+    ----------
+    at : callable
+        Takes a sample at a place.
+    always : int
+        How many eigenvalues are zero at all values.
+    """
+
+    def __init__(self, at: Callable[[float], EigenvalueSample], always: int) -> None:
+        self.take, self.always = at, always
+        self.taken: list[EigenvalueSample] = []
+
+    def at(self, place: float) -> EigenvalueSample:
+        """A sample at a place; all are kept."""
+        found = next((x for x in self.taken if x.place == place), None)
+        if found is None:
+            found = self.take(place)
+            self.taken.append(found)
+        return found
+
+    def between(self, a: EigenvalueSample, b: EigenvalueSample) -> list[StabilityEvent]:
+        """All events between two samples."""
+        before = len(self.taken)
+        at_a, low = self._end(a, b)
+        at_b, high = self._end(b, a)
+        return at_a + (self._parted(low, high, before, 0) if low.place < high.place else []) + at_b
+
+    def _end(self, x: EigenvalueSample, y: EigenvalueSample) -> tuple[list[StabilityEvent], EigenvalueSample]:
+        """Events at the very end x of the stretch to y, and a sample beyond them."""
+        found = self._at_end(x, y)
+        more = abs(sum(e.change for e in found))
+        for part in (*END_OFFSETS, *SPLIT_FRACTIONS[::-1]) if found else ():
+            beyond = self.at(x.place + part * (y.place - x.place))
+            if beyond.growing == x.growing + more:
+                return found, beyond
+        return found, y if found else x
+
+    def _parted(self, a: EigenvalueSample, b: EigenvalueSample, before: int, depth: int) -> list[StabilityEvent]:
+        through = _axis_crossings(a, b)
+        tired = len(self.taken) - before > MAX_EVALUATIONS
+        if a.counts == b.counts and (not through or depth > MAX_FOLLOWED_HALVINGS or tired):
+            return []
+        if tired and a.growing == b.growing:
+            return []
+        found = self._isolated(a, b, through) if _is_explained(a, b, through) else self._meetings(a, b)
+        if found:
+            return found
+        if depth == MAX_BISECTIONS or b.place - a.place <= ROOT_TOLERANCE * max(1.0, b.place):
+            return [_unresolved_event(a, b)] if a.growing != b.growing else []
+        middle = self._middle(a, b)
+        if tired:
+            near = (a, middle) if a.growing != middle.growing else (middle, b)
+            return self._parted(*near, before, depth + 1)
+        return self._parted(a, middle, before, depth + 1) + self._parted(middle, b, before, depth + 1)
+
+    def _at_end(self, x: EigenvalueSample, y: EigenvalueSample) -> list[StabilityEvent]:
+        """What begins to grow, or ceases to, at the very end x of the stretch to y."""
+        there = np.isin(x.kinds, ("axis", "zero"))
+        on = matching_branches(x, y)
+        ones = np.flatnonzero(there & np.isin(y.kinds[on], ("+pair", "+real")))
+        found = [(complex(0.0, abs(x.w[k].imag)), 2 if y.kinds[on[k]] == "+pair" else 1) for k in ones]
+        if not found or not self._leaves(x, y, ones, sum(n for _, n in found)):
+            return []
+        more = 1 if y.place > x.place else -1
+        return [StabilityEvent("at the end", x, w, n * more) for w, n in found]
+
+    def _leaves(self, x: EigenvalueSample, y: EigenvalueSample, ones: np.ndarray, growing: int) -> bool:
+        """Whether eigenvalues leave the axis at x: as many grow next to it, or their real parts change evenly."""
+        next_to, near = (self.at(x.place + part * (y.place - x.place)) for part in END_OFFSETS)
+        if next_to.growing == x.growing + growing:
+            return True
+        at = [k.raw.real[matching_branches(x, k)[ones]] - x.raw.real[ones] for k in (next_to, near, y)]
+        slope, usual = at[0] / END_OFFSETS[0], at[1] / END_OFFSETS[1]
+        even = (usual > MIN_CROSSING_SLOPE * at[2]) & (np.abs(slope - usual) <= SLOPE_VARIATION * usual)
+        return bool((even & (y.kinds[matching_branches(x, y)[ones]] == "+pair")).all())
+
+    def _middle(self, a: EigenvalueSample, b: EigenvalueSample) -> EigenvalueSample:
+        """A sample between two, none of whose eigenvalues is on its way through the axis if that can be."""
+        for part in SPLIT_FRACTIONS:
+            found = self.at(a.place + part * (b.place - a.place))
+            if not crosses_axis((a, found, b))[1]:
+                break
+        return found
+
+    def _zero(
+        self, of: SmoothFunction, a: EigenvalueSample, b: EigenvalueSample
+    ) -> tuple[EigenvalueSample, complex] | None:
+        """Where a smooth function is zero, and the eigenvalue there; None if it has not the zero that it should."""
+        from scipy.optimize import brentq
+
+        f0, f1 = of(a)[0], of(b)[0]
+        if f0 * f1 > 0.0 or (f0 == 0.0 and f1 == 0.0):
+            return None
+        x0, x1 = a.place, b.place
+        place = float(
+            brentq(lambda x: of(self.at(x))[0], x0, x1, xtol=ROOT_TOLERANCE * max(1.0, x1), rtol=ROOT_TOLERANCE)
+        )
+        at = self.at(place)
+        left, value = of(at)
+        return None if abs(left) > ZERO_TOLERANCE * max(abs(f0), abs(f1)) else (at, value)
+
+    def _isolated(
+        self, a: EigenvalueSample, b: EigenvalueSample, through: list[tuple[complex, complex]]
+    ) -> list[StabilityEvent] | None:
+        """Eigenvalues that change sides, each by itself; None if one has not the zero that it should."""
+        out = []
+        for w0, w1 in through:
+            found = self._zero(self._tracked({a.place: w0, b.place: w1}), a, b)
+            if found is None:
+                return None
+            out.append(StabilityEvent("through", *found, int(np.sign(w1.real)) * (2 if w1.imag else 1)))
+        return out
+
+    def _meetings(self, a: EigenvalueSample, b: EigenvalueSample) -> list[StabilityEvent] | None:
+        """Two eigenvalues that meet, if that is all that happens."""
+        for what, (counts, more) in MEETING_KINDS.items():
+            for sign in (1, -1):
+                if _count_changes(a, b) == {k: sign * n for k, n in counts.items()}:
+                    of = self._meeting(what, a, b)
+                    found = None if of is None else self._zero(of, a, b)
+                    return None if found is None else [StabilityEvent(what, *found, sign * more)]
+        return None
+
+    def _tracked(self, known: dict[float, complex]) -> SmoothFunction:
+        """Real part of an eigenvalue that is known at some places, and where it is on the axis."""
+
+        def of(x: EigenvalueSample) -> tuple[float, complex]:
+            if x.place not in known:
+                candidates = np.argsort(np.abs(x.raw))[self.always :]
+                k = int(candidates[np.argmin(np.abs(x.raw[candidates] - _interpolated(known, x.place)))])
+                value = complex(x.raw[k])
+                if x.w[k] == 0.0:  # it cannot be told from those that are always zero, but their sum can
+                    value = complex(x.raw[x.w == 0.0].sum().real)
+                known[x.place] = value
+            value = known[x.place]
+            return value.real, complex(0.0, abs(value.imag))
+
+        return of
+
+    def _meeting(self, what: str, a: EigenvalueSample, b: EigenvalueSample) -> SmoothFunction | None:
+        """The square of half the difference of two eigenvalues that meet, and their mean."""
+        if what == "parting at zero":
+
+            def near_zero(x: EigenvalueSample) -> tuple[float, complex]:
+                w = x.raw[np.argsort(np.abs(x.raw))[: self.always + 2]]
+                return float((w * w).sum().real / 2.0), 0j
+
+            return near_zero
+        pair = _meeting_pair(what, a, b)
+        if pair is None:
+            return None
+        known = {x.place: complex(w.mean()) for x, w in zip((a, b), pair, strict=True)}
+
+        def of(x: EigenvalueSample) -> tuple[float, complex]:
+            mean = known.get(x.place)
+            if mean is None:
+                mean = _interpolated(known, x.place)
+            moving = x.raw[np.argsort(np.abs(x.raw))[self.always :]]
+            w = moving[np.argsort(np.abs(moving - mean))[:2]]
+            known.setdefault(x.place, complex(w.mean()))
+            upper = complex(0.0, abs(w.mean().imag)) if what == "pairs meet" else complex(w.mean().real)
+            return float((((w[0] - w[1]) / 2.0) ** 2).real), upper
+
+        return of
+
+
+def _count_changes(a: EigenvalueSample, b: EigenvalueSample) -> dict[str, int]:
+    """How many eigenvalues more lie where, in b than in a."""
+    change = Counter(b.counts)
+    change.subtract(a.counts)
+    return {k: n for k, n in change.items() if n}
+
+
+def _axis_crossings(a: EigenvalueSample, b: EigenvalueSample) -> list[tuple[complex, complex]]:
+    """Eigenvalues, one of each pair, that go on as such with a real part of the other sign: (in a, in b)."""
+    on = matching_branches(a, b)
+    alike = np.isin(a.kinds, ("+real", "-real")) == np.isin(b.kinds[on], ("+real", "-real"))
+    signs = ("+real", "-real", "+pair", "-pair")
+    moved = np.isin(a.kinds, signs) & np.isin(b.kinds[on], signs) & alike & (a.w.real * b.w[on].real < 0.0)
+    return [(complex(a.w[k]), complex(b.w[on[k]])) for k in np.flatnonzero(moved)]
+
+
+def _is_explained(a: EigenvalueSample, b: EigenvalueSample, through: list[tuple[complex, complex]]) -> bool:
+    """Whether eigenvalues that change sides are all that changes."""
+    change: Counter[str] = Counter()
+    for w0, w1 in through:
+        what = "pair" if w0.imag else "real"
+        change.update({("+" if w.real > 0.0 else "-") + what: n for w, n in ((w0, -1), (w1, 1))})
+    return bool(through) and {k: n for k, n in change.items() if n} == _count_changes(a, b)
+
+
+def _meeting_pair(what: str, a: EigenvalueSample, b: EigenvalueSample) -> tuple[np.ndarray, np.ndarray] | None:
+    """The two eigenvalues that meet, at both ends."""
+    apart, pair = ("axis", "+pair") if what == "pairs meet" else (f"{what[0]}real", f"{what[0]}pair")
+    here, there = (a, b) if a.counts.get(apart, 0) > b.counts.get(apart, 0) else (b, a)
+    on = matching_branches(here, there)
+    kinds = there.kinds[on]
+    gone = ("+pair", "-pair") if what == "pairs meet" else (pair, "")
+    ones = np.flatnonzero((here.kinds == apart) & np.isin(kinds, gone))
+    if len(ones) != 2:
+        return None
+    found = here.w[ones], there.w[on[ones]]
+    return found if here is a else (found[1], found[0])
+
+
+def _interpolated(known: dict[float, complex], place: float) -> complex:
+    """An eigenvalue as it follows from those known on both sides."""
+    low, high = max(k for k in known if k < place), min(k for k in known if k > place)
+    return known[low] + (place - low) / (high - low) * (known[high] - known[low])
+
+
+def _unresolved_event(a: EigenvalueSample, b: EigenvalueSample) -> StabilityEvent:
+    """Several events that cannot be told apart, or one that is no zero of anything smooth."""
+    more = a if a.growing > b.growing else b
+    grows = ("+real", "+pair")
+    on = matching_branches(more, a if more is b else b)
+    ones = more.w[np.isin(more.kinds, grows) & ~np.isin((a if more is b else b).kinds[on], grows)]
+    value = complex(ones[np.argmin(np.abs(ones.real))]) if len(ones) else 0j
+    return StabilityEvent("several", b, complex(0.0, value.imag), b.growing - a.growing)
+
+
+EVENT_TOLERANCE = 1e-9  # of the stretch between two values: events closer together at one eigenvalue are one
+VALUE_ROUNDING = 1e-13  # of the largest value: what is none
+REFINEMENT_FRACTIONS = (
+    0.25,
+    0.0625,
+    0.015625,
+    0.00390625,
+)  # of the way to the next value: samples beside where branches meet
+MEETING_SPAN = 2.0  # stretches between values: eigenvalues that are one, and apart again within these, only meet
+MAX_REFINED_MEETINGS = 16  # places where branches meet that are shown finely
+
+
+@dataclass(frozen=True, kw_only=True)
+class RootLocusOptions(OperatingPointOptions):
+    """What `Mechanism.root_locus` is asked."""
+
+    parameter: str
+    values: Sequence[float] | np.ndarray
+    equilibrium: bool
+    progress: bool | Callable[[float], None]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.about, Equilibrium):
+            raise ModelError("root_locus: an equilibrium is one of its own parameters; say equilibrium=True instead")
+        if self.about is not None and self.equilibrium:
+            raise ModelError("root_locus: say either about or equilibrium=True, which places the mechanism itself")
+        if self.frozen and self.equilibrium:
+            raise ModelError("root_locus: frozen does nothing where nothing moves: leave out frozen or equilibrium")
+
+    def here(self, value: float, about: Equilibrium | None) -> OperatingPointOptions:
+        """Where the mechanism is at a value; at an equilibrium if that is given."""
+        t, parameters = self.t, dict(self.parameters or {})
+        if self.parameter == "t":
+            t = value
+        else:
+            parameters[self.parameter] = float(value)
+        return OperatingPointOptions(
+            about=self.about if about is None else about,
+            t=t if about is None else None,
+            parameters=parameters,
+            coordinates=self.coordinates,
+            frozen=self.frozen,
+        )
+
+    def rest(self, values: Sequence[float] | np.ndarray, start: Equilibrium | None = None) -> EquilibriaOptions:
+        """What is asked for the equilibria at values."""
+        return EquilibriaOptions(
+            parameter=self.parameter,
+            values=values,
+            t=self.t or 0.0,
+            parameters=self.parameters,
+            start=start,
+            stable=False,
+            progress=False,
+        )
+
+
+def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
+    """Eigenvalues over values of a parameter, as branches, and where stability changes: see `Mechanism.root_locus`."""
+    refuse_unsupported(model, "root_locus", controlled=True)
+    refuse_sampled_controllers(model, "root_locus")
+    points = checked_values(model, o.parameter, o.values, o.t, o.parameters)
+    rest = (_ControlledEquilibria if model.controllers else _EquilibriumBranch)(model, o, points)
+
+    def at(place: float) -> EigenvalueSample:
+        value = float(np.interp(place, np.arange(len(points)), points))
+        about = rest.at(place, value) if o.equilibrium else None
+        here = o.here(value, about)
+        if not model.controllers:
+            return eigenvalue_sample(place, value, *equations_without_inputs(here.state(model), o.frozen))
+        d = auxiliary_instant(model, here.state(model), o.coordinates, (), frozen=o.frozen)
+        with d.errors_in_user_terms():
+            f, frame, r = equations_without_inputs(d.state, o.frozen, speed_scales=d.off)
+        return eigenvalue_sample(place, value, f, frame, without_auxiliary_coordinates(r, f, d.other.slides))
+
+    done = RootLocus(model.name, o.parameter, points[:0], np.zeros((0, 0), complex))
+    with progress_bar(o.progress, f"eigenvalues over {o.parameter}") as tell:
+        return _trace_locus(done, points, at, tell)
+
+
+class _EquilibriumBranch:
+    """Equilibria at the values and between them, along one branch."""
+
+    def __init__(self, model: Model, o: RootLocusOptions, points: np.ndarray) -> None:
+        self.model, self.o = model, o
+        self.along = equilibria(model, o.rest(points)) if o.equilibrium else None
+
+    def at(self, place: float, value: float) -> Equilibrium:
+        """The equilibrium at a place among the values."""
+        assert self.along is not None
+        about = self.along[int(place)]
+        if place == int(place):
+            return about
+        return equilibria(self.model, self.o.rest([self.along.values[int(place)], value], about))[1]
+
+
+class _ControlledEquilibria:
+    """The same with controllers: each search begins at the nearest one that is known."""
+
+    def __init__(self, model: Model, o: RootLocusOptions, points: np.ndarray) -> None:
+        self.model, self.o, self.known = model, o, dict[float, Equilibrium]()
+
+    def at(self, place: float, value: float) -> Equilibrium:
+        """The equilibrium at a place among the values."""
+        if place not in self.known:
+            near = min(self.known, key=lambda k: abs(k - place), default=None)
+            here = self.o.here(value, None)
+            start = None if near is None else self.known[near]
+            self.known[place] = equilibrium(self.model, rest_options(here.t or 0.0, here.parameters, start))
+        return self.known[place]
+
+
+def _trace_locus(
+    done: RootLocus, points: np.ndarray, at: Callable[[float], EigenvalueSample], report: ReportProgress
+) -> RootLocus:
+    """The locus at the values, then between them."""
+    taken: list[EigenvalueSample] = []
+    for k, value in enumerate(points):
+        try:
+            taken.append(at(float(k)))
+            if len(taken[k].w) != len(taken[0].w):
+                raise AnalysisError(f"there are {len(taken[k].w)} states, and {len(taken[0].w)} at the values before")
+        except AnalysisError as error:
+            raise series_error(done, value, error) from error
+        _write_branches(done, taken)
+        report(0.5 * (k + 1) / len(points), f"{value:.6g}")
+    search = CrossingSearch(at, min(x.counts.get("zero", 0) for x in taken))
+    search.taken = list(taken)
+    events = _events_between(search, taken, report)
+    done.crossings = _stability_changes(events, taken)
+    _refine_meetings(search, [e for e in events if "meet" in e.what or "part" in e.what], taken)
+    _write_branches(done, search.taken)
+    report(1.0, "")
+    return done
+
+
+def _write_branches(done: RootLocus, samples: Sequence[EigenvalueSample]) -> None:
+    """Write samples as branches."""
+    order = sorted(samples, key=lambda x: x.place)
+    base, last = order[0], np.lexsort((order[0].w.real, order[0].w.imag))
+    rows = [base.w[last]]
+    for k, x in enumerate(order[1:], 1):
+        own = matching_branches(base, x)[last]
+        rows.append(x.w[own])
+        if not _is_meeting(base, x, order[k + 1 :]):
+            base, last = x, own
+    done.path, done.path_values = np.array(rows), np.array([x.value for x in order])
+    given = [k for k, x in enumerate(order) if x.place == int(x.place)]
+    done.values, done.eigenvalues = done.path_values[given], done.path[given]
+    done.seen_from = tuple(dict.fromkeys(x.told for x in order if x.told))
+
+
+def _is_meeting(base: EigenvalueSample, x: EigenvalueSample, following: Sequence[EigenvalueSample]) -> bool:
+    """Whether eigenvalues that are apart before and soon after are one at a sample, where none has its own shape."""
+    many = len(np.unique(x.w))
+    if many >= len(np.unique(base.w)):
+        return False
+    return any(len(np.unique(y.w)) > many for y in following if y.place - base.place <= MEETING_SPAN)
+
+
+def _events_between(
+    search: CrossingSearch, samples: Sequence[EigenvalueSample], report: ReportProgress
+) -> list[StabilityEvent]:
+    """Events between the given values; those that lie on an event are passed over."""
+    on = crosses_axis(samples)
+    kept = [samples[0]]
+    for k, x in enumerate(samples[1:], 1):
+        if k == len(samples) - 1 or not (on[k] or _passes_zero(kept[-1], x, samples[k + 1])):
+            kept.append(x)
+    _add_turning_samples(search, kept)
+    found = []
+    for a, b in pairwise(kept):
+        found += search.between(a, b)
+        report(0.5 + 0.5 * b.place / len(samples), "where stability changes")
+    return found
+
+
+def _passes_zero(a: EigenvalueSample, x: EigenvalueSample, b: EigenvalueSample) -> bool:
+    """Whether more eigenvalues are zero at a sample than at either beside it."""
+    before, here, after = (k.counts.get("zero", 0) for k in (a, x, b))
+    return here > max(before, after)
+
+
+def _add_turning_samples(search: CrossingSearch, samples: list[EigenvalueSample]) -> None:
+    """Add samples where a parabola through three real parts of a branch turns on the other side of the axis."""
+    more = []
+    for a, b, c in zip(samples, samples[1:], samples[2:], strict=False):
+        if not a.counts == b.counts == c.counts:
+            continue
+        to, on = matching_branches(b, a), matching_branches(b, c)
+        for k in range(len(b.w)):
+            y = [a.w[to[k]].real, b.w[k].real, c.w[on[k]].real]
+            if 0.0 in y:
+                continue
+            bend = np.polyfit([a.place - b.place, 0.0, c.place - b.place], y, 2)
+            turn = -bend[1] / (2.0 * bend[0]) if bend[0] else np.inf
+            if a.place < b.place + turn < c.place and np.polyval(bend, turn) * y[1] < 0.0:
+                more.append(b.place + turn)
+    for place in dict.fromkeys(more):
+        samples.append(search.at(float(place)))
+    samples.sort(key=lambda x: x.place)
+
+
+def _stability_changes(events: Sequence[StabilityEvent], samples: Sequence[EigenvalueSample]) -> list[Crossing]:
+    """Changes of stability, those at one place and eigenvalue as one."""
+    fastest = max(float(np.abs(x.w).max(initial=0.0)) for x in samples)
+    least = VALUE_ROUNDING * max(abs(x.value) for x in samples)
+    found: list[tuple[float, Crossing]] = []
+    for e in sorted(events, key=lambda e: e.at.place):
+        if not e.change:
+            continue
+        kind = "flutter" if e.eigenvalue.imag > 0.0 else "divergence"
+        own = Crossing(e.at.value if abs(e.at.value) > least else 0.0, e.eigenvalue, kind, e.change)
+        if found:
+            place, other = found[-1]
+            if (
+                e.at.place - place <= EVENT_TOLERANCE
+                and abs(other.eigenvalue - own.eigenvalue) <= EVENT_TOLERANCE * fastest
+            ):
+                found[-1] = place, other._replace(change=other.change + own.change)
+                continue
+        found.append((e.at.place, own))
+    return [c for _, c in found if c.change]
+
+
+def _refine_meetings(
+    search: CrossingSearch, events: Sequence[StabilityEvent], samples: Sequence[EigenvalueSample]
+) -> None:
+    """Samples beside the places where branches meet: there they move as a square root does."""
+    for e in events[:MAX_REFINED_MEETINGS]:
+        for side in (-1.0, 1.0):
+            end = np.floor(e.at.place) if side < 0.0 else np.floor(e.at.place) + 1.0
+            for part in REFINEMENT_FRACTIONS:
+                search.at(float(e.at.place + part * (min(end, len(samples) - 1.0) - e.at.place)))

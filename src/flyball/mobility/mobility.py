@@ -1,0 +1,498 @@
+"""Degrees of freedom and redundancy: Gruebler's count, the true rank, free motions and redundant sets by name.
+
+The counts are found at once, since every motion begins with them. What takes longer is found when it is asked
+for: the sets of constraints that depend on one another and their remedies (``sets``), the free motions by name
+(``motions``), and what the mobility depends on (``geometry``): counting, special dimensions, or a singular
+position. Two experiments decide the last: the frames of all joints are perturbed at random (freedom that is lost
+then depends on exact dimensions), and the mechanism is moved along its free motions and closed again (where the
+rank is larger there, the position is singular).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..assembly.assembled_state import Assembly, consistent_state
+from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from ..assembly.positions_and_velocities import closed_position_near
+from ..engine.kinematics import retract
+from ..errors import AssemblyError, ModelError
+from ..model.body import Body, Driver, Initial
+from ..model.geometry import orientation_matrix
+from ..model.joint import Joint
+from ..model.model import Model
+from ..model.unsupported_elements import ignored_elements
+from ..numerics.rank import rank
+from ..numerics.sparse_rank import DENSE, null_spaces, sparse_null_space
+from ..results.mobility import FreedomGeometry, FreeMotion, Mobility, RedundantSet
+from ..tables.forest import point_mass_obstacles
+from ..tables.table_definitions import POINT, Frames
+from .null_spaces import (
+    ConstraintNullSpaces,
+    is_small,
+    jacobian_rank,
+    minimal_subspaces,
+    scaled_jacobian,
+    undetermined_components,
+    velocity_scales,
+)
+from .remedies import find_remedies
+
+NEGLIGIBLE_SPEED = 1e-7  # part of a motion's largest velocity below which something stands still
+NAMING_THRESHOLD = 1e-2  # part of it that a coordinate must have to name the motion
+
+
+def free_motions(a: Assembly, motions: np.ndarray) -> tuple[FreeMotion, ...]:
+    """A basis of the free motions in which each moves as few bodies as can be, named by what moves.
+
+    Parameters
+    ----------
+    a : Assembly
+        In absolute coordinates.
+    motions : ndarray (nv, f)
+        Any basis.
+    """
+    if not motions.shape[1]:
+        return ()
+    c = a.compiled
+    place = {name: b for name, b in c.structure.place.items() if b >= 0}
+    tree = c.values.system.tree
+    groups = [np.arange(tree.v[b], tree.v[b] + tree.nv[b]) for b in place.values()]
+    scale = velocity_scales(c)[:, None]
+    names, gradients = _candidate_coordinates(a)
+    out: list[FreeMotion] = []
+    for bodies, basis in sorted(minimal_subspaces(motions / scale, groups), key=lambda s: len(s[0])):
+        moving = [list(place)[b] for b in bodies]
+        used = {m.coordinate for m in out}
+        free = [k for k, name in enumerate(names) if name not in used]
+        out += _named_motions(a, basis * scale, moving, [names[k] for k in free], gradients[free])
+    return tuple(out)
+
+
+def _candidate_coordinates(a: Assembly) -> tuple[list[str], Any]:
+    """Coordinates that may name a motion, those next to ground first, then bodies' own; and their sparse gradients."""
+    own = a.compiled
+    model = own.structure.model
+    depth = _joint_distances(model)
+    joints = sorted(model.joints, key=lambda j: _joint_distance(depth, model, j))
+    names = [f"{j.name}.{what}" for j in joints for what in j.measured(model.planar)]
+    axes = ("angle", "x", "y") if model.planar else ("x", "y", "z")
+    names += [f"{b.name}.{what}" for b in model.bodies for what in axes]
+    measuring = model.copy()
+    measuring.initial = [Initial(name=name, value=0.0) for name in names]
+    held = dict.fromkeys(names, 0.0)
+    probe = compile_mechanism(measuring, parameters=own.values.told, holds=measuring.initial, held=held)
+    probe.follow(own.hints)
+    probe.at(a.t, a.q, a.v)
+    G = probe.sparse_jacobian()
+    return names, G[[probe.structure.slices[name].start for name in names]]
+
+
+def _joint_distances(model: Any) -> dict[str, int]:
+    """How many joints a body is away from ground."""
+    depth = {"ground": 0}
+    links = [tuple(model.carrier(n, j) for n in (j.body_i, j.body_j)) for j in model.joints]
+    grown = True
+    while grown:
+        grown = False
+        for i, j in links:
+            for one, other in ((i, j), (j, i)):
+                if one in depth and depth.get(other, 1 << 30) > depth[one] + 1:
+                    depth[other], grown = depth[one] + 1, True
+    return depth
+
+
+def _joint_distance(depth: dict[str, int], model: Any, j: Joint) -> int:
+    return min(depth.get(model.carrier(n, j), 1 << 30) for n in (j.body_i, j.body_j))
+
+
+def _named_motions(a: Assembly, basis: np.ndarray, bodies: list[str], names: list[str], D: Any) -> list[FreeMotion]:
+    """Motions that the same bodies share, told apart by coordinates of joints, then by how the bodies turn and move.
+
+    Each coordinate chosen has the rate 1 in its own motion and 0 in the others.
+    """
+    c = a.compiled
+    s = c.structure
+    size = velocity_scales(c)
+    joints = {j.name for j in s.model.joints}
+    moving = set(bodies)
+    first = [k for k, name in enumerate(names) if name.partition(".")[0] in joints]
+    later = [k for k, name in enumerate(names) if name.partition(".")[0] in moving]
+    turns = (
+        np.zeros((0, s.nv)) if s.model.planar else np.vstack([_angular_velocity_rows(c, s.place[b]) for b in bodies])
+    )
+    labels = [names[k] for k in first] + [""] * len(turns) + [names[k] for k in later]
+    rates = np.vstack([D[first] @ basis, turns @ basis, D[later] @ basis])
+    full = np.concatenate([abs(D[first]) @ size, np.abs(turns) @ size, abs(D[later]) @ size])
+    left, chosen = np.eye(basis.shape[1]), []  # coefficients of what is not named yet
+    for k, row in enumerate(rates):
+        if not left.shape[1]:
+            break
+        rate = row @ left
+        j = int(np.argmax(np.abs(rate)))
+        if not np.abs(rate[j]) > 0.0:
+            continue
+        largest = np.abs((basis @ left[:, j]) / size).max()
+        if np.abs(rate[j]) > NAMING_THRESHOLD * largest * max(full[k], 1e-300):
+            chosen.append(k)
+            left = np.delete(left, j, axis=1) - np.outer(left[:, j] / rate[j], np.delete(rate, j))
+            left = left / np.maximum(np.sqrt((left**2).sum(axis=0)), 1e-300)
+    tidy = basis @ np.linalg.inv(rates[chosen])
+    return [_free_motion(a, tidy[:, i], labels[k]) for i, k in enumerate(chosen)]
+
+
+def _angular_velocity_rows(c: CompiledMechanism, b: int) -> np.ndarray:
+    """Rows that give the angular velocity of a spatial body in world axes."""
+    out = np.zeros((3, c.structure.nv))
+    v0 = int(c.values.system.tree.v[b])
+    if c.values.system.tree.joint[b] == POINT:
+        return out
+    out[:, v0 + 3 : v0 + 6] = c.work.BK[b, 3:12].reshape(3, 3)
+    return out
+
+
+def _free_motion(a: Assembly, velocity: np.ndarray, coordinate: str) -> FreeMotion:
+    c = a.compiled
+    s = c.structure
+    tree = c.values.system.tree
+    speed = np.abs(velocity / velocity_scales(c))
+    fast = {
+        name: float(speed[tree.v[b] : tree.v[b] + tree.nv[b]].max())
+        for name, b in s.place.items()
+        if b >= 0 and isinstance(s.model[name], Body)
+    }
+    largest = max(fast.values())
+    moving = tuple(name for name, x in fast.items() if x > NEGLIGIBLE_SPEED * largest)
+    if coordinate:
+        return FreeMotion(coordinate, coordinate, moving, velocity)
+    name = max((n for n in moving if n not in s.points), key=fast.__getitem__)
+    b = s.place[name]
+    own = velocity[tree.v[b] : tree.v[b] + tree.nv[b]]
+    others = f"; {', '.join(n for n in moving if n != name)} with it" if len(moving) > 1 else ""
+    return FreeMotion(f"{name} {_rotation_text(a, name, own)}{others}", "", moving, velocity)
+
+
+def _rotation_text(a: Assembly, name: str, u: np.ndarray) -> str:
+    """How a spatial body turns: about its own axis, where its mass centre and all its joints lie on that."""
+    c = a.compiled
+    b = c.structure.place[name]
+    p, R = c.work.BK[b, :3], c.work.BK[b, 3:12].reshape(3, 3)
+    w, v = R @ u[3:], u[:3]
+    axis = w / np.linalg.norm(w)
+    at = p + np.cross(w, v) / (w @ w)
+    S = c.values.system
+    joints = {j.name for j in c.structure.model.joints}
+    frames = {k for t in c.structure.terms if t.element.name in joints for k in (t.F, t.M)}
+    points = [p, *(c.work.FK[k, :3] for k in sorted(frames) if S.frame_body[k] == b)]
+    near = 1e-6 * c.values.length
+    through = all(np.linalg.norm(np.cross(x - at, axis)) < near for x in points)
+    direction = ", ".join(f"{x + 0.0:.3g}" for x in np.where(np.abs(axis) < 1e-9, 0.0, axis))
+    if through and max(np.linalg.norm(x - p) for x in points) > near:
+        return f"spins about its own axis ({direction})"
+    if abs(w @ v) > 1e-9 * (w @ w) * c.values.length:
+        return f"turns about ({direction}) and moves along it"
+    where = ", ".join(f"{x + 0.0:.4g}" for x in np.where(np.abs(at) < near, 0.0, at))
+    return f"turns about ({direction}) through ({where}) m"
+
+
+PERTURBATION = 0.03  # how far frames are shaken: part of the mechanism's length, and radians
+MOTION_STEP = 0.04  # how far the mechanism is moved: the same
+MOTION_TRIALS = 6
+LEAST_DISPLACEMENT = 0.2  # part of a step that must be left of it when the mechanism is closed again
+
+
+def mobility_geometry(m: Mobility, spaces: ConstraintNullSpaces) -> FreedomGeometry:
+    """What the freedoms of a count rest on."""
+    if m.freedoms == 0:
+        return FreedomGeometry(0, 0, 0, m.gruebler)
+    a = spaces.assembly
+    positions = nearby_positions(a, spaces.velocities)
+    c = a.compiled
+    still = np.zeros(c.structure.nv)
+    ranks = []
+    for q in positions:
+        c.at(a.t, q, still)
+        ranks.append(jacobian_rank(c))
+    c.at(a.t, a.q, a.v)
+    nearby = m.velocities - max(ranks) if ranks else (0 if m.redundancy else m.freedoms)
+    generic = nearby if m.rows <= m.rank else min(nearby, m.velocities - _perturbed_rank(a))
+    return FreedomGeometry(m.freedoms, nearby, generic, m.gruebler, positions)
+
+
+def nearby_positions(a: Assembly, motions: np.ndarray) -> list[np.ndarray]:
+    """Closed positions a small step along free motions, as far as there are any."""
+    c = a.compiled
+    model = c.structure.model
+    near = c
+    if not all(r.holonomic for r in c.structure.rows):
+        near = compile_mechanism(model, parameters=c.values.told, positions=True)
+        near.follow(c.hints)
+    scale = velocity_scales(c)
+    random = np.random.default_rng(1)
+    k = motions.shape[1]
+    mixes = [*np.eye(k)[: MOTION_TRIALS // 2], *random.normal(size=(MOTION_TRIALS - min(k, MOTION_TRIALS // 2), k))]
+    out = []
+    for mix in mixes:
+        u = motions @ mix
+        d = MOTION_STEP * c.values.length * u / max(float(np.abs(u / scale).max(initial=0.0)), 1e-300)
+        for step in (d, -d):
+            start = a.q.copy()
+            retract(c.values.system, start, step)
+            q = closed_position_near(near, a.t, start)
+            if q is not None and _position_distance(c, q, a.q) > LEAST_DISPLACEMENT * _position_distance(c, start, a.q):
+                out.append(q)
+                break
+    return out
+
+
+def _position_distance(c: CompiledMechanism, q: np.ndarray, start: np.ndarray) -> float:
+    """How far apart positions are [m], turns counted by the mechanism's length."""
+    size = np.ones(len(q))
+    shifts = 2 if c.structure.model.planar else 3
+    tree = c.values.system.tree
+    for q0, nq in zip(tree.q, tree.nq, strict=True):
+        size[q0 + shifts : q0 + nq] = c.values.length
+    return float(np.linalg.norm((q - start) * size))
+
+
+def _perturbed_rank(a: Assembly) -> int:
+    """Rank where the frames of all joints are somewhere else, by a little and at random."""
+    c = compile_mechanism(a.compiled.structure.model, parameters=a.compiled.values.told)
+    s = c.structure
+    S = c.values.system
+    frames = Frames(S.frames.position.copy(), S.frames.rotation.copy())
+    random = np.random.default_rng(2)
+    for k in range(len(S.frame_body)):
+        if s.frames[k].role == "world":
+            continue
+        shift, turn = PERTURBATION * c.values.length * random.normal(size=3), PERTURBATION * random.normal(size=3)
+        if s.model.planar:
+            shift[2] = turn[0] = turn[1] = 0.0
+        frames.position[k] += shift
+        frames.rotation[k] = (frames.rotation[k].reshape(3, 3) @ orientation_matrix(turn, "turn")).ravel()
+    shaken = CompiledMechanism(replace(c.values, system=S._replace(frames=frames)), c.z)
+    shaken.follow(a.compiled.hints)
+    shaken.at(a.t, a.q, a.v)
+    return jacobian_rank(shaken)
+
+
+CONTRADICTION_TOLERANCE = (
+    1e-8  # a dependency of unit size that adds up to more than this part of the mechanism's length contradicts
+)
+
+MAX_DEPENDENCIES = (
+    64  # constraints too many that are connected with one another, of which sets are sought in a large mechanism
+)
+LEAST_DRIVER_SHARE = (
+    1e-3  # part of the largest share in a dependency that a driver must have for the gap to be seen at it
+)
+
+
+def redundant_sets(
+    spaces: ConstraintNullSpaces, positions: list[np.ndarray], infinitesimal: bool, redundancy: int
+) -> tuple[RedundantSet, ...]:
+    """The sets, smallest first. Cures hold in all these positions, and if those of the sets before are done too.
+
+    ``infinitesimal``: the mechanism can shake but not move, so that what depends on one another does so here only.
+    ``redundancy``: constraints too many. Of a large mechanism in which more than `MAX_NAMED_MOTIONS` of them are connected with one
+    another, the sets found are not all there are.
+    """
+    lam, a = spaces.dependencies, spaces.assembly
+    if not lam.shape[1]:
+        return ()
+    c = a.compiled
+    s = c.structure
+    c.at(a.t, a.q, a.v)
+    G, size, _ = scaled_jacobian(c)
+    size = np.maximum(size, 1e-300)
+    names = list(s.slices)
+    groups = [np.arange(r.start, r.stop) for r in s.slices.values()]
+    most = MAX_DEPENDENCIES if max(G.shape) > DENSE else lam.shape[1]
+    found = minimal_subspaces(lam * size[:, None], groups, most)
+    all_found = sum(basis.shape[1] for _, basis in found) == redundancy
+    found.sort(key=lambda x: len(x[0]))
+    g, nu = c.work.rows.value / size, (c.sparse_jacobian() @ a.v - c.work.rows.nu) / size
+    those = [tuple(names[e] for e in elements) for elements, _ in found]
+    tried = find_remedies(spaces, those, positions)
+    out = []
+    for elements, (numbers, basis), (cure, here_only, cut) in zip(those, found, tried, strict=True):
+        what, gap, unit = _disagreement(basis, g, nu, size, c)
+        loose = undetermined_components(a, basis / size[:, None], list(elements))
+        drivers = tuple(n for n in elements if isinstance(s.model[n], Driver))
+        loose = {k: v for k, v in loose.items() if k not in drivers}
+        here_only = not what and (here_only or infinitesimal)
+        cure = None if what or here_only else cure
+        count = basis.shape[1]
+        if not all_found:  # those of a set's own rows are
+            own = G[np.concatenate([groups[e] for e in numbers])].toarray()
+            count = len(own) - rank(own)
+        out.append(RedundantSet(elements, count, what, gap, here_only, loose, cure, drivers, cut, unit))
+    return tuple(out)
+
+
+def _disagreement(
+    basis: np.ndarray, g: np.ndarray, nu: np.ndarray, size: np.ndarray, c: CompiledMechanism
+) -> tuple[str, float, str]:
+    """What the rows of a dependency disagree on, by how much, and the unit of that.
+
+    Seen at the first driver among them, or at the row with the largest share.
+    """
+    unit, length = basis / np.abs(basis).max(axis=0), c.values.length
+    for what, off, scale, per in (
+        ("position", g, length, ""),
+        ("velocity", nu, max(length, float(np.abs(nu).max(initial=0.0))), "/s"),
+    ):
+        gaps = np.abs(unit.T @ off)
+        if gaps.max() > CONTRADICTION_TOLERANCE * scale:
+            j = int(gaps.argmax())
+            share = np.abs(unit[:, j])
+            driven = np.array([isinstance(r.element, Driver) for r in c.structure.rows]) & (share > LEAST_DRIVER_SHARE)
+            k = int(np.argmax(driven)) if driven.any() else int(share.argmax())
+            return what, float(gaps[j] / share[k] * size[k]), ("m" if c.metric[k] else "rad") + per
+    return "", 0.0, ""
+
+
+MAX_NAMED_MOTIONS = 64  # free motions of a large mechanism that are named; counted are all
+
+
+class MobilityDetails(ConstraintNullSpaces):
+    """What a count found, and how more is found when it is asked for."""
+
+    @property
+    def name(self) -> str:
+        """Of the mechanism."""
+        return self.assembly.compiled.structure.model.name
+
+    def sets(self, m: Mobility) -> tuple[RedundantSet, ...]:
+        """See `Mobility.sets`."""
+        if self.gap:
+            return redundant_sets(self, [], False, m.redundancy)
+        g = m.geometry
+        return redundant_sets(self, g.positions, g.singular and not g.positions, m.redundancy)
+
+    def motions(self, m: Mobility) -> tuple[FreeMotion, ...]:
+        """See `Mobility.motions`."""
+        a = self.assembly
+        a.compiled.at(a.t, a.q, a.v)  # turns are named by where bodies are
+        large = max(m.rows, m.velocities) > DENSE
+        return free_motions(a, self.velocities[:, : MAX_NAMED_MOTIONS if large else None])
+
+    def geometry(self, m: Mobility) -> FreedomGeometry:
+        """See `Mobility.geometry`."""
+        return mobility_geometry(m, self)
+
+
+def mobility(
+    model: Model,
+    a: Assembly | None = None,
+    *,
+    t: float = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    inertia: bool = False,
+) -> Mobility:
+    """Freedoms and redundancy at a position.
+
+    Parameters
+    ----------
+    model : Model
+    a : Assembly, optional
+        Where; assembled at time ``t`` if not given. A mechanism that cannot be assembled is then looked at in the best
+        position found: the constraints that contradict one another are those that depend on one another there.
+    t : float [s]
+    parameters : mapping, optional
+        Values of parameters in SI units, in place of the model's.
+    inertia : bool
+        Refuse bodies that can move without any inertia: where forces are to move them, they could not.
+
+    Returns
+    -------
+    Mobility
+
+    Raises
+    ------
+    ModelError
+        If a body can move without any inertia and may not.
+    AssemblyError
+        If velocities disagree though positions do not depend on one another.
+    """
+    gap = ""
+    if a is None:
+        try:
+            a = consistent_state(model, t=t, parameters=parameters)
+        except AssemblyError as error:
+            if error.best is None:
+                raise
+            a, gap = error.best, str(error)
+    c = a.compiled
+    if c.structure.rows:  # else nothing is asked of where it is, and the engine need not be compiled
+        c.at(a.t, a.q, a.v)
+    s, S = c.structure, c.values.system
+    G, size, scale = scaled_jacobian(c, is_small(c))
+    nr, nv = (int(n) for n in G.shape)
+    rank, dependent, motions = null_spaces(G)
+    if inertia and S.scales.semidefinite > 0.0:
+        check_inertia(model, a, massless_motions(a, G, scale) if motions is None else motions * scale[:, None])
+    names: list[str] = []
+    for k in np.flatnonzero(np.abs(dependent).max(axis=1, initial=0.0) > 1e-6).tolist():
+        if (name := s.rows[k].element.name) not in names:
+            names.append(name)
+    lam = dependent / np.maximum(size, 1e-300)[:, None]
+    there = MobilityDetails(a, lam, None if motions is None else motions * scale[:, None], gap)
+    without = ignored_elements(model)
+    loose = undetermined_components(a, lam, names) if len(names) else {}
+    return Mobility(nv, nr, rank, tuple(names), loose, without, there, lam.shape[1])
+
+
+# Motions without inertia: the constraints allow them and no mass resists, so that nothing determines them.
+
+
+ROTATION_PART = 1e-3  # part of a motion that is no turn
+
+
+def massless_motions(a: Assembly, G: Any, scale: np.ndarray) -> np.ndarray:
+    """Motions (nv, k) that the constraints allow and no mass resists, from M + G^T G."""
+    import scipy.sparse as sp
+
+    M = sp.diags(scale) @ a.compiled.mass() @ sp.diags(scale)
+    return sparse_null_space(M / M.diagonal().max() + G.T @ G)[1] * scale[:, None]
+
+
+def check_inertia(model: Model, a: Assembly, motions: np.ndarray) -> None:
+    """Refuse motions that no mass resists.
+
+    Raises
+    ------
+    ModelError
+        Naming the body that could move without inertia.
+    """
+    if not motions.shape[1]:
+        return
+    i, j, M = a.compiled.mass_entries()
+    K = motions[i].T @ (M[:, None] * motions[j])
+    w, V = np.linalg.eigh(K)
+    if w[0] > 1e-9 * max(w[-1], 1e-300):
+        return
+    motion = motions @ V[:, 0]
+    tree = a.compiled.values.system.tree
+    size = [np.abs(motion[v0 : v0 + n]).max() for v0, n in zip(tree.v, tree.nv, strict=True)]
+    b = int(np.argmax(size))
+    name = next(k for k, v in a.compiled.structure.place.items() if v == b)
+    v0, n = int(tree.v[b]), int(tree.nv[b])
+    shifts = 2 if model.planar else 3
+    turns = motion[v0 + shifts : v0 + n]
+    if np.abs(turns).max(initial=0.0) < ROTATION_PART * size[b]:
+        raise ModelError(
+            f"body {name!r} can move without any mass resisting it, so its motion is not determined. Give it a "
+            f"mass, or joints that make it move with bodies that have one"
+        )
+    about = "turn" if shifts == 2 else f"turn about ({', '.join(f'{x:.3g}' for x in turns / np.linalg.norm(turns))})"
+    why = point_mass_obstacles(model).get(name, "")
+    raise ModelError(
+        f"body {name!r} can {about} (its own axes) without any inertia resisting it, so its motion is not determined. "
+        f"Give it a moment of inertia, or joints that prevent this motion"
+        + (f"; it is no point mass, which would not turn, since {why}" if why else "")
+    )

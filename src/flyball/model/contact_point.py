@@ -1,0 +1,97 @@
+"""A contact point of two bodies in event-driven integration: a gap and, with friction, slip rows."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+
+from ..constraints import corner_on_box, displacement
+from ..constraints.blocks import Row
+from ..constraints.switch_kinds import EDGE, SLIP, STOP
+from .element import element
+from .force import Switch, TwoFrameForce
+from .joint import WorldFrame
+
+Term = tuple[float, ...]  # the kind of a row and its eight parameters
+
+
+@element
+class Touch(TwoFrameForce):
+    """A place of a `Contact`: what stays apart, and with friction what sticks or slides there.
+
+    These are made from the shapes when a motion begins, not written by hand.
+
+    Parameters
+    ----------
+    name : str
+        ``"ball-floor"``, with a number where two bodies have several.
+    body_i, body_j : str
+        Bodies of F and M; ``"ground"`` for what stands still.
+    frames : two tuples of 12 numbers
+        F and M in the world as drawn: origin, rotation row by row.
+    gap : tuple of 9 numbers
+        The row that says how far apart the sides are: its kind, its parameters.
+    seen : tuple of 9 numbers
+        The same as it is watched while they are apart, where that is another.
+    slips : tuples of 9 numbers
+        The rows that say how fast the sides slide, one in the plane and two in space; none without friction.
+    friction : two numbers
+        Coefficients of rest and of sliding.
+    restitution : number
+    """
+
+    frames: tuple[tuple[float, ...], tuple[float, ...]]
+    gap: Term
+    seen: Term | None = None
+    slips: tuple[Term, ...] = ()
+    friction: tuple[float, float] = (0.0, 0.0)
+    restitution: float = 0.0
+
+    kind: ClassVar[int] = 1000  # behind all others; no formula of its own: it acts by its switches
+    outputs: ClassVar[dict[str, str]] = {"gap": "m", "normal": "N", "friction": "N", "slip": "m/s"}
+    sliding: ClassVar[bool] = True
+
+    @property
+    def radius(self) -> float:
+        """Of the ball about M's origin; 0 of a corner."""
+        return self.gap[7] if int(self.gap[0]) == displacement.KIND else self.gap[4]
+
+    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame]:
+        """Its frames."""
+        F, M = ((np.array(x[:3]), np.array(x[3:]).reshape(3, 3)) for x in self.frames)
+        return {"F": F, "M": M}
+
+    def acts(self) -> bool:
+        """Whether there is friction."""
+        return bool(self.slips)
+
+    def conservative(self) -> bool:
+        """What is smooth takes nothing."""
+        return not self.slips
+
+    def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[float, float]:
+        """The face that its corner is on, and 0."""
+        f, m = ((tuple(p), tuple(R.ravel())) for p, R in (F, M))
+        return corner_on_box.foot(self.gap[1:], f, m, 0.0, None), 0.0
+
+    def switches(self) -> tuple[Switch, ...]:
+        """The gap, and the slip along each tangent."""
+        seen = () if self.seen is None else (("F", "M", _row(self.seen)),)
+        out = [Switch(STOP, "gap", path=(("F", "M", _row(self.gap)),), seen=seen)]
+        for k, slip in enumerate(self.slips):
+            path = (("F", "M", _row(slip, holonomic=False)),)
+            out.append(Switch(SLIP, f"slip_{k + 1}", path=path, slides=k == 0, other="gap"))
+        if self.seen is not None:
+            margin = (corner_on_box.KIND_MARGIN, *self.gap[1:])
+            out.append(Switch(EDGE, "edge", path=(("F", "M", _row(margin)),), other="gap"))
+        return tuple(out)
+
+    def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
+        """Of the gap its least value and the restitution, of a slip both coefficients."""
+        return (0.0, np.inf, self.restitution) if label == "gap" else () if label == "edge" else self.friction
+
+
+def _row(term: Term, holonomic: bool = True) -> Row:
+    return Row(int(term[0]), tuple(term[1:]), holonomic=holonomic)

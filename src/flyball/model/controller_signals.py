@@ -1,0 +1,371 @@
+"""Signals of controllers as expressions of measured quantities, time, parameters and the controllers' states.
+
+Where a law names a controller, the formula of its output is substituted, so that all readers of laws know it,
+nonsmooth points of limits included. A state is a name such as ``pid.integral``, which laws read as they read a
+sensor. Algebraic loops of signals are solved where each signal is linear in the others.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ..errors import ExpressionError, ModelError
+from .controller import Controller, refuse_equal
+from .element import LawOf, resolve
+from .expression_parser import SyntaxNode, call_node
+from .expressions import Expression
+from .messages import suggest
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+ZERO, ONE = (SyntaxNode("number", (), x) for x in (0.0, 1.0))
+SINGULAR_GAIN = 1e-9  # of 1: what is left of a loop's own gain below which it says nothing of its signal
+
+
+def solve_loop(tree: SyntaxNode, name: str, whose: str, ring: str) -> SyntaxNode:
+    """What a signal is, by a formula of it in which its own name stands: y = a y + b gives b / (1 - a).
+
+    Parameters
+    ----------
+    tree : Node
+    name : str
+        Of the signal.
+    whose, ring : str
+        The controller and the signals on the way round, for messages.
+
+    Raises
+    ------
+    ModelError
+        If the formula is not linear in the signal, or any signal fulfils it, or none.
+    """
+    parts = _linear(tree, name)
+    if parts is None:
+        raise ModelError(
+            f"{whose}: its {name.partition('.')[2]} depends on itself at the same instant, and not linearly (limits, "
+            f"products, functions): {ring}. Have one of them go through a state, as a Lag or an Integrator has, or "
+            f"sample one of the controllers (period=...)"
+        )
+    a, b = parts
+    if a.kind == "number" and abs(a.value - 1.0) <= SINGULAR_GAIN:
+        raise ModelError(
+            f"{whose}: its {name.partition('.')[2]} depends on itself at the same instant with the gain 1, which "
+            f"leaves it open: {ring}. Have one of them go through a state, as a Lag or an Integrator has"
+        )
+    return _over(b, _plus(ONE, _minus(a)))
+
+
+def _folded(tree: SyntaxNode) -> SyntaxNode:
+    """The tree with sums, products and ratios of numbers in one."""
+    if not tree.args:
+        return tree
+    args = tuple(_folded(x) for x in tree.args)
+    if tree.kind == "neg":
+        return _minus(args[0])
+    by = {"+": _plus, "-": lambda x, y: _plus(x, _minus(y)), "*": _times, "/": _over}.get(tree.kind)
+    plain = by is not None and all(x.kind == "number" for x in args)
+    return by(*args) if plain and by is not None else replace(tree, args=args)
+
+
+def _linear(tree: SyntaxNode, name: str) -> tuple[SyntaxNode, SyntaxNode] | None:
+    """Factor and rest, a and b of a y + b, both without the name; None if it is not of this form."""
+    if all(n.kind != "name" or n.value != name for n in tree.walk()):
+        return ZERO, _folded(tree)
+    if tree.kind == "name":
+        return ONE, ZERO
+    found = [_linear(x, name) for x in tree.args]
+    if any(x is None for x in found):
+        return None
+    parts = [x for x in found if x is not None]
+    if tree.kind == "neg":
+        return _minus(parts[0][0]), _minus(parts[0][1])
+    if tree.kind in ("+", "-"):
+        first, last = parts
+        if tree.kind == "-":
+            last = _minus(last[0]), _minus(last[1])
+        return _plus(first[0], last[0]), _plus(first[1], last[1])
+    if tree.kind == "*":
+        for (a, b), (none, by) in (parts, parts[::-1]):
+            if none == ZERO:
+                return _times(a, by), _times(b, by)
+    if tree.kind == "/" and parts[1][0] == ZERO:
+        return _over(parts[0][0], parts[1][1]), _over(parts[0][1], parts[1][1])
+    if tree.kind == "where" and parts[0][0] == ZERO:
+        (_, when), (a, b), (c, d) = parts
+        return SyntaxNode("where", (when, a, c)), SyntaxNode("where", (when, b, d))
+    return None
+
+
+def _minus(x: SyntaxNode) -> SyntaxNode:
+    return SyntaxNode("number", (), -x.value) if x.kind == "number" else SyntaxNode("neg", (x,))
+
+
+def _plus(x: SyntaxNode, y: SyntaxNode) -> SyntaxNode:
+    if x.kind == y.kind == "number":
+        return SyntaxNode("number", (), x.value + y.value)
+    return y if x == ZERO else x if y == ZERO else SyntaxNode("+", (x, y))
+
+
+def _times(x: SyntaxNode, y: SyntaxNode) -> SyntaxNode:
+    if x.kind == y.kind == "number":
+        return SyntaxNode("number", (), x.value * y.value)
+    return ZERO if ZERO in (x, y) else y if x == ONE else x if y == ONE else SyntaxNode("*", (x, y))
+
+
+def _over(x: SyntaxNode, y: SyntaxNode) -> SyntaxNode:
+    if x.kind == y.kind == "number" and y.value != 0.0:
+        return SyntaxNode("number", (), x.value / y.value)
+    return ZERO if x == ZERO else x if y == ONE else SyntaxNode("/", (x, y))
+
+
+MAX_OPERATIONS = 20_000
+"""Operations of one law, controllers' formulas in their places: longer ones are refused."""
+CONTROLLER_INPUT = LawOf(None, curves=True)
+"""What laws that controllers are given may use."""
+
+
+class ConnectedState(NamedTuple):
+    """One state of a controller, wired; of a sampled one also a signal, which is held."""
+
+    controller: Controller
+    state: str
+    law: Expression  # its rate, or its value from the next sample on
+    signal: bool = False
+
+    @property
+    def name(self) -> str:
+        """As laws read it: "pid.integral"."""
+        return f"{self.controller.name}.{self.state}"
+
+
+def controllers_by_name(model: Model) -> dict[str, Controller]:
+    """Controllers by name, those that are just being added too."""
+    return {c.name: c for c in (*model.controllers, *vars(model).get("_adding", ()))}
+
+
+def signal_names(model: Model) -> Collection[str]:
+    """All names of signals and states that laws may use."""
+    return _signal_graph(model).names if controllers_by_name(model) else ()
+
+
+def substitute_signals(model: Model, law: Expression, of: LawOf) -> Expression:
+    """The law with formulas of controllers' signals in the places of their names; of a function its arguments are."""
+    known = set(signal_names(model))
+    if not law.names & known:
+        return law
+    if law.function is None:
+        return dataclasses.replace(law, tree=_signal_graph(model).placed(law.tree))
+    tree = call_node(law.tree, model.names_in_laws(of), law.text, law.where)
+    return dataclasses.replace(law, tree=_signal_graph(model).placed(tree), function=None)
+
+
+def signal_law(model: Model, e: Controller, name: str) -> Expression:
+    """A signal of a controller, or a state, as a law."""
+    return Expression(f"{e.name}.{name}", _signal_graph(model).signal(e, name), None, f"{name} of {e.title}")
+
+
+def input_law(model: Model, e: Controller, name: str) -> Expression:
+    """What a controller is given, as a law."""
+    return Expression(name, _signal_graph(model).template(e, name), None, f"{e.called(name)} of {e.title}")
+
+
+def controller_states(model: Model) -> list[ConnectedState]:
+    """All states of all controllers: those with a rate; then of sampled ones signals, in the order in which they are
+    known, and states.
+
+    Raises
+    ------
+    ModelError
+        If signals of sampled controllers depend on each other in a ring.
+    """
+    return (
+        model.kept.get("wired", None, 1, lambda: _controller_states(model))
+        if model.frozen
+        else _controller_states(model)
+    )
+
+
+def _controller_states(model: Model) -> list[ConnectedState]:
+    wiring = _signal_graph(model)
+    every = controllers_by_name(model).values()
+
+    def made(e: Controller, name: str, text: str, signal: bool = False) -> ConnectedState:
+        return ConnectedState(e, name, Expression(text, wiring.template(e, text), None, f"{name} of {e.title}"), signal)
+
+    rates = [made(e, x.name, x.law) for e in every if not e.sampled for x in wiring.states[e.name]]
+    held = [made(e, name, text, True) for e in every if e.holds for name, text in e.signals().items()]
+    later = [made(e, x.name, x.law) for e in every if e.sampled for x in wiring.states[e.name]]
+    return [*rates, *_in_order(held), *later]
+
+
+def _in_order(held: list[ConnectedState]) -> list[ConnectedState]:
+    """Signals that are held, each after those that it is said by at the same instant."""
+    waiting, out = {x.name: x for x in held}, list[ConnectedState]()
+    while waiting:
+        ready = [x for x in waiting.values() if not x.law.names & waiting.keys()]
+        if not ready:
+            raise ModelError(_loop_message(waiting))
+        out += ready
+        waiting = {k: x for k, x in waiting.items() if x not in ready}
+    return out
+
+
+def _loop_message(waiting: dict[str, ConnectedState]) -> str:
+    """What to say of signals that need each other at one instant."""
+    way = [next(iter(waiting))]
+    while (name := next(iter(sorted(waiting[way[-1]].law.names & waiting.keys())))) not in way:
+        way.append(name)
+    ring = " -> ".join([*way[way.index(name) :], name])
+    e = waiting[name].controller
+    return (
+        f"{e.title}: at an instant at which it is sampled its {waiting[name].state} depends on itself: {ring}. Have "
+        f"one of them go through a state, or sample them one after the other (offset=...)"
+    )
+
+
+def check_controller(model: Model, e: Controller) -> None:
+    """Refuse a controller whose laws name what is not there, or depend on themselves."""
+    own = controller_names(model, e)
+    refuse_equal(e, own)
+    for name, law in e.given().items():
+        if law is not None:
+            model.law(law, CONTROLLER_INPUT, f"{e.called(name)} of {e.title}")
+    wiring = _signal_graph(model)
+    for name in e.signals():
+        wiring.signal(e, name)
+    for x in wiring.states[e.name]:
+        wiring.template(e, x.law)
+    controller_states(model)
+
+
+def controller_names(model: Model, e: Controller) -> list[str]:
+    """Names of a controller's signals and states."""
+    return [*e.signals(), *(x.name for x in _signal_graph(model).states[e.name])]
+
+
+def _signal_graph(model: Model) -> _SignalGraph:
+    return model.kept.get("wiring", None, 1, lambda: _SignalGraph(model)) if model.frozen else _SignalGraph(model)
+
+
+class _SignalGraph:
+    """The controllers of one model, as their formulas are put in place."""
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.all = model, controllers_by_name(model)
+        self.known: dict[tuple[str, str], SyntaxNode] = {}
+        self.way: list[str] = []
+        self.rings: dict[str, str] = {}
+        self.states = {name: e.states(resolve(e, model.environment())) for name, e in self.all.items()}
+        self.own = {name: (*e.signals(), *(x.name for x in self.states[name])) for name, e in self.all.items()}
+        self.names = {f"{name}.{k}" for name, own in self.own.items() for k in own}
+        self.names |= {name for name, e in self.all.items() if e.bare}
+
+    def signal(self, e: Controller, name: str) -> SyntaxNode:
+        """A signal as an expression; solved for where it depends on itself, or refused."""
+        key = e.name, name
+        if key in self.known:
+            return self.known[key]
+        if e.holds or name not in e.signals():
+            return SyntaxNode("name", (), f"{e.name}.{name}")
+        told = f"{e.name}.{name}"
+        if told in self.way:
+            self.rings.setdefault(told, " -> ".join([*self.way[self.way.index(told) :], told]))
+            return SyntaxNode("name", (), told)
+        self.way.append(told)
+        tree = self.template(e, e.signals()[name])
+        self.way.pop()
+        if told in self.rings:
+            tree = solve_loop(tree, told, e.title, self.rings[told])
+        if all(n.kind != "name" or n.value not in self.way for n in tree.walk()):  # of a ring it is known with the rest
+            self.known[key] = tree
+        return tree
+
+    def template(self, e: Controller, text: str) -> SyntaxNode:
+        """A formula of a controller's own, of its signals, its states, and what it is given."""
+        tree = Expression.parse(text).tree
+        given, own = e.given(), self.own[e.name]
+
+        def found(node: SyntaxNode) -> SyntaxNode | None:
+            name = node.value
+            if name in given:
+                return self.law(given[name], f"{e.called(name)} of {e.title}")
+            return self.signal(e, name) if name in own else None
+
+        return self.limited(_at(_replaced(tree, found), 0), e.title)
+
+    def law(self, value: Any, where: str) -> SyntaxNode:
+        """A law of the user's that a controller is given."""
+        law = self.model.law(value, CONTROLLER_INPUT, where, whole=False)
+        if law.function is None:
+            return self.placed(law.tree)
+        return self.placed(call_node(law.tree, self.model.names_in_laws(CONTROLLER_INPUT), law.text, where))
+
+    def placed(self, tree: SyntaxNode) -> SyntaxNode:
+        """A law's tree with signals in place."""
+
+        def found(node: SyntaxNode) -> SyntaxNode | None:
+            owner, dot, what = node.value.partition(".")
+            e = self.all.get(owner)
+            if e is None:
+                return None
+            name = what if dot else e.bare
+            return self.signal(e, name) if name in self.own[owner] else None
+
+        return self.limited(_replaced(tree, found), "a law")
+
+    def limited(self, tree: SyntaxNode, whose: str) -> SyntaxNode:
+        """The tree; refused if it is too long."""
+        if sum(1 for _ in tree.walk()) > MAX_OPERATIONS:
+            raise ModelError(
+                f"{whose} is a formula of more than {MAX_OPERATIONS} operations, controllers that follow one another at the same "
+                f"instant being put in; have some of them go through a state, or sample them (period=...)"
+            )
+        return tree
+
+
+def _replaced(tree: SyntaxNode, found: Any) -> SyntaxNode:
+    """The tree with what ``found`` gives for names, at their places in the text."""
+    if tree.kind == "name":
+        new = found(tree)
+        return tree if new is None else _at(new, tree.start)
+    if not tree.args:
+        return tree
+    return dataclasses.replace(tree, args=tuple(_replaced(a, found) for a in tree.args))
+
+
+def _at(tree: SyntaxNode, start: int) -> SyntaxNode:
+    """The tree as if it stood at a place of no width."""
+    return dataclasses.replace(tree, start=start, stop=start, args=tuple(_at(a, start) for a in tree.args))
+
+
+def refuse_in_driver(model: Model, law: Expression, where: str) -> None:
+    """Refuse controllers in the law of a driver, which needs derivatives that a controller's signals have not."""
+    for name in sorted(law.names):
+        owner = name.partition(".")[0]
+        if owner in controllers_by_name(model):
+            raise ModelError(
+                f"{where}: {name!r} is of {controllers_by_name(model)[owner].title}; a driver prescribes a motion and needs "
+                f"two derivatives of its law by time. Use an Actuator or a Motor, whose force the controller says"
+            )
+
+
+def refuse_unknown(model: Model, law: Expression) -> None:
+    """Refuse signals that a controller has not."""
+    all_, known = controllers_by_name(model), set(signal_names(model))
+    for name in sorted(law.names - known):
+        if name.partition(".")[0] in all_:
+            raise ExpressionError(f"'{law}': {_unknown(model, name)}")
+
+
+def _unknown(model: Model, name: str) -> str:
+    """What to say of a name whose owner is a controller."""
+    owner, _, what = name.partition(".")
+    e = controllers_by_name(model)[owner]
+    own = controller_names(model, e)
+    if not what:
+        return f"{e.title} has several outputs; name one: {', '.join(f'{owner}.{k}' for k in own)}"
+    return f"{e.title} has no signal {what!r}{suggest(what, own)}; it has {', '.join(own)}"

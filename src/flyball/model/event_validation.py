@@ -1,0 +1,241 @@
+"""Whether what an event names exists, and whether its actions are consistent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ModelError
+from .body import GROUND, Body, Driver, Frame
+from .controller_signals import controller_states
+from .element import LawOf, si_numbers
+from .event import START, Action, Event, Impulse, Lock, Release, Set, Stop, comparison_sides, component_list
+from .expressions import is_number_text
+from .joint import Joint
+from .messages import listing, suggest
+from .quantities import quantities
+from .units import same_kind
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+@dataclass(frozen=True)
+class LockTarget:
+    """What an action holds or lets go.
+
+    Attributes
+    ----------
+    coordinates : tuple of str
+        Coordinates that are locked, each by a row of its own: ``"A.angle"``.
+    joint : str
+        Or the joint whose own rows hold or let go.
+    element : str
+        Or the limit or rope that is in force or not.
+    """
+
+    coordinates: tuple[str, ...] = ()
+    joint: str = ""
+    element: str = ""
+
+    def keys(self) -> tuple[str, ...]:
+        """What must not be locked and released at one instant."""
+        return self.coordinates or (self.joint or self.element,)
+
+
+def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
+    """What it is that ``a`` holds or lets go.
+
+    Raises
+    ------
+    ModelError
+        If there is no such part, or it has nothing to be locked or released.
+    """
+    what = f"{e.title}: {a.title}"
+    if "." in a.what:
+        model.coordinate(a.what, e)
+        return LockTarget((a.what,))
+    found = model.find(a.what)
+    if isinstance(found, Joint):
+        own = tuple(f"{a.what}.{k}" for k in found.measured(model.planar))
+        if own and (isinstance(a, Lock) or _locked_somewhere(model, e, {a.what, *own})):
+            return LockTarget(own)
+        if not found.rows(model.planar):
+            raise ModelError(f"{what}: {found.title} holds nothing that could be released")
+        return LockTarget(joint=a.what)
+    if found is not None and (found.category == "limits" or getattr(found, "single", "") == "rope"):
+        return LockTarget(element=a.what)
+    if found is None:
+        known = [*(j.name for j in model.joints), *(x.name for x in model.limits)]
+        raise ModelError(
+            f"{what}: there is no part named {a.what!r}{suggest(a.what, known)}; "
+            f"name a joint, a coordinate such as 'A.angle', a limit or a rope"
+        )
+    if found.category in ("bodies", "frames"):
+        axes = "x, y, angle" if model.planar else "x, y, z"
+        raise ModelError(
+            f"{what}: {found.title} has the coordinates {axes}; name one, as in '{a.what}.x', or hold it by a Fixed "
+            f"joint that another event releases"
+        )
+    raise ModelError(
+        f"{what}: {found.title} is no joint, coordinate, limit or rope; a force is switched off by fb.Set of a "
+        f"parameter in its numbers or laws"
+    )
+
+
+def _locked_somewhere(model: Model, e: Event, names: set[str]) -> bool:
+    """Whether an event locks one of these."""
+    every = (*(x for x in model.events if x.name != e.name), e)
+    return any(isinstance(a, Lock) and a.what in names for x in every for a in x.do)
+
+
+VALUE_LAW = LawOf(None, curves=True)
+"""What values that events set may use."""
+
+
+def check_event(model: Model, e: Event) -> None:
+    """Refuse names that are not there, expressions that never change, and actions that contradict one another.
+
+    Raises
+    ------
+    ModelError
+        Naming the event, the action, the value, the rule and a remedy.
+    """
+    if e.at_start:
+        if START in {*model.parameters, *(x.name for x in model.sensors)}:
+            raise ModelError(
+                f"{e.title}: when is {START!r}, the start of the motion, and {model.name!r} has a parameter or "
+                f"sensor of that name; rename that, or write an expression"
+            )
+    else:
+        _check_when(model, e)
+    for a in e.do:
+        _check_action(model, e, a)
+    _refuse_contradictions(model, e)
+
+
+def _check_when(model: Model, e: Event) -> None:
+    """It names something that changes along a motion."""
+    law = model.law(e.law, e.of, f"when of {e.title}")
+    set_anywhere = {a.parameter for x in (*model.events, e) for a in x.do if isinstance(a, Set)}
+    _refuse_unlike(model, e)
+    if law is not None and law.function is None and law.names <= {*model.parameters} - set_anywhere:
+        raise ModelError(
+            f"{e.title}: when is {e.when!r}, which never changes; name t, a sensor, or a curve such as 'A.angle' in it"
+        )
+
+
+def _refuse_unlike(model: Model, e: Event) -> None:
+    """A curve is compared with a quantity of its own kind: no length with an angle."""
+    if not isinstance(e.when, str) or (sides := comparison_sides(e.when, e)) is None:
+        return
+    for curve, quantity in (sides, sides[::-1]):
+        name, _, what = curve.partition(".")
+        if what and model.find(name) is not None and is_number_text(quantity):
+            known = quantities(model, name).get(what)
+            if known is not None and known.unit:
+                same_kind(f"1 {known.unit}", quantity, f"{e.title}: in {e.when!r} {curve}")
+
+
+def _check_action(model: Model, e: Event, a: Action) -> None:
+    if isinstance(a, Set):
+        states = [x.name for x in controller_states(model) if not x.signal] if model.controllers else []
+        if a.parameter in states:
+            model.law(a.value, VALUE_LAW, f"value of {a.title} in {e.title}")
+            return
+        if a.parameter not in model.parameters:
+            known = [*model.parameters, *states]
+            raise ModelError(
+                f"{e.title}: {a.title}: {model.name!r} has no parameter {a.parameter!r}"
+                f"{suggest(a.parameter, known)}; {listing(known)}"
+            )
+        where = f"value of {a.title} in {e.title}"
+        model.law(a.value, VALUE_LAW, where)
+        old = model.parameters[a.parameter]
+        if isinstance(a.value, str) and isinstance(old, str) and is_number_text(a.value) and is_number_text(old):
+            same_kind(old, a.value, where)
+    elif isinstance(a, (Lock, Release)):
+        for text in lock_target(model, e, a).coordinates:
+            for d in model.drivers:
+                _refuse_driven(e, a, d, text)
+    elif isinstance(a, Impulse):
+        _check_impulse(model, e, a)
+
+
+def _refuse_driven(e: Event, a: Action, d: Driver, text: str) -> None:
+    if d.coordinate == text:
+        raise ModelError(
+            f"{e.title}: {a.title}: {d.title} prescribes {text!r}, so nothing can be locked there; use an "
+            f"Actuator or a Motor, or a law that stands still: where(t < 1, t, 1)"
+        )
+
+
+def _check_impulse(model: Model, e: Event, a: Impulse) -> None:
+    """On a body it has two or three components, along a coordinate one."""
+    what = f"{e.title}: {a.title}"
+    if a.impulse is None and a.torque is None:
+        raise ModelError(f"{what}: it is none; give impulse=..., such as fb.Impulse('ball', (1, 0))")
+    found = model.find(a.on)
+    if isinstance(found, (Body, Frame)) or a.on == GROUND:
+        if model.carrier(a.on, e) == GROUND:
+            raise ModelError(f"{what}: a blow on ground moves nothing; name a body")
+        n = 2 if model.planar else 3
+        _components(what, "impulse", a.impulse, n, "(0, 1)" if model.planar else "(0, 0, 1)")
+        _components(what, "torque", a.torque, 1 if model.planar else 3, "0.5" if model.planar else "(0, 0, 0.5)")
+        if a.at is not None and len(a.at) not in (n, 3):
+            raise ModelError(f"{what}: at needs {n} components, got {a.at}")
+        si_numbers(a.at, model.environment(), "m", f"at of {a.title} in {e.title}")
+        if a.at is not None and a.impulse is None:
+            raise ModelError(f"{what}: at has no effect on the impulse of a torque alone; leave it out")
+        units = {"impulse": "N*s", "torque": "N*m*s"}
+    else:
+        text = coordinate_of(model, e, a)
+        for name, usual in (("torque", None), ("at", None), ("axes", "world")):
+            if getattr(a, name) != usual:
+                raise ModelError(f"{what}: {name} is of a body; along a coordinate give one number: impulse=...")
+        _components(what, "impulse", a.impulse, 1, "0.5")
+        units = {"impulse": "N*m*s" if model.unit(text, e) == "rad" else "N*s"}
+    for name, law in a.laws():
+        model.law(law, LawOf(units[name], curves=True), f"{name} of {a.title} in {e.title}")
+
+
+def coordinate_of(model: Model, e: Event, a: Impulse) -> str:
+    """The coordinate that an impulse acts along: one that is named, or the only one of a joint."""
+    found = model.find(a.on)
+    if "." in a.on:
+        model.coordinate(a.on, e)
+        return a.on
+    if not isinstance(found, Joint):
+        known = [*(b.name for b in model.bodies), *(f.name for f in model.frames), *(j.name for j in model.joints)]
+        raise ModelError(
+            f"{e.title}: {a.title}: there is no body, frame or joint named {a.on!r}{suggest(a.on, known)}; "
+            f"{listing(known)}"
+        )
+    own = list(found.measured(model.planar))
+    if len(own) != 1:
+        raise ModelError(
+            f"{e.title}: {a.title}: {found.title} has {len(own)} coordinates"
+            + (f"; name one: {', '.join(f'{a.on}.{k}' for k in own)}" if own else "; name a body")
+        )
+    return f"{a.on}.{own[0]}"
+
+
+def _components(what: str, name: str, given: Any, n: int, example: str) -> None:
+    if given is not None and len(component_list(given)) != n:
+        raise ModelError(f"{what}: {name} needs {n} component{'s' if n > 1 else ''}, such as {example}, got {given!r}")
+
+
+def _refuse_contradictions(model: Model, e: Event) -> None:
+    """Each thing is done to once; what is locked is not released at the same instant."""
+    done: dict[str, Action] = {}
+    for a in e.do:
+        if isinstance(a, (Lock, Release)):
+            keys = lock_target(model, e, a).keys()
+        else:
+            keys = (f"parameter {a.about()}",) if isinstance(a, Set) else ("the end",) if isinstance(a, Stop) else ()
+        for key in keys:
+            if key in done:
+                first = done[key]
+                rule = "each is said once" if type(first) is type(a) else "they contradict each other"
+                raise ModelError(f"{e.title}: {first.title} and {a.title} are both in do, and {rule}; leave one out")
+            done[key] = a

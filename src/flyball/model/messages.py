@@ -1,0 +1,88 @@
+"""Parts of messages: suggestions for misspelt names, lists of what exists, the summary of a mechanism."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+def suggest(name: object, known: Iterable[str]) -> str:
+    """' (did you mean ...?)' where something close is known; what is no text is close to nothing."""
+    if not isinstance(name, str):
+        return ""
+    names = list(known)
+    same = [k for k in names if k.lower() == name.lower() and k != name]
+    close = same or difflib.get_close_matches(name, names, 1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def listing(names: list[str]) -> str:
+    """What there is, for messages."""
+    if not names:
+        return "there is none yet; add it first"
+    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    return f"known: {shown}"
+
+
+def shortened_list(names: Iterable[str], most: int = 60) -> str:
+    """Names with commas between them, in about so many letters: the last one too where three or more are left out."""
+    every = list(names)
+    if len(", ".join(every)) <= most or len(every) < 4:
+        return ", ".join(every)
+    kept: list[str] = []
+    for name in every[:-1]:
+        if kept and len(", ".join([*kept, name, every[-1]])) > most - 5:
+            break
+        kept.append(name)
+    if len(every) - len(kept) <= 3:
+        return ", ".join(every)
+    return f"{', '.join(kept)}, ... {every[-1]}"
+
+
+def abbreviated(text: str, most: int = 200) -> str:
+    """A text, of a long one the beginning and the end."""
+    return text if len(text) <= most else f"{text[: 2 * most // 3]} ... {text[-most // 4 :]}"
+
+
+LINE_WIDTH = 100  # letters of a line
+
+
+def summary_lines(model: Model) -> list[tuple[str, str]]:
+    """Labels and texts for people: how many parts of each kind there are, and their names."""
+    gravity = ", ".join(str(x) for x in model.gravity)
+    head = ("planar" if model.planar else "spatial") + (f", gravity ({gravity})" if model.gravity_told else "")
+    out = [("mechanism", f"{model.name!r}, {head}")]
+    out += _line("ground", (e.name for e in model.ground))
+    out += _line("bodies", (e.name for e in model.bodies))
+    out += _line("bulk", (f"{e.count} {e.name}" for e in model.bulk))
+    out += _line("frames", (e.name for e in model.frames))
+    for category in ("joints", "couplings", "controllers", "forces"):
+        kinds: dict[str, list[str]] = {}
+        for e in getattr(model, category):
+            kinds.setdefault(type(e).__name__, []).append(e.name)
+        out += _line(
+            category,
+            (f"{kind} {shortened_list(names)}" for kind, names in kinds.items()),
+            len(getattr(model, category)),
+        )
+    out += _line("drivers", (f"{d.name} ({d.coordinate} = {d.law})" for d in model.drivers))
+    for category in ("sensors", "tables", "initial", "materials", "contacts", "limits"):
+        out += _line(category, (e.name for e in getattr(model, category)))
+    out += _line("events", (f"{e.name} ({e.when})" for e in model.events))
+    return out + _line("parameters", (f"{k} = {v}" for k, v in model.parameters.items()))
+
+
+def _line(label: str, texts: Iterable[str], count: int | None = None) -> list[tuple[str, str]]:
+    """One line, cut where it gets long; nothing where there is nothing."""
+    every = list(texts)
+    text = "; ".join(every) if count is not None else shortened_list(every, LINE_WIDTH)
+    return [(label, f"{len(every) if count is None else count}: {text}")] if every else []
+
+
+def summary(model: Model) -> str:
+    """The lines as a text."""
+    return "\n".join(f"{label:<10} {text}" for label, text in summary_lines(model))

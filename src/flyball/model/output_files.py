@@ -1,0 +1,108 @@
+"""Writing of output files: complete or not at all, with an extension that matches the content."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from ..errors import ModelError, cannot_write
+
+RESULT, TABLE, PAGE, LATEX = (".nc", ".nc4", ".h5", ".hdf5"), (".csv", ".txt"), (".html", ".htm"), (".tex",)
+PICTURE, DESCRIPTION = (".png", ".svg", ".pdf"), (".toml",)
+OTHER_METHODS = {RESULT: "save", TABLE: "to_csv", PAGE: "to_html", LATEX: "to_latex", PICTURE: "plot(path=...)"}
+"""Which method writes files of other endings."""
+
+
+def file_extension(path: str | os.PathLike, known: Sequence[str]) -> str:
+    """The ending of a path in small letters, which must be a known one; "" for a device, which needs none.
+
+    Raises
+    ------
+    ModelError
+        If it is another, or the path is none.
+    """
+    at = _path(path)
+    found = at.suffix.lower()
+    if found in known:
+        return found
+    if _device(at):
+        return ""
+    if at.is_dir():
+        raise cannot_write(at, IsADirectoryError())
+    said = f"the ending {found!r} is not known here" if found else "its name has no ending"
+    other = next((f"; {how} writes {found}" for kinds, how in OTHER_METHODS.items() if found in kinds), "")
+    raise ModelError(f"cannot write {os.fspath(path)!r}: {said}; it must be {' or '.join(known)}{other}")
+
+
+def _path(path: str | os.PathLike) -> Path:
+    """A path that files can have."""
+    try:
+        os.fsencode(path)
+        if "\0" in os.fspath(path):
+            raise ValueError
+        return Path(path)
+    except (TypeError, ValueError):
+        raise ModelError(f"the path of a file is a text or a path, not {path!r}") from None
+
+
+def make_folder(path: str | os.PathLike) -> Path:
+    """A folder, made with its parents where it is not there.
+
+    Raises
+    ------
+    ModelError
+        If that cannot be done.
+    """
+    folder = _path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ModelError(f"cannot make the folder {str(folder)!r}: {error.strerror}") from None
+    return folder
+
+
+def _device(path: Path) -> bool:
+    """Whether something is there that is neither a file nor a folder, as /dev/stdout."""
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
+@contextmanager
+def replacing_file(path: str | os.PathLike, known: Sequence[str] = ()) -> Iterator[BinaryIO]:
+    """A file to write to, beside its place: put there once all is written, removed if anything fails.
+
+    What stood there before stays until then. ``known``: endings that the name may have; any if not given.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be written (no such folder, no space left, ...), or has another ending.
+    """
+    if known:
+        file_extension(path, known)
+    place = _path(path).resolve()
+    try:
+        if _device(place):
+            with open(place, "wb") as file:
+                yield file
+            return
+        part = place.with_name(f".{place.name}.{os.getpid()}.part")
+        try:
+            with open(part, "wb") as file:
+                yield file
+            if place.exists():
+                shutil.copymode(place, part)
+            part.replace(place)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise cannot_write(path, error) from None
+
+
+def write_file(path: str | os.PathLike, data: str | bytes | memoryview, known: Sequence[str] = ()) -> None:
+    """Write a text or bytes to a file; see `replacing_file`."""
+    with replacing_file(path, known) as file:
+        file.write(data.encode() if isinstance(data, str) else data)

@@ -1,0 +1,209 @@
+"""Copies and unchangeable snapshots of a model, and the cache of what was computed from a snapshot."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping
+from copy import copy
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from ..errors import ModelError
+from .body import Initial
+from .element import python_data
+
+if TYPE_CHECKING:
+    from .element import Element
+    from .model import Model
+
+
+T = TypeVar("T")
+
+
+class ResultCache:
+    """Results of pure functions of the object that this hangs on, the last few of each kind.
+
+    It belongs to the process: a copy or a pickle of the object begins with an empty one. Two threads that ask for the
+    same at once may both work it out; since the functions are pure, that is all they do.
+    """
+
+    def __init__(self) -> None:
+        self._found: dict[str, OrderedDict[Hashable, Any]] = {}
+        self._lock = threading.Lock()
+
+    def get(self, kind: str, key: Hashable, most: int, make: Callable[[], T]) -> T:
+        """What ``make`` returns, made now or earlier; of each kind the ``most`` used last are kept."""
+        with self._lock:
+            known = self._found.get(kind)
+            if known is not None and key in known:
+                if most > 1:
+                    known.move_to_end(key)
+                return known[key]
+        made = make()
+        with self._lock:
+            known = self._found.setdefault(kind, OrderedDict())
+            known[key] = made
+            while len(known) > most:
+                known.popitem(last=False)
+        return made
+
+    def known(self, kind: str, key: Hashable = None) -> Any:
+        """The same if it is there, else None."""
+        with self._lock:
+            return self._found.get(kind, OrderedDict()).get(key)
+
+    def drop(self, kind: str, key: Hashable) -> None:
+        """Forget one of them."""
+        with self._lock:
+            self._found.get(kind, OrderedDict()).pop(key, None)
+
+    def take(self, kind: str, other: ResultCache, convert: Callable[[Any], Any]) -> None:
+        """Begin with what is made of all that another has of a kind."""
+        with other._lock:
+            found = other._found.get(kind, OrderedDict()).copy()
+        self._found[kind] = OrderedDict((key, convert(x)) for key, x in found.items())
+
+    def __reduce__(self) -> Any:
+        return ResultCache, ()
+
+
+def exact_key(values: Mapping[str, Any]) -> Hashable:
+    """A key of numbers by name that tells every bit apart, real and complex numbers too."""
+    x = np.array(list(values.values()))
+    return tuple(values), x.dtype.char, x.tobytes()
+
+
+CATEGORIES = (
+    "materials",
+    "material_pairs",
+    "ground",
+    "bodies",
+    "bulk",
+    "frames",
+    "joints",
+    "couplings",
+    "tables",
+    "sensors",
+    "controllers",
+    "forces",
+    "drivers",
+    "initial",
+    "contacts",
+    "limits",
+    "events",
+)
+SETTINGS = ("name", "planar", "gravity_told")
+
+
+def model_copy(model: Model) -> Any:
+    """A model with lists of its own, that can be changed."""
+    out = object.__new__(type(model))
+    vars(out).update(vars(model))
+    vars(out).pop("kept", None)
+    vars(out).update({"_snapshot": None, "frozen": False, "parameters": dict(model.parameters)})
+    vars(out)["gravity"] = copy(model.gravity)  # it may be a list
+    vars(out).update({name: list(getattr(model, name)) for name in CATEGORIES} | {"by_name": dict(model.by_name)})
+    return out
+
+
+def snapshot(model: Model) -> Any:
+    """The model as it is, unchangeable; the last one as long as it is still true."""
+    last = vars(model).get("_snapshot")
+    if model.frozen or (last is not None and _same(model, last)):
+        return model if model.frozen else last
+    out = model_copy(model)
+    vars(out).update({"_resolved": None, "gravity": _gravity(model)})
+    out.environment()  # worked out now: nothing is stored in it later
+    vars(out).update({name: tuple(getattr(model, name)) for name in CATEGORIES})
+    vars(out).update({"parameters": MappingProxyType(out.parameters), "by_name": MappingProxyType(_by_name(out))})
+    vars(out).update({"kept": ResultCache(), "frozen": True})
+    if last is not None and _same_parts(model, last):  # another value of a parameter leaves every structure as it is
+        out.kept.take("spanning", last.kept, lambda tree: tree)
+        out.kept.take("structure", last.kept, lambda s: dataclasses.replace(s, model=out))
+    vars(model)["_snapshot"] = out
+    return out
+
+
+def _by_name(model: Model) -> dict[str, Element]:
+    """The parts that are in the lists, in the order that they were added: lists may be changed by themselves."""
+    there: dict[str, Element] = {}
+    for category in CATEGORIES:
+        parts = getattr(model, category)
+        if any(getattr(e, "category", None) != category for e in parts):
+            raise ModelError(f"{category} of {model.name!r} hold something else: {parts!r}; use m.add")
+        names = [e.name for e in parts]
+        if len(set(names)) < len(names) or (category != Initial.category and not there.keys().isdisjoint(names)):
+            twice = next(x for k, x in enumerate(names) if x in names[:k] or x in there)
+            raise ModelError(f"{model.name!r} has two parts named {twice!r}; names must be unique")
+        there |= dict(zip(names, parts, strict=True)) if category != Initial.category else {}
+    return {name: there[name] for name in model.by_name if name in there} | there
+
+
+def picklable_state(state: Mapping[str, Any]) -> dict[str, Any]:
+    """What is pickled of a model, or copied with all its parts: nothing that was worked out of it."""
+    out = {k: v for k, v in state.items() if k not in ("_snapshot", "kept", "frozen", "_resolved")}
+    out |= {name: list(state[name]) for name in CATEGORIES if name in state}
+    return out | {"_resolved": None, "parameters": dict(state["parameters"]), "by_name": dict(state["by_name"])}
+
+
+def changed_copy(model: Model, parts: Mapping[str, Element | None]) -> Any:
+    """A copy with other parts under these names, or (None) without them."""
+    if not isinstance(parts, Mapping):
+        raise ModelError(f"parts maps names to parts, or to None to leave one out: {{'A': None}}; not {parts!r}")
+    out = model_copy(model)
+    for category in CATEGORIES:
+        if category != Initial.category:  # these bear the names of what they are about
+            kept = [parts.get(e.name, e) for e in getattr(model, category)]
+            setattr(out, category, [e for e in kept if e is not None])
+    left = {name: parts.get(name, e) for name, e in model.by_name.items()}
+    out.by_name = {name: e for name, e in left.items() if e is not None}
+    out.forces = [e.bound(out) for e in out.forces]
+    out.by_name |= {e.name: e for e in out.forces}
+    return out
+
+
+def refuse_changes(model: Model, what: str) -> None:
+    """Refuse to change a snapshot: results and what is prepared stand on it."""
+    if model.frozen:
+        raise ModelError(f"{what}: {model.name!r} is here as a result has it, for good; change a copy of it: m.copy()")
+
+
+def _same(model: Model, last: Model) -> bool:
+    """Whether every part is the same object still, and every parameter and setting the same to the bit."""
+    return _same_parts(model, last) and same_values(model.parameters, last.parameters)
+
+
+def same_values(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
+    """Whether the same names in the same order have the same values, to the bit and of the same kind."""
+    return list(a) == list(b) and all(_same_bits(v, b[k]) for k, v in a.items())
+
+
+def _same_parts(model: Model, last: Model) -> bool:
+    """The same but for the values of the parameters."""
+    mine, its = vars(model), vars(last)
+    for k in CATEGORIES:
+        a, b = mine[k], its[k]
+        if len(a) != len(b):
+            return False
+        for x, y in zip(a, b, strict=True):
+            if x is not y:
+                return False
+    for k in SETTINGS:
+        if not _same_bits(mine[k], its[k]):
+            return False
+    gravity = _same_bits(_gravity(model), last.gravity) and type(model) is type(last)
+    return gravity and list(model.parameters) == list(last.parameters)
+
+
+def _gravity(model: Model) -> tuple[Any, ...]:
+    """Gravity as a tuple: a user may have put a list or an array there, and change it."""
+    return model.gravity if isinstance(model.gravity, tuple) else tuple(python_data(model.gravity))
+
+
+def _same_bits(a: Any, b: Any) -> bool:
+    """Whether two numbers or texts are the same; 0.0 and -0.0 are not."""
+    return a is b or (type(a) is type(b) and a == b and repr(a) == repr(b))

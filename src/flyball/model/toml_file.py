@@ -1,0 +1,351 @@
+"""Model files: a mechanism as TOML, written to be read and compared by people, and read back exactly.
+
+Numbers are written so that they are read back bit for bit, and strings ("60 rpm", "2*k") as the user wrote them.
+An unknown table, type or field is refused with the line, the nearest known names and the rule.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+from ..errors import ModelError
+from .body import Bodies, Body, Driver, Frame, Ground, Initial
+from .contact import Contact, Material, MaterialPair
+from .contact_point import Touch
+from .controller import IMU, Controller, Sensor
+from .element import Element, written_fields
+from .event import Event
+from .expression_parser import function_name
+from .force import Force, Unilateral
+from .joint import Coupling, Joint
+from .model import Model, suggest
+from .output_files import DESCRIPTION, file_extension, write_file
+from .shapes.mesh import Mesh, paths_from
+from .snapshot import CATEGORIES
+from .table import Table
+
+M = TypeVar("M", bound=Model)
+
+SETTINGS = ("name", "planar", "gravity", "parameters")
+ONE_KIND = {
+    "materials": Material,
+    "material_pairs": MaterialPair,
+    "ground": Ground,
+    "bodies": Body,
+    "bulk": Bodies,
+    "frames": Frame,
+    "tables": Table,
+    "drivers": Driver,
+    "initial": Initial,
+    "contacts": Contact,
+    "events": Event,
+}
+MUTUAL = "controllers"  # which may need each other
+AFTER_OTHERS = ("sensors", "controllers", "forces", "drivers")  # which alone may name one another
+SELF_NAMED = ("material_pairs", "contacts")  # that have a name of their own accord
+MANY_KINDS = {
+    "joints": (Joint, "joints"),
+    "couplings": (Coupling, "joints"),
+    "controllers": (Controller, "controllers"),
+    "forces": (Force, "forces"),
+    "limits": (Unilateral, "forces"),
+}
+DEFAULT_KINDS = {"sensors": "Sensor", "limits": "Limit"}  # where no type is said
+SENSORS = {"Sensor": Sensor, "IMU": IMU}
+WIDTH = 100  # a list of shapes longer than this is written one shape a line
+_HEADER = re.compile(r"^\s*\[\[\s*\"?(\w+)\"?\s*\]\]")
+_PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+
+
+def save(model: Model, path: str | os.PathLike) -> None:
+    """Write a mechanism to a TOML file.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be written, or a value of the mechanism has no place in a file.
+    """
+    file_extension(path, DESCRIPTION)
+    write_file(path, dumps(model, Path(path).parent))
+
+
+def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:
+    """The text of the mechanism's TOML file; relative paths in it as seen from ``folder``, else as they were given."""
+    lines = [f"name = {_text(model.name)}", f"planar = {_value(model.planar)}", f"gravity = {_value(model.gravity)}"]
+    if model.parameters:
+        lines += ["", "[parameters]"]
+        lines += [f"{_key(k)} = {_value(v)}" for k, v in model.parameters.items()]
+    for category in CATEGORIES:
+        for e in getattr(model, category):
+            lines += ["", f"[[{category}]]"]
+            told = category in MANY_KINDS or category in DEFAULT_KINDS
+            kind = {"type": type(e).__name__} if told and type(e).__name__ != DEFAULT_KINDS.get(category) else {}
+            fields = kind | _written(e, folder)
+            _refuse_functions(e, fields)
+            lines += [f"{k} = {_value(v)}" for k, v in fields.items()]
+    text = "\n".join(lines) + "\n"
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise ModelError(f"{model.name!r} cannot be written: a text holds {error.object[error.start]!r}") from None
+    return text
+
+
+def _written(e: Element, folder: str | os.PathLike | None) -> dict[str, Any]:
+    """The element's fields as plain data, paths of meshes as seen from the folder."""
+    data = written_fields(e)
+    if folder is not None and isinstance(e, (Body, Bodies, Ground)) and "shape" in data:
+        tables = data["shape"] if isinstance(data["shape"], list) else [data["shape"]]
+        for shape, table in zip(e.shapes(), tables, strict=True):
+            if isinstance(shape, Mesh) and shape.path is not None:
+                table["path"] = shape.path_from(folder)
+    return data
+
+
+def _refuse_functions(e: Element, fields: Mapping[str, Any]) -> None:
+    for name, value in fields.items():
+        for law in value if isinstance(value, (list, tuple)) else (value,):
+            if callable(law):
+                raise ModelError(
+                    f"{e.title}: {name} is the Python function '{function_name(law)}', and a model file cannot hold a "
+                    f"Python function; use an expression or a Table"
+                )
+
+
+def _value(value: Any) -> str:
+    """A value in TOML; numbers by ``repr``, which is exact."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        items = [_value(v) for v in value]
+        if any(isinstance(v, Mapping) for v in value) and sum(map(len, items)) > WIDTH:
+            return "[\n" + "".join(f"    {i},\n" for i in items) + "]"
+        return f"[{', '.join(items)}]"
+    raise ModelError(f"{value!r} cannot be written to a model file; use a number or a text")
+
+
+def _text(text: str) -> str:
+    import tomli_w
+
+    return tomli_w.dumps({"a": text}).removeprefix("a = ").removesuffix("\n")
+
+
+def _key(key: str) -> str:
+    import tomli_w
+
+    return tomli_w.dumps({key: 0}).removesuffix(" = 0\n")
+
+
+def load(path: str | os.PathLike, cls: type[M]) -> M:
+    """Read a mechanism of class ``cls`` from a TOML file.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file, it is no TOML, or it describes no valid mechanism; the message names the file, the
+        line, and the element.
+    """
+    path = Path(path)
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        there = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        raise ModelError(f"there is no file {os.fspath(path)!r}{suggest(path.name, there)}") from None
+    except UnicodeDecodeError as error:
+        raise ModelError(f"{path}: not a text in UTF-8 (byte {error.start}), so no model file") from None
+    except OSError as error:
+        raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror}") from None
+    with paths_from(path.parent):
+        return loads(text, cls, os.fspath(path))
+
+
+def loads(text: str, cls: type[M], source: str = "model") -> M:
+    """Read a mechanism of class ``cls`` from the text of a TOML file; ``source`` names it in messages."""
+    data = _parsed(text, source)
+    known = [*SETTINGS, *CATEGORIES]
+    for key, value in data.items():
+        if key not in known:
+            what = "table" if isinstance(value, (Mapping, list)) else "key"
+            raise ModelError(f"{source}: unknown {what} {key!r}{suggest(key, known)}; a model has {', '.join(known)}")
+    model = _settings(data, cls, source)
+    _add_all(model, _entries(data, text, source))
+    return model
+
+
+Entry = tuple[str, Mapping[str, Any], str]
+
+
+def _entries(data: Mapping[str, Any], text: str, source: str) -> list[Entry]:
+    """(category, fields, place in the file) of every element."""
+    lines = _header_lines(text)
+    out = []
+    for category in CATEGORIES:
+        tables = data.get(category, [])
+        if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
+            raise ModelError(f"{source}: {category!r} must be tables, each headed [[{category}]]")
+        places = lines.get(category, [])
+        for k, table in enumerate(tables):
+            line = f" (line {places[k]})" if len(places) == len(tables) else ""
+            name = f" {table['name']!r}" if isinstance(table.get("name"), str) else ""
+            out.append((category, table, f"{source}: [[{category}]] {k + 1}{name}{line}"))
+    return out
+
+
+def _add_all(model: Model, entries: list[Entry]) -> None:
+    """Add every element; those that name others further down in the file come after them."""
+    waiting = entries
+    while waiting:
+        failed: list[Entry] = []
+        errors: list[ModelError] = []
+        for entry in waiting:
+            try:
+                _add(model, *entry)
+            except ModelError as error:
+                failed.append(entry)
+                errors.append(error)
+        if len(failed) == len(waiting):
+            if not _together(model, failed):
+                raise errors[0]
+            failed = [entry for entry in failed if entry[0] != MUTUAL]
+        if failed and all(category not in AFTER_OTHERS for category, _, _ in failed):
+            raise errors[0]  # only these can name one another
+        waiting = failed
+    place = {str(fields.get("name")): k for k, (_, fields, _) in enumerate(entries)}
+    for category in AFTER_OTHERS:
+        getattr(model, category).sort(key=lambda e: place[e.name])
+
+
+def _together(model: Model, entries: list[Entry]) -> bool:
+    """Add controllers that name one another all at once, if there are any; whether there were.
+
+    Raises
+    ------
+    ModelError
+        If one of them is wrong with the others there, too: a name that nothing has, or a ring at one instant.
+    """
+    twins = [entry for entry in entries if entry[0] == MUTUAL]
+    before = len(model.controllers)
+    made = [_make_element(*entry) for entry in twins]
+    try:
+        model.add(*made)
+    except ModelError as error:
+        for e in model.controllers[before:]:
+            model.by_name.pop(e.name)
+        del model.controllers[before:]
+        at = [where for e, (_, _, where) in zip(made, twins, strict=True) if e.title in str(error)]
+        _refuse(error, [*at, twins[0][2]][0])
+    return bool(made)
+
+
+def _parsed(text: str, source: str) -> dict[str, Any]:
+    """The file's tables, or an error that shows the faulty line with a caret."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ModelError(f"{source}: its lists are nested too deep") from None
+    except ValueError as error:  # TOMLDecodeError, and numbers of more digits than Python reads
+        message = str(error)
+        place = _PLACE.search(message)
+        if place is None:
+            raise ModelError(f"{source}: {message}") from None
+        lines = text.split("\n")
+        last = max((k for k, x in enumerate(lines, 1) if x.strip()), default=1)
+        line = min(int(place[1]), len(lines)) if place[1] else last
+        shown = lines[line - 1].rstrip("\r").replace("\t", " ")
+        column = int(place[2]) if place[2] else len(shown) + 1
+        margin = f"{line:>6} | "
+        caret = " " * (len(margin) + column - 1) + "^"
+        reason = message[: place.start()]
+        raise ModelError(f"{source}, line {line}: {reason}\n{margin}{shown}\n{caret}") from None
+
+
+def _settings(data: Mapping[str, Any], cls: type[M], source: str) -> M:
+    """The empty mechanism with its name, plane, gravity and parameters."""
+    given = {k: data[k] for k in SETTINGS if k in data}
+    for key, kind, what in (("planar", bool, "true or false"), ("parameters", Mapping, "a table of named numbers")):
+        if key in given and not isinstance(given[key], kind):
+            raise ModelError(f"{source}: {key!r} must be {what}, got {given[key]!r}")
+    for key, value in given.get("parameters", {}).items():
+        if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+            raise ModelError(f"{source}: [parameters] {key!r} must be a number or a text with a unit, got {value!r}")
+    try:
+        return cls(**given)
+    except Exception as error:
+        _refuse(error, source)
+
+
+def _header_lines(text: str) -> dict[str, list[int]]:
+    """Line numbers of the ``[[...]]`` headers, by category."""
+    out: dict[str, list[int]] = {}
+    for k, line in enumerate(text.split("\n"), 1):
+        if match := _HEADER.match(line):
+            out.setdefault(match[1], []).append(k)
+    return out
+
+
+def _add(model: Model, category: str, table: Mapping[str, Any], where: str) -> None:
+    made = _make_element(category, table, where)
+    try:
+        model.add(made)
+    except Exception as error:
+        _refuse(error, where)
+
+
+def _make_element(category: str, table: Mapping[str, Any], where: str) -> Element:
+    """The element that a table describes."""
+    fields = dict(table)
+    cls = ONE_KIND[category] if category in ONE_KIND else _kind(category, fields, where)
+    if "name" not in fields and category not in SELF_NAMED:
+        raise ModelError(f'{where}: it has no name; add name = "..."')
+    try:
+        return cls(**fields)
+    except Exception as error:
+        _refuse(error, where)
+
+
+def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
+    """The class that the table's ``type`` names."""
+    if category in DEFAULT_KINDS:
+        fields.setdefault("type", DEFAULT_KINDS[category])
+    if category == "sensors":
+        known = sorted(SENSORS)
+    else:
+        base, room = MANY_KINDS[category]
+        importlib.import_module(f"..{room}", __package__)
+        kinds = {k: c for k, c in Element.registry.items() if issubclass(c, base) and c.category == category}
+        own = [k for k, c in kinds.items() if not c.__module__.startswith("flyball.")]
+        known = [*sorted(k for k, c in kinds.items() if c.__module__.count(f".{room}.")), *sorted(own)]
+    name = fields.pop("type", None)
+    if category == "forces" and name == Touch.__name__:  # of a motion with contact, in its result file
+        return Touch
+    if name not in known:
+        problem = "it has no type" if name is None else f"unknown type {name!r}{suggest(str(name), known)}"
+        hint = "" if name is None else ". A type of your own is known once the Python file that defines it is imported"
+        raise ModelError(f"{where}: {_elsewhere(name) or problem}; {category} are {', '.join(known)}{hint}")
+    return Element.of_type(name, f"{where}: ")
+
+
+def _elsewhere(name: Any) -> str:
+    """In which table a type stands, if there is one for it."""
+    for _, room in MANY_KINDS.values():
+        importlib.import_module(f"..{room}", __package__)
+    kind = Element.registry.get(str(name))
+    return f"a {name} stands in a table [[{kind.category}]]" if kind and kind.category in MANY_KINDS else ""
+
+
+def _refuse(error: Exception, where: str) -> NoReturn:
+    """The error with the place in the file before it; whatever it was, it becomes a ``ModelError``."""
+    kind = type(error) if isinstance(error, ModelError) else ModelError
+    raise kind(f"{where}: {error}") from None

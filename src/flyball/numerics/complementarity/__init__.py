@@ -1,0 +1,14 @@
+"""Complementarity problems, one solver a file: contact impulses in friction cones, small dense problems.
+
+Nothing here knows bodies. The contact problem (`contact_problem`) is an operator from impulses to velocities
+(`contact_operator`) with cones of admissible impulses (`cone_projection`). Solvers: `gauss_seidel`, `jacobi`,
+`apgd`, `barzilai_borwein` (first order; they share `packed_contacts` and `gradient_steps`), `newton`, `admm`
+(second order, with a sparse factor; they share `island_rows` and `proximal_rows`), `friction_pyramid` and
+`lemke` (pyramids in place of cones). A new solver is a file with a kernel and a line in
+`solver_choice.SOLVERS`.
+
+The small dense problem (`dense_problem`, `dense_solver`) decides which rows hold, slide or separate.
+`interior_point` and `douglas_rachford` find indeterminate forces within their cones.
+
+Imports: NumPy, `compiler/`, `math/`, `numerics/graphs`.
+"""

@@ -1,0 +1,550 @@
+"""The small dense complementarity problem solved: exchange of states, then Lemke's pivoting.
+
+Pivoting is used where exchanging states does not end. Rows that hold and those that slide in a known direction
+are eliminated first. A unilateral row is one unknown, friction is four: its impulse up and down, how fast it
+slides (Stewart and Trinkle 1996), and by how much the line of its reach is below zero. Ties are broken
+lexicographically (Cottle, Pang and Stone 1992, section 4.9), so that constants within rounding have to be set
+to zero: along a chain of bodies constants fall by many powers of ten, and their rounding would decide which is
+the least.
+
+The law of friction discs that slip is not linear: it is linearised at the present velocities, and all is solved
+again (Newton's method where everything else has its own rules: Josephy 1979).
+"""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ...compiler.kernels import kernel
+from ...math.scalar import exp, log, sqrt
+from .dense_problem import (
+    AT_HIGH,
+    AT_LOW,
+    AT_REST,
+    BILATERAL,
+    DISC_SLIPS,
+    FRICTION_DISC,
+    FRICTION_DISC_2,
+    FRICTION_LINE,
+    HOLD_IMPOSSIBLE,
+    LAST_LOG_RATIO,
+    LAST_MISS,
+    NO_IMPULSE,
+    NO_SOLUTION,
+    OUTCOME,
+    PASS_COUNT,
+    PIVOT_COUNT,
+    REFINED_IMPULSE,
+    ROW_SCALE,
+    SCALED_BIAS,
+    SCALED_CONST,
+    SLIDES_AS_GIVEN,
+    SLIDING,
+    SLIP_DIRECTION,
+    SLIP_RATIO,
+    SOFTENED_IMPULSE,
+    SOFTENING,
+    SOLUTION_FOUND,
+    UNILATERAL,
+    DenseProblem,
+    exchange_states,
+    row_rounding,
+    scale_problem,
+    scaled_reach,
+    scaled_velocity,
+    solve_states,
+)
+
+PIVOT_TOLERANCE = 1e-11
+TIE_TOLERANCE = 1e-13
+CONSTANT_ROUNDING = 1e-14  # of the largest constant at the start: what is left of a constant is none
+MAX_PIVOTS = 50  # pivots for each unknown
+
+
+@formula
+def solve_by_pivoting(P):
+    """States by pivoting. Returns whether there are any."""
+    m = number_unknowns(P)
+    if not reduce_problem(P):
+        return False
+    fill_tableau(P, m)
+    if not pivot_to_solution(P, m):
+        return False
+    read_states(P, m)
+    return True
+
+
+@formula
+def number_unknowns(P):
+    """How many there are; the first of each row into ``at``; ``at[n]`` is the first slip."""
+    n, m = P.b.shape[0], 0
+    for i in range(n):
+        P.at[i] = m
+        if P.rule[i] == UNILATERAL:
+            m += 1
+        elif is_friction(P.rule[i]):
+            m += 4
+    return m
+
+
+@formula
+def reduce_problem(P):
+    """x and reach of every row by the impulses of those that are sought, into Q: columns of these, and a constant."""
+    n = P.b.shape[0]
+    for i in range(n):
+        for j in range(n + 1):
+            P.Q[0, i, j] = P.Q[1, i, j] = 0.0
+        rule = P.rule[i]
+        if rule == BILATERAL:
+            for j in range(n):
+                P.Q[0, i, j] = P.N[i, j]
+            P.Q[0, i, i] += SOFTENING
+            P.Q[0, i, n] = P.row[SCALED_BIAS, i]
+        elif rule == SLIDING:
+            for j in range(n):
+                P.Q[0, i, j] = P.lean[i] * P.scaled_gain[i, j]
+            P.Q[0, i, i] += 1.0
+            P.Q[0, i, n] = P.lean[i] * P.row[SCALED_CONST, i]
+    if not eliminate_rows(P):
+        return False
+    for i in range(n):
+        of = i - 1 if P.rule[i] == FRICTION_DISC_2 else i
+        for j in range(n + 1):
+            P.Q[1, i, j] = P.scaled_gain[of, j] if j < n and not is_eliminated(P.rule[j]) else 0.0
+        P.Q[1, i, n] = P.row[SCALED_CONST, of]
+        for k in range(n):
+            if is_eliminated(P.rule[k]):
+                for j in range(n + 1):
+                    P.Q[1, i, j] += P.scaled_gain[of, k] * P.Q[0, k, j]
+    return True
+
+
+@formula
+def is_eliminated(rule):
+    """Whether rows of this rule have equations alone."""
+    return rule == BILATERAL or rule == SLIDING
+
+
+@formula
+def is_friction(rule):
+    """Whether rows of this rule are friction; a pair is taken for two, a square for its circle, to begin with."""
+    return rule == FRICTION_LINE or rule == FRICTION_DISC or rule == FRICTION_DISC_2
+
+
+@formula
+def eliminate_rows(P):
+    """Rows of Q[0] with equations become x = (coefficients of the others, constant); Gauss and Jordan."""
+    n = P.b.shape[0]
+    for i in range(n):
+        P.swap[i] = -1  # the unknown that the equation of row i was solved for
+    for k in range(n):
+        if not is_eliminated(P.rule[k]):
+            continue
+        best, size = -1, 0.0
+        for i in range(n):
+            if is_eliminated(P.rule[i]) and P.swap[i] < 0 and abs(P.Q[0, i, k]) > size:
+                best, size = i, abs(P.Q[0, i, k])
+        if best < 0:
+            return False
+        P.swap[best] = k
+        d = P.Q[0, best, k]
+        for j in range(n + 1):
+            P.Q[0, best, j] /= d
+        for i in range(n):
+            f = P.Q[0, i, k]
+            if i != best and is_eliminated(P.rule[i]) and f != 0.0:
+                for j in range(n + 1):
+                    P.Q[0, i, j] -= f * P.Q[0, best, j]
+    for i in range(n):  # rows in the order of their unknowns, moved to the other side; Q[1] is scratch here
+        if P.swap[i] >= 0:
+            k = P.swap[i]
+            for j in range(n + 1):
+                P.Q[1, k, j] = 0.0 if j < n and is_eliminated(P.rule[j]) else -P.Q[0, i, j]
+    for k in range(n):
+        for j in range(n + 1):
+            P.Q[0, k, j] = P.Q[1, k, j] if is_eliminated(P.rule[k]) else 0.0
+        if P.rule[k] == UNILATERAL or is_friction(P.rule[k]):
+            P.Q[0, k, k] = 1.0
+    return True
+
+
+@formula
+def fill_tableau(P, m):
+    """Columns: w, z, z0, q; of w = M z + z0 + q."""
+    n = P.b.shape[0]
+    T = P.T
+    for a in range(m):
+        P.basis[a] = a
+        for c in range(2 * m + 2):
+            T[a, c] = 0.0
+        T[a, a], T[a, 2 * m] = 1.0, -1.0
+    for i in range(n):
+        rule, a = P.rule[i], P.at[i]
+        if rule == UNILATERAL:
+            add_impulse_terms(P, m, a, i, (1.0, 0.0))
+        elif is_friction(rule):
+            add_impulse_terms(P, m, a, i, (1.0, 0.0))
+            add_impulse_terms(P, m, a + 1, i, (-1.0, 0.0))
+            add_impulse_terms(P, m, a + 2, i, (0.0, 1.0))
+            T[a, m + a + 2] -= 1.0  # + slip
+            T[a + 1, m + a + 2] -= 1.0
+            T[a + 2, m + a] += 1.0  # reach - up - down
+            T[a + 2, m + a + 1] += 1.0
+            add_impulse_terms(P, m, a + 3, i, (0.0, 1.0))
+            T[a + 2, m + a + 3] -= 1.0  # + what it lacks, in reach and in what is not negative of it
+            T[a + 3, m + a + 3] -= 1.0
+
+
+@formula
+def add_impulse_terms(P, m, a, i, what):
+    """Add (u, reach) . what of row i to row a of the tableau."""
+    n = P.b.shape[0]
+    for j in range(n + 1):
+        value = what[1] * P.Q[1, i, j]
+        if what[0] != 0.0:
+            for k in range(n):
+                soft = SOFTENING if k == i else 0.0
+                value += what[0] * (P.N[i, k] + soft) * P.Q[0, k, j]
+            if j == n:
+                value += what[0] * P.row[SCALED_BIAS, i]
+        if j == n:
+            P.T[a, 2 * m + 1] += value
+        elif P.rule[j] == UNILATERAL:
+            P.T[a, m + P.at[j]] -= value
+        elif is_friction(P.rule[j]):
+            P.T[a, m + P.at[j]] -= value
+            P.T[a, m + P.at[j] + 1] += value
+
+
+@formula
+def pivot_to_solution(P, m):
+    """Pivot until z0 is out. Returns whether it came to that."""
+    T = P.T
+    least, most = 0.0, 0.0
+    for a in range(m):
+        most = max(most, abs(T[a, 2 * m + 1]))
+    nothing = CONSTANT_ROUNDING * most
+    clear_rounding(P, m, nothing)
+    for a in range(m):
+        least = min(least, T[a, 2 * m + 1])
+    if least >= 0.0:
+        return True
+    enter = 2 * m
+    row = leaving_row(P, m, enter, True)
+    for _ in range(MAX_PIVOTS * (m + 1)):
+        P.info[PIVOT_COUNT] += 1
+        leave = P.basis[row]
+        pivot_on(P, m, row, enter)
+        clear_rounding(P, m, nothing)
+        P.basis[row] = enter
+        if leave == 2 * m:
+            return True
+        enter = leave + m if leave < m else leave - m
+        row = leaving_row(P, m, enter, False)
+        if row < 0:
+            return False
+    return False
+
+
+@formula
+def leaving_row(P, m, enter, start):
+    """The row of the lexicographically least (q, inverse of the basis) over the column that enters; -1: a ray."""
+    T = P.T
+    largest = 1.0
+    for a in range(m):
+        largest = max(largest, abs(T[a, enter]))
+    best = -1
+    for a in range(m):
+        if not start and not T[a, enter] > PIVOT_TOLERANCE * largest:
+            continue
+        if best < 0 or stands_before(P, m, (a, best), enter, start):
+            best = a
+    if best >= 0 and not start:  # z0 leaves where it may
+        for a in range(m):
+            if P.basis[a] == 2 * m and T[a, enter] > PIVOT_TOLERANCE * largest:
+                q, p = T[a, 2 * m + 1] / T[a, enter], T[best, 2 * m + 1] / T[best, enter]
+                if q <= p + TIE_TOLERANCE * (abs(p) + abs(q)):
+                    return a
+    return best
+
+
+@formula
+def stands_before(P, m, two, enter, start):
+    """Whether the first of two rows stands before the second."""
+    T = P.T
+    a, b = two
+    da = 1.0 if start else T[a, enter]
+    db = 1.0 if start else T[b, enter]
+    for c in range(-1, m):
+        k = 2 * m + 1 if c < 0 else c
+        x, y = T[a, k] / da, T[b, k] / db
+        if abs(x - y) > TIE_TOLERANCE * (abs(x) + abs(y)):
+            return x < y
+    return False
+
+
+@formula
+def pivot_on(P, m, row, enter):
+    """Make the column of what enters a unit vector."""
+    T = P.T
+    d = T[row, enter]
+    for c in range(2 * m + 2):
+        T[row, c] /= d
+    for a in range(m):
+        f = T[a, enter]
+        if a != row and f != 0.0:
+            for c in range(2 * m + 2):
+                T[a, c] -= f * T[row, c]
+
+
+@formula
+def clear_rounding(P, m, nothing):
+    """Constants that are rounding become zero."""
+    for a in range(m):
+        if abs(P.T[a, 2 * m + 1]) <= nothing:
+            P.T[a, 2 * m + 1] = 0.0
+
+
+@formula
+def unknown_value(P, m, z):
+    """Value of an unknown."""
+    for a in range(m):
+        if P.basis[a] == m + z:
+            return P.T[a, 2 * m + 1]
+    return 0.0
+
+
+@formula
+def read_states(P, m):
+    """States from the unknowns."""
+    for i in range(P.b.shape[0]):
+        rule, a = P.rule[i], P.at[i]
+        if rule == UNILATERAL:
+            P.state[i] = AT_REST if unknown_value(P, m, a) > 0.0 else NO_IMPULSE
+        elif is_friction(rule):
+            if unknown_value(P, m, a + 3) > 0.0:
+                P.state[i] = NO_IMPULSE
+            elif unknown_value(P, m, a + 2) > 0.0:
+                P.state[i] = AT_HIGH if unknown_value(P, m, a) > unknown_value(P, m, a + 1) else AT_LOW
+            else:
+                P.state[i] = AT_REST
+        elif rule == SLIDING:
+            P.state[i] = SLIDES_AS_GIVEN
+        else:
+            P.state[i] = AT_REST if rule == BILATERAL else NO_IMPULSE
+    for i in range(P.b.shape[0]):
+        if P.rule[i] == FRICTION_DISC and not (P.state[i] == AT_REST and P.state[i + 1] == AT_REST):
+            a, b = P.at[i], P.at[i + 1]
+            p, q = (
+                unknown_value(P, m, a) - unknown_value(P, m, a + 1),
+                unknown_value(P, m, b) - unknown_value(P, m, b + 1),
+            )
+            size, slip = sqrt(p * p + q * q), unknown_value(P, m, a + 2) + unknown_value(P, m, b + 2)
+            P.state[i] = P.state[i + 1] = DISC_SLIPS
+            P.row[SLIP_DIRECTION, i], P.row[SLIP_DIRECTION, i + 1] = (
+                (-p / size, -q / size) if size > 0.0 else (1.0, 0.0)
+            )
+            P.row[SLIP_RATIO, i] = size / slip if slip > 0.0 else 1.0
+
+
+MAX_REST_VELOCITY = 1e-6  # of the largest velocity that there would be: what holds and is left with more cannot hold
+DIRECTION_TOLERANCE = 1e-13
+MAX_DIRECTION_PASSES = 60  # of the ways of pairs
+MAX_SLOW_SLIP_PASSES = 200  # the same by the other way
+REACH_TOLERANCE = 1e-12  # of what a pair can hold: found
+MAX_MISS = 1e-6  # of what a pair can hold, or of its way: missed; redundancy leaves rounding of 1e-7
+MIN_LOG_SLOPE = 1e-6  # least slope of the logarithm of what it carries over that of k
+MAX_LOG_STEP = 3.0  # longest step of the logarithm of k
+REST_RATIO = 1e8  # as large a k, of a mass of one, as is at rest
+
+
+@formula
+def admit_states(P):
+    """States that go with the rules."""
+    for i in range(P.b.shape[0]):
+        rule, state = P.rule[i], P.state[i]
+        if rule == BILATERAL or rule == FRICTION_DISC or rule == FRICTION_DISC_2:
+            P.state[i] = AT_REST
+        elif rule == SLIDING:
+            P.state[i] = SLIDES_AS_GIVEN
+        elif rule == UNILATERAL:
+            P.state[i] = AT_REST if state == AT_REST else NO_IMPULSE
+        elif rule == FRICTION_LINE:
+            P.state[i] = state if state == AT_LOW or state == AT_HIGH else AT_REST
+        else:
+            P.state[i] = NO_IMPULSE
+
+
+@formula
+def solve_scaled(P):
+    """States and impulses of the problem as it is scaled and turned. Returns how it ended."""
+    n = P.b.shape[0]
+    if not exchange_states(P, SOFTENED_IMPULSE, 10 + 3 * n):
+        if not solve_by_pivoting(P):
+            return NO_SOLUTION
+        exchange_states(P, SOFTENED_IMPULSE, 10 + n)  # pivots are as good as rounding lets them be
+    for i in range(n):
+        P.at[i] = P.state[i]
+    if not exchange_states(P, REFINED_IMPULSE, 10 + n):
+        for i in range(n):
+            P.state[i] = P.at[i]
+        if not solve_states(P):
+            return NO_SOLUTION
+    idle = 0
+    for i in range(n):  # what carries nothing and need not, does not hold
+        if (
+            P.rule[i] == UNILATERAL
+            and P.state[i] == AT_REST
+            and abs(P.row[REFINED_IMPULSE, i]) <= row_rounding(P, P.row[REFINED_IMPULSE], i)
+        ):
+            P.state[i] = NO_IMPULSE
+            idle += 1
+    if idle > 0 and not solve_states(
+        P
+    ):  # the others by themselves: where all is rounding its share is not less than theirs
+        return NO_SOLUTION
+    for i in range(n):  # friction that can hold nothing: as it slides
+        if P.rule[i] == FRICTION_LINE and P.state[i] == NO_IMPULSE:
+            P.state[i] = AT_LOW if scaled_velocity(P, P.row[REFINED_IMPULSE], i) > 0.0 else AT_HIGH
+        elif P.rule[i] == SLIDING:
+            P.state[i] = SLIDES_AS_GIVEN
+    most = 0.0
+    for i in range(n):
+        most = max(most, driving_size(P, P.row[REFINED_IMPULSE], i))
+    for i in range(n):
+        least = MAX_REST_VELOCITY * most + P.grain[i] / P.row[ROW_SCALE, i]
+        if P.state[i] == AT_REST and abs(scaled_velocity(P, P.row[REFINED_IMPULSE], i)) > least:
+            return HOLD_IMPOSSIBLE
+    return SOLUTION_FOUND
+
+
+@formula
+def driving_size(P, x, i):
+    """How large the terms of row i are together, without impulses of what holds: where it cannot these say nothing."""
+    size = abs(P.row[SCALED_BIAS, i])
+    for j in range(x.shape[0]):
+        if P.state[j] != AT_REST:
+            size += abs(P.N[i, j] * x[j])
+    return size
+
+
+@formula
+def update_slip_directions(P):
+    """The ways of pairs that slip, by their velocities now. Returns by how much they turned at most."""
+    x, most = P.row[REFINED_IMPULSE], 0.0
+    for i in range(P.b.shape[0]):
+        if P.rule[i] != FRICTION_DISC or P.state[i] != DISC_SLIPS:
+            continue
+        u, v = scaled_velocity(P, x, i), scaled_velocity(P, x, i + 1)
+        size, reach = sqrt(u * u + v * v), max(scaled_reach(P, x, i), 0.0)
+        if not size > row_rounding(P, x, i) + row_rounding(P, x, i + 1):
+            continue
+        most = max(most, abs(u / size - P.row[SLIP_DIRECTION, i]), abs(v / size - P.row[SLIP_DIRECTION, i + 1]))
+        P.row[SLIP_DIRECTION, i], P.row[SLIP_DIRECTION, i + 1], P.row[SLIP_RATIO, i] = u / size, v / size, reach / size
+    return most
+
+
+@formula
+def solve_slow_slip(P):
+    """Pairs that hardly slip, whose ways Newton's method does not find: x = -k u, with k so that |x| is the reach.
+
+    |x| grows with k (as in the subproblem of a trust region, More and Sorensen 1983), so k is found by secants. What
+    carries less with any k is at rest: where redundancy leaves open what it carries, only the least sum of squares
+    was more than it can hold.
+    """
+    most = 0.0
+    for i in range(P.b.shape[0]):
+        P.row[SLIP_RATIO, i] = 1.0
+    for turn in range(MAX_SLOW_SLIP_PASSES):
+        for i in range(P.b.shape[0]):
+            P.row[SLIP_DIRECTION, i] = 0.0
+        P.info[PASS_COUNT] += 1
+        P.info[OUTCOME] = solve_scaled(P)
+        if P.info[OUTCOME] == NO_SOLUTION:
+            return
+        most = 0.0
+        for i in range(P.b.shape[0]):
+            if P.rule[i] == FRICTION_DISC and P.state[i] == DISC_SLIPS:
+                most = max(most, update_slip_ratio(P, i, turn))
+        if most <= REACH_TOLERANCE:
+            break
+    if most > MAX_MISS:
+        P.info[OUTCOME] = NO_SOLUTION
+    for i in range(P.b.shape[0]):
+        if P.rule[i] == FRICTION_DISC and P.state[i] == DISC_SLIPS and P.row[SLIP_RATIO, i] >= REST_RATIO:
+            P.state[i] = P.state[i + 1] = AT_REST
+
+
+@formula
+def update_slip_ratio(P, i, turn):
+    """Another k of the pair i, i + 1. Returns by what part its |x| missed the reach."""
+    x = P.row[REFINED_IMPULSE]
+    size, reach = sqrt(x[i] * x[i] + x[i + 1] * x[i + 1]), scaled_reach(P, x, i)
+    if not (size > 0.0 and reach > 0.0):  # nothing holds it
+        P.row[SLIP_RATIO, i] *= 0.5
+        return 0.0 if size <= row_rounding(P, x, i) + row_rounding(P, x, i + 1) else 1.0
+    if size < reach and P.row[SLIP_RATIO, i] >= REST_RATIO:
+        return 0.0
+    k, miss = log(P.row[SLIP_RATIO, i]), log(size / reach)
+    slope = 1.0
+    if turn > 0 and k != P.row[LAST_LOG_RATIO, i]:
+        slope = (miss - P.row[LAST_MISS, i]) / (k - P.row[LAST_LOG_RATIO, i])
+        slope = slope if abs(slope) > MIN_LOG_SLOPE else 1.0
+    P.row[LAST_LOG_RATIO, i], P.row[LAST_MISS, i] = k, miss
+    P.row[SLIP_RATIO, i] = exp(k - min(max(miss / slope, -MAX_LOG_STEP), MAX_LOG_STEP))
+    return abs(miss)
+
+
+@formula
+def write_results(P):
+    """Impulses, velocities and reaches in the units of the problem."""
+    n = P.b.shape[0]
+    x = P.row[REFINED_IMPULSE]
+    for i in range(n):
+        P.reach[i] = scaled_reach(P, x, i - 1 if P.rule[i] == FRICTION_DISC_2 else i) / P.row[ROW_SCALE, i]
+        P.x[i] = x[i] / P.row[ROW_SCALE, i]
+    for i in range(n):
+        u = P.b[i]
+        for j in range(n):
+            u += P.A[i, j] * P.x[j]
+        P.u[i] = u
+
+
+@formula
+def solve_dense(P):
+    """Solve in place; how it ended stands in ``P.info``."""
+    P.info[PASS_COUNT] = P.info[PIVOT_COUNT] = 0
+    scale_problem(P)
+    admit_states(P)
+    turned = 0.0
+    for _ in range(MAX_DIRECTION_PASSES):
+        P.info[PASS_COUNT] += 1
+        P.info[OUTCOME] = solve_scaled(P)
+        turned = update_slip_directions(P) if P.info[OUTCOME] != NO_SOLUTION else 0.0
+        if turned <= DIRECTION_TOLERANCE:
+            break
+    if turned > MAX_MISS:
+        solve_slow_slip(P)
+    write_results(P)
+
+
+@kernel
+def solve_dense_kernel(P: DenseProblem) -> None:
+    """`solve_dense`, called from Python."""
+    solve_dense(P)
+
+
+def solve_dense_problem(P: DenseProblem) -> int:
+    """Impulses, velocities and states of all rows, in place, from the states that stand there.
+
+    Parameters
+    ----------
+    P : Dense
+        The problem; see `problem`.
+
+    Returns
+    -------
+    int
+        FOUND; NONE_FOUND: no impulses fulfil all rules (or none were found); NOT_HELD: rows that hold cannot.
+    """
+    solve_dense_kernel(P)
+    return int(P.info[OUTCOME])

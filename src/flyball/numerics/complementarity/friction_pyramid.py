@@ -1,0 +1,163 @@
+"""The linear complementarity problem: a friction pyramid with d edges in place of the cone, by Gauss-Seidel.
+
+Stewart and Trinkle 1996, Anitescu and Potra 1997: the tangential impulse is a sum of non-negative ones in d
+directions, no more than mu p_n together, and dissipates the most. That is: it is the point of a regular d-gon
+nearest to a step against the velocity. Small problems can be solved by pivoting instead: `lemke`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ...compiler.formulas import formula
+from ...compiler.kernels import kernel
+from ...math.scalar import atan2, cos, sin
+from .contact_operator import (
+    apply_contact_impulse,
+    apply_line_impulse,
+    contact_range,
+    contact_velocity,
+    finish_solve,
+    larger_or_nan,
+    line_range,
+    node_range,
+    residuals,
+)
+from .contact_problem import (
+    CONVERGED,
+    LIMIT_REACHED,
+    SOLVE_FAILED,
+    ContactProblem,
+    ContactState,
+    ContactWorkspace,
+    FactorStorage,
+    SolverSettings,
+)
+from .gauss_seidel import sweep_lines
+from .packed_contacts import (
+    BIAS,
+    IMPULSE,
+    INVERSE_NN,
+    LEAST_NORMAL,
+    MU,
+    NS,
+    NT,
+    SLIDING_STEP,
+    SOFT,
+    copy_nodes,
+    count_contact_kinds,
+    pack_contacts,
+)
+
+ALL_FRICTIONAL = 2  # no contact is taken as one of balls
+
+
+@formula
+def project_on_polygon(d, r, x, y):
+    """The point nearest to (x, y) of the regular polygon with d corners at distance r, the first along x."""
+    half = math.pi / d
+    side = math.floor(atan2(y, x) / (2.0 * half))  # the corners are at angles 2 half side, 2 half (side + 1)
+    middle = (2.0 * side + 1.0) * half
+    c, s = cos(middle), sin(middle)
+    out, along = c * x + s * y, c * y - s * x
+    if out <= r * cos(half):
+        return x, y
+    most = r * sin(half)
+    out, along = r * cos(half), min(max(along, -most), most)
+    return c * out - s * along, s * out + c * along
+
+
+@formula
+def pyramid_sliding_friction(d, angle):
+    """Friction on a pyramid while it slides, in parts of that on the cone: against the velocity, and across it.
+
+    Parameters
+    ----------
+    d : int
+        Edges of the pyramid.
+    angle : float
+        Direction of the velocity [rad], from an edge.
+
+    Returns
+    -------
+    tuple of float
+        It acts along the edge that is nearest to the direction against the velocity: (1, 0) on the cone.
+    """
+    part = 2.0 * math.pi / d
+    off = angle - part * math.floor(angle / part + 0.5)
+    return cos(off), -sin(off)
+
+
+@formula
+def update_pyramid(P, X, W, c, at, d):
+    """One contact: the normal impulse, then the tangential one; the largest change of a velocity."""
+    k = W.packed
+    u, p = contact_velocity(P, W.own, X.wide, c), k[at + IMPULSE]
+    n = max(p - (u[0] + k[at + BIAS] + k[at + SOFT] * p) * k[at + INVERSE_NN], k[at + LEAST_NORMAL])
+    x = k[at + IMPULSE + 1] - k[at + SLIDING_STEP] * (u[1] + k[at + BIAS + 1] + k[at + NS] * (n - p))
+    y = k[at + IMPULSE + 2] - k[at + SLIDING_STEP] * (u[2] + k[at + BIAS + 2] + k[at + NT] * (n - p))
+    x, y = project_on_polygon(d, k[at + MU] * n, x, y)
+    change = n - p, x - k[at + IMPULSE + 1], y - k[at + IMPULSE + 2]
+    k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2] = n, x, y
+    X.p[c, 0], X.p[c, 1], X.p[c, 2] = n, x, y
+    apply_contact_impulse(P, W.own, X.wide, c, change)
+    moved = abs(change[0]) + abs(change[1]) + abs(change[2])
+    return moved / k[at + INVERSE_NN] if moved > 0.0 else 0.0
+
+
+@formula
+def pyramid_residuals(P, X, W, O, worst):
+    """What `finish_solve` wants: the residual is what the last sweep changed, the objective by definition."""
+    _, _, linear, square = residuals(P, X, O, (W.own, X.wide, W.free, W.free_wide))
+    first, last = contact_range(P, O)
+    most, step = 0.0, 0.0
+    for c in range(first, last):
+        most = max(most, abs(X.p[c, 0]))
+        step = max(step, W.rows[1, c, 0])
+    return worst, worst * step / most if most > 0.0 else worst * step, linear, square
+
+
+@formula
+def prepare_pyramids(P, X, W, O):
+    """Lay contacts out, with what is there acting; how many there are."""
+    first, last = contact_range(P, O)
+    copy_nodes(P, X, W, node_range(P, O))
+    for k in range(X.wide.shape[0]):
+        W.free_wide[k] = X.wide[k]
+    pack_contacts(P, X, W, 1, first, count_contact_kinds(P, W, first, last, ALL_FRICTIONAL))
+    begin, end = line_range(P, O)
+    for k in range(begin, end):
+        apply_line_impulse(P, X.wide, k, X.line[k])
+    return last - first
+
+
+@kernel
+def pyramid(
+    P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
+) -> int:
+    """Sweeps until velocities change by less than `ENOUGH`, at most `MOST`; how many there were.
+
+    Of Coulomb's law on a pyramid of `DIRECTIONS` edges, at least three; without rolling friction. Asked for anything
+    else it ends `SOLVE_FAILED` with everything as it was.
+    """
+    used, O.count.ended, O.count.written = 0, LIMIT_REACHED, 0
+    if P.turn.shape[0] > 0 or O.count.directions < 3 or not O.count.coulomb:
+        O.count.ended, O.count.used = SOLVE_FAILED, 0
+        return 0
+    n = prepare_pyramids(P, X, W, O)
+    worst = 0.0
+    while used < O.count.most:
+        turned, worst = used % 2 == 1, 0.0
+        for e in range(n):
+            s = n - 1 - e if turned else e
+            worst = larger_or_nan(worst, update_pyramid(P, X, W, W.sides[s, 2], 32 * s, O.count.directions))
+        worst = larger_or_nan(worst, sweep_lines(P, X, O, turned))
+        used += 1
+        if O.count.history:
+            finish_solve(P, X, W, O, pyramid_residuals(P, X, W, O, worst), used, False)
+        if worst <= O.real.enough:
+            O.count.ended = CONVERGED
+            break
+    O.count.used = used
+    finish_solve(P, X, W, O, pyramid_residuals(P, X, W, O, worst), used, True)
+    return used

@@ -1,0 +1,496 @@
+"""Projected gradient steps for all contacts at once: what Jacobi, Barzilai-Borwein and APGD are made of.
+
+The metric is that of diagonal blocks (or 1), so a step of size 1 is of the size of Gauss-Seidel's. Vectors are
+planes of `ContactWorkspace.rows`, by visit: impulses in the first four, their velocities N p in three more, b =
+D v + bias in the last; torques stand eight planes further, lines in `ContactWorkspace.lines`. Impulses of
+spheres are vectors in the world; of all others along the frame. Velocities of products stand in W.own and
+X.wide.
+
+A pass takes a step of the gradient for all contacts and applies its impulses; another forms the product with N.
+Before the iterations contacts are packed and the warm start is loaded; after them the answer is written back.
+"""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ...math.scalar import sqrt
+from .cone_projection import fraction_within, rolling_cone_normal
+from .contact_operator import (
+    apply_contact_impulse,
+    apply_line_impulse,
+    apply_torque_impulse,
+    contact_angular_velocity,
+    contact_range,
+    contact_velocity,
+    finish_solve,
+    larger_or_nan,
+    line_diagonal,
+    line_range,
+    line_velocity,
+    node_range,
+    residuals,
+    rolling_diagonal_block,
+)
+from .contact_problem import LINE_BIAS as LINE_BIAS
+from .contact_problem import LINE_HIGH, LINE_LOW
+from .contact_problem import LINE_SOFT as LINE_SOFT
+from .packed_contacts import (
+    ARM1,
+    ARM2,
+    BIAS,
+    FRICTIONAL,
+    IMPULSE,
+    INVERSE_NN,
+    LEAST_NORMAL,
+    METRIC_RATIO,
+    MU,
+    SLIDING_STEP,
+    SOFT,
+    SPHERE,
+    SPHERE_BIAS,
+    SPHERE_INVERSE_N,
+    SPHERE_INVERSE_T,
+    SPHERE_LEAST,
+    SPHERE_MU,
+    SPHERE_NORMAL,
+    SPHERE_RATIO,
+    SPHERE_SOFT,
+    SPHERE_TANGENT,
+    SPHERE_WIDTH,
+    apply_point_impulse,
+    apply_sphere_impulse,
+    copy_nodes,
+    count_contact_kinds,
+    frictional_velocity,
+    limit_friction,
+    local_step_sizes,
+    pack_contacts,
+    sphere_sliding_velocity,
+)
+
+BIAS_PLANE, TORQUE_OFFSET = 7, 8  # plane of b; by how many planes torques stand further on
+ROLLING_STEPS, LINE_METRIC = 16, 8  # plane of steps of spinning and rolling; row of lines' diagonal
+
+
+@formula
+def extrapolated(W, a, b, beta, s):
+    """Vector a + beta (a - b) of visit s."""
+    x, y, z = W.rows[a, s, 0], W.rows[a, s, 1], W.rows[a, s, 2]
+    if beta == 0.0:
+        return x, y, z
+    return x + beta * (x - W.rows[b, s, 0]), y + beta * (y - W.rows[b, s, 1]), z + beta * (z - W.rows[b, s, 2])
+
+
+@formula
+def set_vector(W, a, s, x):
+    """Vector a of visit s."""
+    W.rows[a, s, 0], W.rows[a, s, 1], W.rows[a, s, 2] = x
+
+
+@formula
+def step_sphere(k, at, y, g, size, coulomb):
+    """Impulse after a step from y against g; sums of d' M d and the square of M d, d: by what it differs from y."""
+    x0, x1, x2, lean, slide = k[at], k[at + 1], k[at + 2], k[at + SPHERE_INVERSE_N], k[at + SPHERE_INVERSE_T]
+    gn, yn, mu = g[0] * x0 + g[1] * x1 + g[2] * x2, y[0] * x0 + y[1] * x1 + y[2] * x2, k[at + SPHERE_MU]
+    a, b, c = g[0] - gn * x0, g[1] - gn * x1, g[2] - gn * x2
+    if coulomb:
+        gn += mu * sqrt(a * a + b * b + c * c)
+    n = yn - size * lean * gn
+    a, b, c = y[0] - yn * x0 - size * slide * a, y[1] - yn * x1 - size * slide * b, y[2] - yn * x2 - size * slide * c
+    n, part = limit_friction(n, sqrt(a * a + b * b + c * c), mu, k[at + SPHERE_RATIO], 0, k[at + SPHERE_LEAST])
+    a, b, c = n * x0 + part * a, n * x1 + part * b, n * x2 + part * c
+    e, f, h, n = a - y[0], b - y[1], c - y[2], n - yn
+    dn, dt = n * n, e * e + f * f + h * h - n * n
+    return (a, b, c), dn / lean + dt / slide, dn / (lean * lean) + dt / (slide * slide)
+
+
+@formula
+def step_frictional(k, at, y, g, size, coulomb):
+    """As `step_sphere`, of any contact, along its frame."""
+    lean, slide, gn = k[at + INVERSE_NN], k[at + SLIDING_STEP], g[0]
+    if lean == 0.0:  # nothing moves
+        return y, 0.0, 0.0
+    if coulomb:
+        gn += k[at + MU] * sqrt(g[1] * g[1] + g[2] * g[2])
+    n, a, b = y[0] - size * lean * gn, y[1] - size * slide * g[1], y[2] - size * slide * g[2]
+    n, part = limit_friction(n, sqrt(a * a + b * b), k[at + MU], k[at + METRIC_RATIO], 0, k[at + LEAST_NORMAL])
+    a, b = part * a, part * b
+    dn, dt = (n - y[0]) * (n - y[0]), (a - y[1]) * (a - y[1]) + (b - y[2]) * (b - y[2])
+    if slide == 0.0:
+        return (n, a, b), dn / lean, dn / (lean * lean)
+    return (n, a, b), dn / lean + dt / slide, dn / (lean * lean) + dt / (slide * slide)
+
+
+@formula
+def step_rolling(P, k, c, at, y, g, way):
+    """As `step_frictional`, impulses and torques together: y and g are two vectors each, way: size, coulomb, steps."""
+    size, coulomb, spin, roll = way
+    (yn, ys, yt), (yz, yx, yy) = y
+    (gn, gs, gt), (gz, gx, gy) = g
+    lean, slide, mu, rho, sigma = k[at + INVERSE_NN], k[at + SLIDING_STEP], k[at + MU], P.turn[c, 0], P.turn[c, 1]
+    if coulomb:
+        gn += mu * sqrt(gs * gs + gt * gt) + rho * sqrt(gx * gx + gy * gy) + sigma * abs(gz)
+    n, s, t = yn - size * lean * gn, ys - size * slide * gs, yt - size * slide * gt
+    z, x, w = yz - size * spin * gz, yx - size * roll * gx, yy - size * roll * gy
+    a, b, d = sqrt(lean / slide), sqrt(lean / roll), sqrt(lean / spin)  # in units in which the metric is 1
+    r, q = sqrt(s * s + t * t), sqrt(x * x + w * w)
+    n = max(rolling_cone_normal(mu * a, rho * b, sigma * d, n, r * a, q * b, abs(z) * d), k[at + LEAST_NORMAL])
+    a, b, d = fraction_within(n, mu, r), fraction_within(n, rho, q), fraction_within(n, sigma, abs(z))
+    s, t, z, x, w = a * s, a * t, d * z, b * x, b * w
+    dn, dt, dz = (n - yn) * (n - yn), (s - ys) * (s - ys) + (t - yt) * (t - yt), (z - yz) * (z - yz)
+    dx = (x - yx) * (x - yx) + (w - yy) * (w - yy)
+    dd = dn / lean + dt / slide + dz / spin + dx / roll
+    return (n, s, t), (z, x, w), dd, dn / (lean * lean) + dt / (slide * slide)
+
+
+@formula
+def step_line(P, W, k, ids, par):
+    """As `step_sphere`, of line k, written down; and g times the whole change."""
+    cur, prev, ucur, uprev, new = ids
+    beta, size, _ = par
+    y = W.lines[cur, k] + beta * (W.lines[cur, k] - W.lines[prev, k])
+    g = W.lines[ucur, k] + beta * (W.lines[ucur, k] - W.lines[uprev, k]) + W.lines[BIAS_PLANE, k]
+    d = W.lines[LINE_METRIC, k]
+    q = min(max(y - size * g / d, P.line_x[k, LINE_LOW]), P.line_x[k, LINE_HIGH])
+    W.lines[new, k] = q
+    return d * (q - y) * (q - y), g * (q - W.lines[cur, k]), d * d * (q - y) * (q - y)
+
+
+@formula
+def clear_velocities(P, X, W, O):
+    """No velocities."""
+    begin, end = node_range(P, O)
+    for e in range(begin, end):
+        for k in range(6):
+            W.own[P.member[e], k] = 0.0
+    for k in range(X.wide.shape[0]):
+        X.wide[k] = 0.0
+
+
+@formula
+def gradient_step(P, X, W, O, many, ids, par):
+    """A step from y = cur + beta (cur - prev) to ``new``, and its impulses on the velocities.
+
+    Parameters
+    ----------
+    many : tuple
+        Contacts of each kind.
+    ids : tuple
+        Vectors cur, prev, their N p, and new.
+    par : tuple
+        beta, size of the step, whether by Coulomb's law.
+
+    Returns
+    -------
+    tuple
+        d' M d with d = new - y; g . (new - cur); the largest square of M d of a contact.
+    """
+    cur, prev, ucur, uprev, new = ids
+    beta, size, coulomb = par
+    k, v, dd, gs, worst = W.packed, W.own, 0.0, 0.0, 0.0
+    clear_velocities(P, X, W, O)
+    for s in range(many[SPHERE] + many[FRICTIONAL]):
+        ball = s < many[SPHERE]
+        at = SPHERE_WIDTH * s if ball else SPHERE_WIDTH * many[SPHERE] + 32 * (s - many[SPHERE])
+        y, u, b = (
+            extrapolated(W, cur, prev, beta, s),
+            extrapolated(W, ucur, uprev, beta, s),
+            extrapolated(W, BIAS_PLANE, BIAS_PLANE, 0.0, s),
+        )
+        g, i, j = (u[0] + b[0], u[1] + b[1], u[2] + b[2]), W.sides[s, 0], W.sides[s, 1]
+        if ball:
+            x, more, square = step_sphere(k, at, y, g, size, coulomb)
+            apply_sphere_impulse(k, v, i, j, at, (0.0, x[0], x[1], x[2]))
+        else:
+            x, more, square = step_frictional(k, at, y, g, size, coulomb)
+            apply_frictional_impulse(k, v, W.inner, i, j, at, x)
+        set_vector(W, new, s, x)
+        dd, worst = dd + more, larger_or_nan(worst, square)
+        gs += g[0] * (x[0] - W.rows[cur, s, 0]) + g[1] * (x[1] - W.rows[cur, s, 1]) + g[2] * (x[2] - W.rows[cur, s, 2])
+    return gradient_step_general(P, X, W, O, many, ids, par, (dd, gs, worst))
+
+
+@formula
+def apply_vector(P, X, W, O, many, a):
+    """Vector a, without torques and lines, on the velocities."""
+    clear_velocities(P, X, W, O)
+    for s in range(many[SPHERE] + many[FRICTIONAL]):
+        i, j, x = W.sides[s, 0], W.sides[s, 1], extrapolated(W, a, a, 0.0, s)
+        if s < many[SPHERE]:
+            apply_sphere_impulse(W.packed, W.own, i, j, SPHERE_WIDTH * s, (0.0, x[0], x[1], x[2]))
+        else:
+            apply_frictional_impulse(
+                W.packed, W.own, W.inner, i, j, SPHERE_WIDTH * many[SPHERE] + 32 * (s - many[SPHERE]), x
+            )
+    begin = general_start(many)[0]
+    for s in range(begin, begin + many[4]):
+        apply_contact_impulse(P, W.own, X.wide, W.sides[s, 2], extrapolated(W, a, a, 0.0, s))
+
+
+@formula
+def apply_frictional_impulse(k, v, B, i, j, at, p):
+    """An impulse along the frame of a rough contact."""
+    x = k[at] * p[0] + k[at + 3] * p[1] + k[at + 6] * p[2]
+    y = k[at + 1] * p[0] + k[at + 4] * p[1] + k[at + 7] * p[2]
+    z = k[at + 2] * p[0] + k[at + 5] * p[1] + k[at + 8] * p[2]
+    apply_point_impulse(k, v, B, j, at + ARM2, x, y, z)
+    apply_point_impulse(k, v, B, i, at + ARM1, -x, -y, -z)
+
+
+@formula
+def general_start(many):
+    """First visit, and first number in ``pack``, of contacts of groups."""
+    first = many[SPHERE] + many[FRICTIONAL]
+    return first, SPHERE_WIDTH * many[SPHERE] + 32 * many[FRICTIONAL]
+
+
+@formula
+def gradient_step_general(P, X, W, O, many, ids, par, sums):
+    """Of contacts of groups, of turning and of lines."""
+    cur, prev, ucur, uprev, new = ids
+    beta, size, coulomb = par
+    dd, gs, worst = sums
+    begin, at = general_start(many)
+    for s in range(begin, begin + many[4]):
+        c = W.sides[s, 2]
+        y, u, b = (
+            extrapolated(W, cur, prev, beta, s),
+            extrapolated(W, ucur, uprev, beta, s),
+            extrapolated(W, BIAS_PLANE, BIAS_PLANE, 0.0, s),
+        )
+        g = u[0] + b[0], u[1] + b[1], u[2] + b[2]
+        if P.turn.shape[0] > 0:
+            z, u = (
+                extrapolated(W, TORQUE_OFFSET + cur, TORQUE_OFFSET + prev, beta, s),
+                extrapolated(W, TORQUE_OFFSET + ucur, TORQUE_OFFSET + uprev, beta, s),
+            )
+            b = extrapolated(W, TORQUE_OFFSET + BIAS_PLANE, BIAS_PLANE, 0.0, s)
+            h = u[0] + b[0], u[1] + b[1], u[2] + b[2]
+            way = size, coulomb, W.rows[ROLLING_STEPS, s, 0], W.rows[ROLLING_STEPS, s, 1]
+            x, q, more, square = step_rolling(P, W.packed, c, at, (y, z), (g, h), way)
+            for e in range(3):
+                gs += h[e] * (q[e] - W.rows[TORQUE_OFFSET + cur, s, e])
+            set_vector(W, TORQUE_OFFSET + new, s, q)
+            apply_torque_impulse(P, W.own, X.wide, c, q)
+        else:
+            x, more, square = step_frictional(W.packed, at, y, g, size, coulomb)
+        set_vector(W, new, s, x)
+        apply_contact_impulse(P, W.own, X.wide, c, x)
+        dd, worst, at = dd + more, larger_or_nan(worst, square), at + 32
+        gs += g[0] * (x[0] - W.rows[cur, s, 0]) + g[1] * (x[1] - W.rows[cur, s, 1]) + g[2] * (x[2] - W.rows[cur, s, 2])
+    first, last = line_range(P, O)
+    for e in range(first, last):
+        more, rise, square = step_line(P, W, e, ids, par)
+        apply_line_impulse(P, X.wide, e, W.lines[new, e])
+        dd, gs, worst = dd + more, gs + rise, larger_or_nan(worst, square)
+    return dd, gs, worst
+
+
+@formula
+def visit_velocity(P, X, W, s, at, ball, new):
+    """N x of visit s, of vector ``new``; but for its torque."""
+    k, v, i, j = W.packed, W.own, W.sides[s, 0], W.sides[s, 1]
+    x = extrapolated(W, new, new, 0.0, s)
+    if ball:
+        u = sphere_sliding_velocity(k, v, i, j, at, (v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2], 0.0))
+        n = k[at + SPHERE_SOFT] * (k[at] * x[0] + k[at + 1] * x[1] + k[at + 2] * x[2])
+        return u[0] + n * k[at], u[1] + n * k[at + 1], u[2] + n * k[at + 2]
+    u = frictional_velocity(k, v, i, j, at)
+    return u[0] + k[at + SOFT] * x[0], u[1], u[2]
+
+
+@formula
+def difference_product(a, b, c):
+    """(a - b) . c for vectors."""
+    return (a[0] - b[0]) * c[0] + (a[1] - b[1]) * c[1] + (a[2] - b[2]) * c[2]
+
+
+@formula
+def apply_operator(P, X, W, O, many, ids, unew, beta):
+    """N new into ``unew``; d' N d with d = new - y, and the square of N d in the inverse metric (without turning)."""
+    cur, prev, ucur, uprev, new = ids
+    k, total, square = W.packed, 0.0, 0.0
+    for s in range(many[SPHERE] + many[FRICTIONAL]):
+        ball = s < many[SPHERE]
+        at = SPHERE_WIDTH * s if ball else SPHERE_WIDTH * many[SPHERE] + 32 * (s - many[SPHERE])
+        u = visit_velocity(P, X, W, s, at, ball, new)
+        set_vector(W, unew, s, u)
+        x, y, w = (
+            extrapolated(W, new, new, 0.0, s),
+            extrapolated(W, cur, prev, beta, s),
+            extrapolated(W, ucur, uprev, beta, s),
+        )
+        w = u[0] - w[0], u[1] - w[1], u[2] - w[2]
+        total += difference_product(x, y, w)
+        n = k[at] * w[0] + k[at + 1] * w[1] + k[at + 2] * w[2] if ball else w[0]
+        lean, slide = (
+            (k[at + SPHERE_INVERSE_N], k[at + SPHERE_INVERSE_T]) if ball else (k[at + INVERSE_NN], k[at + SLIDING_STEP])
+        )
+        square += lean * n * n + slide * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2] - n * n)
+    return apply_operator_general(P, X, W, O, many, ids, unew, beta, (total, square))
+
+
+@formula
+def apply_operator_general(P, X, W, O, many, ids, unew, beta, sums):
+    """Of contacts of groups, of turning and of lines."""
+    cur, prev, ucur, uprev, new = ids
+    k, (total, square) = W.packed, sums
+    begin, at = general_start(many)
+    for s in range(begin, begin + many[4]):
+        c = W.sides[s, 2]
+        x, y, w = (
+            extrapolated(W, new, new, 0.0, s),
+            extrapolated(W, cur, prev, beta, s),
+            extrapolated(W, ucur, uprev, beta, s),
+        )
+        u = contact_velocity(P, W.own, X.wide, c)
+        u = u[0] + P.soft[c] * x[0], u[1], u[2]
+        set_vector(W, unew, s, u)
+        w = u[0] - w[0], u[1] - w[1], u[2] - w[2]
+        total += difference_product(x, y, w)
+        square += k[at + INVERSE_NN] * w[0] * w[0] + k[at + SLIDING_STEP] * (w[1] * w[1] + w[2] * w[2])
+        at += 32
+        if P.turn.shape[0] > 0:
+            x, y = (
+                extrapolated(W, TORQUE_OFFSET + new, TORQUE_OFFSET + new, 0.0, s),
+                extrapolated(W, TORQUE_OFFSET + cur, TORQUE_OFFSET + prev, beta, s),
+            )
+            u, w = (
+                contact_angular_velocity(P, W.own, X.wide, c),
+                extrapolated(W, TORQUE_OFFSET + ucur, TORQUE_OFFSET + uprev, beta, s),
+            )
+            set_vector(W, TORQUE_OFFSET + unew, s, u)
+            total += difference_product(x, y, u) - difference_product(x, y, w)
+    first, last = line_range(P, O)
+    for e in range(first, last):
+        u = line_velocity(P, X.wide, e) + P.line_x[e, LINE_SOFT] * W.lines[new, e]
+        y = W.lines[cur, e] + beta * (W.lines[cur, e] - W.lines[prev, e])
+        w = W.lines[ucur, e] + beta * (W.lines[ucur, e] - W.lines[uprev, e])
+        W.lines[unew, e] = u
+        total += (u - w) * (W.lines[new, e] - y)
+        square += (u - w) * (u - w) / W.lines[LINE_METRIC, e]
+    return total, square
+
+
+@formula
+def packed_place(many, s):
+    """Where the numbers of visit s begin."""
+    return SPHERE_WIDTH * s if s < many[SPHERE] else SPHERE_WIDTH * many[SPHERE] + 32 * (s - many[SPHERE])
+
+
+@formula
+def begin_iterations(P, X, W, O, unit_metric):
+    """Lay contacts out; impulses in vector 0, N p in vector 4, b in its own; how many contacts there are of each kind.
+
+    The metric is 1 if ``unit_metric``.
+    """
+    first, last = contact_range(P, O)
+    copy_nodes(P, X, W, node_range(P, O))
+    for k in range(X.wide.shape[0]):
+        W.free_wide[k] = X.wide[k]
+    many = count_contact_kinds(P, W, first, last, 1)
+    pack_contacts(P, X, W, 0, first, many)
+    for s in range(last - first):
+        load_visit(P, X, W, many, s)
+        if P.turn.shape[0] > 0:
+            steps = local_step_sizes(rolling_diagonal_block(P, W.sides[s, 2]), 0.0, 0)
+            W.rows[ROLLING_STEPS, s, 0], W.rows[ROLLING_STEPS, s, 1] = (
+                (1.0, 1.0) if unit_metric else (steps[0], steps[6])
+            )
+        if unit_metric:
+            at = packed_place(many, s)
+            if s < many[SPHERE]:
+                W.packed[at + SPHERE_INVERSE_N], W.packed[at + SPHERE_INVERSE_T], W.packed[at + SPHERE_RATIO] = (
+                    1.0,
+                    1.0,
+                    1.0,
+                )
+            elif W.packed[at + INVERSE_NN] > 0.0:  # else nothing moves
+                W.packed[at + INVERSE_NN], W.packed[at + SLIDING_STEP], W.packed[at + METRIC_RATIO] = 1.0, 1.0, 1.0
+    start, end = line_range(P, O)
+    for k in range(start, end):
+        W.lines[0, k] = X.line[k]
+        W.lines[BIAS_PLANE, k] = line_velocity(P, W.free_wide, k) + P.line_x[k, LINE_BIAS]
+        W.lines[LINE_METRIC, k] = 1.0 if unit_metric else line_diagonal(P, k)
+        apply_line_impulse(P, X.wide, k, X.line[k])
+    subtract_free_velocities(P, X, W, O)
+    apply_operator(P, X, W, O, many, (0, 0, 0, 0, 0), 4, 0.0)
+    O.count.written = 0
+    return many
+
+
+@formula
+def load_visit(P, X, W, many, s):
+    """Impulses and b of visit s."""
+    k, at, i, j, c, v = W.packed, packed_place(many, s), W.sides[s, 0], W.sides[s, 1], W.sides[s, 2], W.free
+    if s < many[SPHERE]:
+        a, b, d, n = k[at], k[at + 1], k[at + 2], k[at + SPHERE_NORMAL]
+        set_vector(
+            W,
+            0,
+            s,
+            (n * a + k[at + SPHERE_TANGENT], n * b + k[at + SPHERE_TANGENT + 1], n * d + k[at + SPHERE_TANGENT + 2]),
+        )
+        u = sphere_sliding_velocity(k, v, i, j, at, (v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2], 0.0))
+        n = k[at + SPHERE_BIAS]
+        set_vector(W, BIAS_PLANE, s, (u[0] + n * a, u[1] + n * b, u[2] + n * d))
+        return
+    set_vector(W, 0, s, (k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2]))
+    u = (
+        frictional_velocity(k, v, i, j, at)
+        if s < many[SPHERE] + many[FRICTIONAL]
+        else contact_velocity(P, v, W.free_wide, c)
+    )
+    set_vector(W, BIAS_PLANE, s, (u[0] + k[at + BIAS], u[1] + k[at + BIAS + 1], u[2] + k[at + BIAS + 2]))
+    if P.turn.shape[0] > 0:
+        set_vector(W, TORQUE_OFFSET, s, (X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]))
+        set_vector(W, TORQUE_OFFSET + BIAS_PLANE, s, contact_angular_velocity(P, v, W.free_wide, c))
+
+
+@formula
+def subtract_free_velocities(P, X, W, O):
+    """Leave the velocities that impulses make in W.own and X.wide."""
+    first, last = node_range(P, O)
+    for e in range(first, last):
+        i = P.member[e]
+        for k in range(6):
+            W.own[i, k] -= W.free[i, k]
+    for k in range(X.wide.shape[0]):
+        X.wide[k] -= W.free_wide[k]
+
+
+@formula
+def report_iterate(P, X, W, O, many, best, used, last):
+    """The impulses of a vector into X, velocities with them; a row of the history or, at last, the answer."""
+    first, end = node_range(P, O)
+    for e in range(first, end):
+        for k in range(6):
+            W.own[P.member[e], k] = W.free[P.member[e], k]
+    for k in range(X.wide.shape[0]):
+        X.wide[k] = W.free_wide[k]
+    for s in range(many[0] + many[1] + many[2] + many[3] + many[4]):
+        c, x, y, z = W.sides[s, 2], W.rows[best, s, 0], W.rows[best, s, 1], W.rows[best, s, 2]
+        for k in range(3):
+            X.p[c, k] = W.rows[best, s, k]
+            if s < many[SPHERE]:
+                X.p[c, k] = P.frame[c, 3 * k] * x + P.frame[c, 3 * k + 1] * y + P.frame[c, 3 * k + 2] * z
+        apply_contact_impulse(P, W.own, X.wide, c, (X.p[c, 0], X.p[c, 1], X.p[c, 2]))
+        if P.turn.shape[0] > 0:
+            for k in range(3):
+                X.torque[c, k] = W.rows[TORQUE_OFFSET + best, s, k]
+            apply_torque_impulse(P, W.own, X.wide, c, (X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]))
+    first, end = line_range(P, O)
+    for k in range(first, end):
+        X.line[k] = W.lines[best, k]
+        apply_line_impulse(P, X.wide, k, X.line[k])
+    O.count.used = used
+    finish_solve(P, X, W, O, residuals(P, X, O, (W.own, X.wide, W.free, W.free_wide)), used, last)
+
+
+@formula
+def unused_index(a, b, c, first):
+    """The first of the numbers from ``first`` on that is none of three."""
+    for k in range(4):
+        if first + k != a and first + k != b and first + k != c:
+            return first + k
+    return first

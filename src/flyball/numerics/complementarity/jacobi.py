@@ -1,0 +1,107 @@
+"""Projected Jacobi with mass splitting: all contacts at once, each against its own part of the bodies.
+
+A body of n contacts is treated as n bodies of an n-th of its mass (Tonge, Benevolenski and Voroshilov 2012): a
+step of diagonal block / n is then safe, whatever the problem, and the objective falls in every iteration. It
+converges slowly, and is the only solver here whose result does not depend on the order of contacts.
+"""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ...compiler.kernels import kernel
+from ...math.scalar import sqrt
+from .contact_operator import contact_range, line_range
+from .contact_problem import (
+    CONVERGED,
+    FIXED_SIDE,
+    LIMIT_REACHED,
+    ContactProblem,
+    ContactState,
+    ContactWorkspace,
+    FactorStorage,
+    SolverSettings,
+)
+from .gradient_steps import (
+    LINE_METRIC,
+    ROLLING_STEPS,
+    apply_operator,
+    begin_iterations,
+    gradient_step,
+    packed_place,
+    report_iterate,
+)
+from .packed_contacts import INVERSE_NN, SLIDING_STEP, SPHERE, SPHERE_INVERSE_N, SPHERE_INVERSE_T
+
+
+@formula
+def count_contacts(P, W, O):
+    """How many contacts, and lines, each node and group has: in W.nodes[0, i, 0] and at W.wide[0, first of group]."""
+    first, last = contact_range(P, O)
+    start, end = line_range(P, O)
+    for again in range(2):  # first zero, then count
+        for c in range(first, last):
+            for side in range(2):
+                i = P.at[c, side]
+                if i >= 0:
+                    W.nodes[0, i, 0] = W.nodes[0, i, 0] + 1.0 if again else 0.0
+                elif i < FIXED_SIDE:
+                    W.wide[0, P.group[-2 - i]] = W.wide[0, P.group[-2 - i]] + 1.0 if again else 0.0
+        for k in range(start, end):
+            g = P.group[P.line_at[k, 0]]
+            W.wide[0, g] = W.wide[0, g] + 1.0 if again else 0.0
+
+
+@formula
+def most_contacts_of_side(P, W, c):
+    """Most contacts of a side of contact c."""
+    n = 1.0
+    for side in range(2):
+        i = P.at[c, side]
+        if i >= 0:
+            n = max(n, W.nodes[0, i, 0])
+        elif i < FIXED_SIDE:
+            n = max(n, W.wide[0, P.group[-2 - i]])
+    return n
+
+
+@formula
+def split_masses(P, W, O, many):
+    """Shorten the steps of all contacts and lines."""
+    count_contacts(P, W, O)
+    for s in range(many[0] + many[1] + many[2] + many[3] + many[4]):
+        at, n = packed_place(many, s), most_contacts_of_side(P, W, W.sides[s, 2])
+        if s < many[SPHERE]:
+            W.packed[at + SPHERE_INVERSE_N] /= n
+            W.packed[at + SPHERE_INVERSE_T] /= n
+        else:
+            W.packed[at + INVERSE_NN] /= n
+            W.packed[at + SLIDING_STEP] /= n
+        if P.turn.shape[0] > 0:
+            W.rows[ROLLING_STEPS, s, 0] /= n
+            W.rows[ROLLING_STEPS, s, 1] /= n
+    first, last = line_range(P, O)
+    for k in range(first, last):
+        W.lines[LINE_METRIC, k] *= W.wide[0, P.group[P.line_at[k, 0]]]
+
+
+@kernel
+def jacobi(
+    P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
+) -> int:
+    """Iterations until a step changes velocities by less than `ENOUGH`, at most `MOST`; how many there were."""
+    many = begin_iterations(P, X, W, O, False)
+    split_masses(P, W, O, many)
+    cur, new, used, O.count.ended = 0, 1, 0, LIMIT_REACHED
+    while used < O.count.most:
+        used += 1
+        ids = cur, cur, 4 + cur, 4 + cur, new
+        _, _, worst = gradient_step(P, X, W, O, many, ids, (0.0, 1.0, O.count.coulomb))
+        apply_operator(P, X, W, O, many, ids, 4 + new, 0.0)
+        cur, new = new, cur
+        if O.count.history:
+            report_iterate(P, X, W, O, many, cur, used, False)
+        if sqrt(worst) <= O.real.enough:
+            O.count.ended = CONVERGED
+            break
+    report_iterate(P, X, W, O, many, cur, used, True)
+    return used

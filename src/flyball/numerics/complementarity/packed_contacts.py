@@ -1,0 +1,502 @@
+"""Contacts packed in visiting order, all numbers of each in one place, and their local updates.
+
+Contacts of one kind stand together, the kinds with the least work first: spheres without friction, spheres,
+others without friction, others with friction, and general ones (groups, rolling friction). Within a kind,
+contacts that follow each other are taken from distant places of the list, so that they share no body and the
+processor works at several of them at once.
+
+A local update returns the largest change of a velocity that its new impulse made [m/s]. The law is Coulomb's:
+the normal impulse first, then the tangential one within mu times that. In the convex form (``coulomb`` 0) the
+impulse is the point of the cone nearest to a step, in the metric of the diagonal block.
+"""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ...math.scalar import sqrt
+from ...math.vec import cross, dot
+from .cone_projection import fraction_within, least_normal_impulse
+from .contact_operator import angular_response, apply_contact_impulse, apply_torque_impulse, diagonal_block, frame_axis
+from .contact_problem import FIXED_SIDE, IS_ISOTROPIC
+
+SMOOTH_SPHERE, SPHERE, FRICTIONLESS, FRICTIONAL, GENERAL, CONTACT_KINDS = range(6)
+SPHERE_WIDTH, FRICTIONLESS_WIDTH = 16, 20  # numbers of a contact; the rest have 32
+INTERLEAVED_STREAMS = 4
+PARALLEL_TOLERANCE = (
+    1e-20  # square of the sine below which an arm is along the normal: poses far from the origin are rounded
+)
+# columns of Scratch.own
+INVERSE_MASS_COLUMN, MEAN_INERTIA_COLUMN = 6, 7  # 1/m, mean of the block's diagonal
+# where a ball's numbers stand
+(
+    SPHERE_ARM1,
+    SPHERE_ARM2,
+    SPHERE_BIAS,
+    SPHERE_SOFT,
+    SPHERE_INVERSE_N,
+    SPHERE_INVERSE_T,
+    SPHERE_MU,
+    SPHERE_RATIO,
+    SPHERE_NORMAL,
+    SPHERE_TANGENT,
+    SPHERE_LEAST,
+) = 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 15
+# of a smooth contact: normal, torques of a unit impulse on both sides, what they turn by
+(
+    UNIT_TORQUE1,
+    UNIT_TORQUE2,
+    UNIT_SPIN1,
+    UNIT_SPIN2,
+    FRICTIONLESS_BIAS,
+    FRICTIONLESS_SOFT,
+    FRICTIONLESS_INVERSE,
+    FRICTIONLESS_NORMAL,
+    FRICTIONLESS_LEAST,
+) = 3, 6, 9, 12, 15, 16, 17, 18, 19
+# of a rough one: frame, arms, bias; what `local_step_sizes` says; impulse
+ARM1, ARM2, BIAS, SOFT, INVERSE_NN, NS, NT = 9, 12, 15, 18, 19, 20, 21
+ISS, IST, ITT, SLIDING_STEP, METRIC_RATIO, MU, IMPULSE, LEAST_NORMAL = 22, 23, 24, 25, 26, 27, 28, 31
+
+
+@formula
+def copy_nodes(P, X, W, nodes):
+    """Velocities of the nodes ``member[first:last]`` and what each weighs into their own rooms."""
+    for e in range(nodes[0], nodes[1]):
+        i = P.member[e]
+        for k in range(6):
+            W.own[i, k] = X.v[i, k]
+            W.free[i, k] = X.v[i, k]
+            W.inner[i, k] = P.node[i, 1 + k]
+        W.own[i, INVERSE_MASS_COLUMN] = P.node[i, 0]
+        W.own[i, MEAN_INERTIA_COLUMN] = (P.node[i, 1] + P.node[i, 2] + P.node[i, 3]) / 3.0
+    for k in range(8):
+        W.own[P.size[1], k], W.inner[P.size[1], k], W.free[P.size[1], k] = 0.0, 0.0, 0.0
+
+
+@formula
+def arm_along_normal(P, c, side):
+    """Whether the arm is along the normal, and its length in that direction."""
+    a, b, d = P.arm[c, 3 * side], P.arm[c, 3 * side + 1], P.arm[c, 3 * side + 2]
+    x, y, z = P.frame[c, 0], P.frame[c, 1], P.frame[c, 2]
+    r = a * x + b * y + d * z
+    a, b, d = a - r * x, b - r * y, d - r * z
+    return a * a + b * b + d * d <= PARALLEL_TOLERANCE * r * r, r
+
+
+@formula
+def contact_kind(P, W, c, friction_level):
+    """What is to be done for a contact, the arms of balls in W.rows[0]; ``friction_level``: 1 if none is taken
+    as smooth, 2 if none as one of balls either.
+    """
+    i, j = P.at[c, 0], P.at[c, 1]
+    if i < FIXED_SIDE or j < FIXED_SIDE or P.turn.shape[0] > 0:
+        return GENERAL
+    if friction_level > 1:
+        return FRICTIONAL
+    first, second = True, True
+    W.rows[0, c, 1], W.rows[0, c, 2] = 0.0, 0.0
+    if i >= 0:
+        first, W.rows[0, c, 1] = arm_along_normal(P, c, 0)
+    if j >= 0:
+        second, W.rows[0, c, 2] = arm_along_normal(P, c, 1)
+    if P.mu[c] == 0.0 and not friction_level:
+        return SMOOTH_SPHERE if first and second else FRICTIONLESS
+    if not (first and second) or P.bias[c, 1] != 0.0 or P.bias[c, 2] != 0.0:
+        return FRICTIONAL
+    if (i < 0 or P.node[i, 0] == 0.0) and (j < 0 or P.node[j, 0] == 0.0):
+        return FRICTIONAL
+    alike = (i < 0 or P.node[i, IS_ISOTROPIC] == 1.0) and (j < 0 or P.node[j, IS_ISOTROPIC] == 1.0)
+    x, y, z = P.frame[c, 6], P.frame[c, 7], P.frame[c, 8]
+    return SPHERE if alike and abs(x * x + y * y + z * z - 1.0) < 1e-12 else FRICTIONAL
+
+
+@formula
+def packed_width(kind):
+    """Numbers of a contact of a kind."""
+    if kind == SMOOTH_SPHERE or kind == SPHERE:
+        return SPHERE_WIDTH
+    return FRICTIONLESS_WIDTH if kind == FRICTIONLESS else 32
+
+
+@formula
+def interleaved_place(e, m):
+    """Where the e-th of m stands in a sweep."""
+    q = m // INTERLEAVED_STREAMS
+    if e < q * INTERLEAVED_STREAMS:
+        return (e % q) * INTERLEAVED_STREAMS + e // q
+    return e
+
+
+@formula
+def pack_sphere(P, X, W, c, place):
+    """A contact of balls."""
+    k, i, j, r1, r2 = W.packed, P.at[c, 0], P.at[c, 1], W.rows[0, c, 1], -W.rows[0, c, 2]
+    dn, dt, p, q = 0.0, 0.0, X.p[c, 1], X.p[c, 2]
+    for s in range(3):
+        k[place + s] = P.frame[c, s]
+        k[place + SPHERE_TANGENT + s] = P.frame[c, 3 + s] * p + P.frame[c, 6 + s] * q
+    if i >= 0:
+        dn, dt = dn + P.node[i, 0], dt + r1 * r1 * P.node[i, 1]
+    if j >= 0:
+        dn, dt = dn + P.node[j, 0], dt + r2 * r2 * P.node[j, 1]
+    dt += dn
+    k[place + SPHERE_ARM1], k[place + SPHERE_ARM2] = r1, r2
+    k[place + SPHERE_BIAS], k[place + SPHERE_SOFT] = P.bias[c, 0], P.soft[c]
+    k[place + SPHERE_INVERSE_N] = 1.0 / (dn + P.soft[c]) if dn > 0.0 else 0.0
+    k[place + SPHERE_INVERSE_T] = 1.0 / dt if dt > 0.0 else 0.0
+    k[place + SPHERE_MU], k[place + SPHERE_RATIO] = P.mu[c], dt * k[place + SPHERE_INVERSE_N]
+    k[place + SPHERE_NORMAL], k[place + SPHERE_LEAST] = X.p[c, 0], least_normal_impulse(P, c)
+
+
+@formula
+def pack_frictionless(P, W, c, place):
+    """A contact without friction between any nodes."""
+    k, n = W.packed, frame_axis(P, c, 0)
+    d = P.soft[c]
+    for side in range(2):
+        i = P.at[c, side]
+        a = P.arm[c, 3 * side], P.arm[c, 3 * side + 1], P.arm[c, 3 * side + 2]
+        r, g = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        if i >= 0:
+            r = cross(a, n)
+            g = angular_response(P, i, r)
+            d += P.node[i, 0] + dot(r, g)
+        for s in range(3):
+            k[place + s] = n[s]
+            k[place + UNIT_TORQUE1 + 3 * side + s] = r[s]
+            k[place + UNIT_SPIN1 + 3 * side + s] = g[s]
+    k[place + FRICTIONLESS_BIAS], k[place + FRICTIONLESS_SOFT] = P.bias[c, 0], P.soft[c]
+    k[place + FRICTIONLESS_INVERSE] = 1.0 / d if d > P.soft[c] else 0.0
+
+
+@formula
+def pack_frictional(P, coulomb, W, c, place):
+    """A contact with friction of any kind."""
+    k, D = W.packed, diagonal_block(P, c)
+    for s in range(9):
+        k[place + s] = P.frame[c, s]
+    for s in range(6):
+        k[place + ARM1 + s] = P.arm[c, s]
+    for s in range(3):
+        k[place + BIAS + s] = P.bias[c, s]
+    k[place + SOFT], k[place + MU] = P.soft[c], P.mu[c]
+    size = D[0] + D[3] + D[5]
+    W.rows[1, c, 0] = 3.0 / (size + P.soft[c]) if size > 0.0 else 0.0
+    steps = local_step_sizes(D, P.soft[c], coulomb)
+    for s in range(8):
+        k[place + INVERSE_NN + s] = steps[s]
+
+
+@formula
+def local_step_sizes(D, soft, coulomb):
+    """Inverse of nn, ns, nt, the inverse of the tangential block, a step of one size for it, its ratio to nn.
+
+    For the convex form (``coulomb`` 0) those of a diagonal block that is nowhere less than D: with c = |(ns, nt)| and l
+    the larger eigenvalue of the tangential block, D <= (1 + c / sqrt(nn l)) diag(nn, l, l).
+    """
+    nn, ns, nt, ss, st, tt = D[0] + soft, D[1], D[2], D[3], D[4], D[5]
+    if not nn > soft:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    half = 0.5 * (ss - tt)
+    most = 0.5 * (ss + tt) + sqrt(half * half + st * st)
+    if most <= 1e-12 * nn:
+        return 1.0 / nn, ns, nt, 0.0, 0.0, 0.0, 0.0, 0.0
+    if not coulomb:
+        more = 1.0 + sqrt((ns * ns + nt * nt) / (nn * most))
+        return 1.0 / (more * nn), ns, nt, 0.0, 0.0, 0.0, 1.0 / (more * most), most / nn
+    det = ss * tt - st * st
+    if det <= 1e-12 * most * most:  # one direction only in which it can slide
+        det, ss, st, tt = most * most, tt, -st, ss
+    return 1.0 / nn, ns, nt, tt / det, -st / det, ss / det, 1.0 / most, most / nn
+
+
+@formula
+def count_contact_kinds(P, W, first, last, friction_level):
+    """How many contacts there are of each kind; the kind of each is left in W.rows[0, c, 0]."""
+    a, b, d, e, f = 0, 0, 0, 0, 0
+    for c in range(first, last):
+        kind = contact_kind(P, W, c, friction_level)
+        W.rows[0, c, 0] = kind
+        if kind == SMOOTH_SPHERE:
+            a += 1
+        elif kind == SPHERE:
+            b += 1
+        elif kind == FRICTIONLESS:
+            d += 1
+        elif kind == FRICTIONAL:
+            e += 1
+        else:
+            f += 1
+    return a, b, d, e, f
+
+
+@formula
+def pack_contacts(P, X, W, coulomb, first, many):
+    """Put contacts in their order, and their impulses on the velocities in W.own and X.wide."""
+    begin, at = 0, 0  # first visit and first number of a kind
+    last = first + many[0] + many[1] + many[2] + many[3] + many[4]
+    for kind in range(CONTACT_KINDS):
+        e, m, wide = 0, many[kind], packed_width(kind)
+        for c in range(first, last if m > 0 else first):
+            if W.rows[0, c, 0] == kind:
+                visit = interleaved_place(e, m)
+                e += 1
+                pack_contact(P, X, W, coulomb, c, kind, begin + visit, at + wide * visit)
+        begin, at = begin + m, at + wide * m
+
+
+@formula
+def make_admissible(P, X, c):
+    """Make an impulse to start from one of the cone: where it presses less, or not, its friction is less."""
+    n = X.p[c, 0] if X.p[c, 0] > 0.0 else 0.0  # nan too
+    n = max(n, least_normal_impulse(P, c))
+    a, b = X.p[c, 1], X.p[c, 2]
+    r = sqrt(a * a + b * b)
+    part = fraction_within(n, P.mu[c], r) if n > 0.0 and r == r else 0.0
+    X.p[c, 0], X.p[c, 1], X.p[c, 2] = n, part * a if part > 0.0 else 0.0, part * b if part > 0.0 else 0.0
+    if P.turn.shape[0] > 0:
+        z, a, b = X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]
+        roll = fraction_within(n, P.turn[c, 0], sqrt(a * a + b * b)) if n > 0.0 else 0.0
+        spin = fraction_within(n, P.turn[c, 1], abs(z)) if n > 0.0 else 0.0
+        X.torque[c, 0], X.torque[c, 1], X.torque[c, 2] = spin * z, roll * a, roll * b
+
+
+@formula
+def pack_contact(P, X, W, coulomb, c, kind, visit, place):
+    """One contact, with its impulse acting."""
+    i, j = P.at[c, 0], P.at[c, 1]
+    i, j = i if i >= 0 else P.size[1], j if j >= 0 else P.size[1]
+    W.sides[visit, 0], W.sides[visit, 1], W.sides[visit, 2] = i, j, c
+    make_admissible(P, X, c)
+    k = W.packed
+    if kind == SMOOTH_SPHERE or kind == SPHERE:
+        pack_sphere(P, X, W, c, place)
+        if k[place + SPHERE_NORMAL] != 0.0:
+            apply_sphere_impulse(
+                k,
+                W.own,
+                i,
+                j,
+                place,
+                (
+                    k[place + SPHERE_NORMAL],
+                    k[place + SPHERE_TANGENT],
+                    k[place + SPHERE_TANGENT + 1],
+                    k[place + SPHERE_TANGENT + 2],
+                ),
+            )
+        return
+    p = X.p[c, 0], X.p[c, 1], X.p[c, 2]
+    if kind == FRICTIONLESS:
+        pack_frictionless(P, W, c, place)
+        k[place + FRICTIONLESS_NORMAL], k[place + FRICTIONLESS_LEAST] = p[0], least_normal_impulse(P, c)
+    else:
+        pack_frictional(P, coulomb, W, c, place)
+        k[place + LEAST_NORMAL] = least_normal_impulse(P, c)
+        for s in range(3):
+            k[place + IMPULSE + s] = p[s]
+    if p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0:
+        apply_contact_impulse(P, W.own, X.wide, c, p)
+    if P.turn.shape[0] > 0:
+        apply_torque_impulse(P, W.own, X.wide, c, (X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]))
+
+
+@formula
+def apply_sphere_impulse(k, v, i, j, at, p):
+    """What an impulse of a contact of balls does: normal part, tangential vector in the world."""
+    x, y, z, r1, r2 = k[at], k[at + 1], k[at + 2], k[at + SPHERE_ARM1], k[at + SPHERE_ARM2]
+    n, a, b, c = p
+    e, f, g = y * c - z * b, z * a - x * c, x * b - y * a  # n x tangential
+    a, b, c = a + n * x, b + n * y, c + n * z
+    m, r = v[j, INVERSE_MASS_COLUMN], r2 * v[j, MEAN_INERTIA_COLUMN]
+    v[j, 0] += m * a
+    v[j, 1] += m * b
+    v[j, 2] += m * c
+    v[j, 3] -= r * e
+    v[j, 4] -= r * f
+    v[j, 5] -= r * g
+    m, r = v[i, INVERSE_MASS_COLUMN], r1 * v[i, MEAN_INERTIA_COLUMN]
+    v[i, 0] -= m * a
+    v[i, 1] -= m * b
+    v[i, 2] -= m * c
+    v[i, 3] -= r * e
+    v[i, 4] -= r * f
+    v[i, 5] -= r * g
+
+
+@formula
+def limit_friction(n, r, mu, ratio, coulomb, least):
+    """Normal impulse and the part of the tangential one that is kept, of a step to (n, r): see above."""
+    near = n if n > least else least
+    if r <= mu * near:
+        return near, 1.0
+    if not coulomb:
+        near = (n + ratio * mu * r) / (1.0 + ratio * mu * mu)
+        near = near if near > least else least
+    return near, mu * near / r
+
+
+@formula
+def update_smooth_sphere(k, v, i, j, at):
+    """Balls without friction: only velocities along the normal change."""
+    x, y, z, p = k[at], k[at + 1], k[at + 2], k[at + SPHERE_NORMAL]
+    u = x * (v[j, 0] - v[i, 0]) + y * (v[j, 1] - v[i, 1]) + z * (v[j, 2] - v[i, 2])
+    q = p - (u + k[at + SPHERE_BIAS] + k[at + SPHERE_SOFT] * p) * k[at + SPHERE_INVERSE_N]
+    q = q if q > k[at + SPHERE_LEAST] else k[at + SPHERE_LEAST]
+    d = q - p
+    if d == 0.0:
+        return 0.0
+    k[at + SPHERE_NORMAL] = q
+    a, b = d * v[j, INVERSE_MASS_COLUMN], d * v[i, INVERSE_MASS_COLUMN]
+    v[j, 0] += a * x
+    v[j, 1] += a * y
+    v[j, 2] += a * z
+    v[i, 0] -= b * x
+    v[i, 1] -= b * y
+    v[i, 2] -= b * z
+    return abs(a + b)
+
+
+@formula
+def frictionless_velocity(k, v, i, j, at):
+    """Normal velocity of any nodes."""
+    u = k[at] * (v[j, 0] - v[i, 0]) + k[at + 1] * (v[j, 1] - v[i, 1]) + k[at + 2] * (v[j, 2] - v[i, 2])
+    u += k[at + UNIT_TORQUE2] * v[j, 3] + k[at + UNIT_TORQUE2 + 1] * v[j, 4] + k[at + UNIT_TORQUE2 + 2] * v[j, 5]
+    return u - (
+        k[at + UNIT_TORQUE1] * v[i, 3] + k[at + UNIT_TORQUE1 + 1] * v[i, 4] + k[at + UNIT_TORQUE1 + 2] * v[i, 5]
+    )
+
+
+@formula
+def update_frictionless(k, v, i, j, at):
+    """Any nodes without friction."""
+    x, y, z, p = k[at], k[at + 1], k[at + 2], k[at + FRICTIONLESS_NORMAL]
+    u = frictionless_velocity(k, v, i, j, at)
+    q = p - (u + k[at + FRICTIONLESS_BIAS] + k[at + FRICTIONLESS_SOFT] * p) * k[at + FRICTIONLESS_INVERSE]
+    q = q if q > k[at + FRICTIONLESS_LEAST] else k[at + FRICTIONLESS_LEAST]
+    d = q - p
+    if d == 0.0:
+        return 0.0
+    k[at + FRICTIONLESS_NORMAL] = q
+    a, b = d * v[j, INVERSE_MASS_COLUMN], d * v[i, INVERSE_MASS_COLUMN]
+    v[j, 0] += a * x
+    v[j, 1] += a * y
+    v[j, 2] += a * z
+    v[j, 3] += d * k[at + UNIT_SPIN2]
+    v[j, 4] += d * k[at + UNIT_SPIN2 + 1]
+    v[j, 5] += d * k[at + UNIT_SPIN2 + 2]
+    v[i, 0] -= b * x
+    v[i, 1] -= b * y
+    v[i, 2] -= b * z
+    v[i, 3] -= d * k[at + UNIT_SPIN1]
+    v[i, 4] -= d * k[at + UNIT_SPIN1 + 1]
+    v[i, 5] -= d * k[at + UNIT_SPIN1 + 2]
+    return abs(d) / k[at + FRICTIONLESS_INVERSE]
+
+
+@formula
+def sphere_sliding_velocity(k, v, i, j, at, d):
+    """Tangential velocity in the world of balls, d: that of their centres and its normal part."""
+    x, y, z, r1, r2 = k[at], k[at + 1], k[at + 2], k[at + SPHERE_ARM1], k[at + SPHERE_ARM2]
+    e, f, g = r2 * v[j, 3], r2 * v[j, 4], r2 * v[j, 5]
+    e, f, g = e + r1 * v[i, 3], f + r1 * v[i, 4], g + r1 * v[i, 5]
+    # u = v2 - v1 - (r2 w2 + r1 w1) x n, less its normal part
+    a, b, c, n = d
+    return a - n * x - (f * z - g * y), b - n * y - (g * x - e * z), c - n * z - (e * y - f * x)
+
+
+@formula
+def update_sphere(k, v, i, j, at, coulomb):
+    """Balls: the tangential impulse is a vector in the world, and no block couples it with the normal one."""
+    a, b, c, p = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2], k[at + SPHERE_NORMAL]
+    un = k[at] * a + k[at + 1] * b + k[at + 2] * c
+    n = p - (un + k[at + SPHERE_BIAS] + k[at + SPHERE_SOFT] * p) * k[at + SPHERE_INVERSE_N]
+    if n <= 0.0 and p == 0.0 and coulomb and k[at + SPHERE_LEAST] == 0.0:
+        return 0.0
+    a, b, c = sphere_sliding_velocity(k, v, i, j, at, (a, b, c, un))
+    it, s, t, w = (
+        k[at + SPHERE_INVERSE_T],
+        k[at + SPHERE_TANGENT],
+        k[at + SPHERE_TANGENT + 1],
+        k[at + SPHERE_TANGENT + 2],
+    )
+    a, b, c = s - it * a, t - it * b, w - it * c
+    q, part = limit_friction(
+        n, sqrt(a * a + b * b + c * c), k[at + SPHERE_MU], k[at + SPHERE_RATIO], coulomb, k[at + SPHERE_LEAST]
+    )
+    a, b, c = part * a, part * b, part * c
+    k[at + SPHERE_NORMAL], k[at + SPHERE_TANGENT], k[at + SPHERE_TANGENT + 1], k[at + SPHERE_TANGENT + 2] = q, a, b, c
+    n, a, b, c = q - p, a - s, b - t, c - w
+    apply_sphere_impulse(k, v, i, j, at, (n, a, b, c))
+    return (abs(n) + abs(a) + abs(b) + abs(c)) / it
+
+
+@formula
+def packed_point_velocity(k, v, i, at):
+    """Velocity of a point of node i whose arm stands at ``at``."""
+    a, b, c = k[at], k[at + 1], k[at + 2]
+    e, f, g = v[i, 3], v[i, 4], v[i, 5]
+    return v[i, 0] + f * c - g * b, v[i, 1] + g * a - e * c, v[i, 2] + e * b - f * a
+
+
+@formula
+def frictional_velocity(k, v, i, j, at):
+    """Velocity of a rough contact along its frame, without bias."""
+    a, b, c = packed_point_velocity(k, v, j, at + ARM2)
+    e, f, g = packed_point_velocity(k, v, i, at + ARM1)
+    a, b, c = a - e, b - f, c - g
+    return (
+        k[at] * a + k[at + 1] * b + k[at + 2] * c,
+        k[at + 3] * a + k[at + 4] * b + k[at + 5] * c,
+        k[at + 6] * a + k[at + 7] * b + k[at + 8] * c,
+    )
+
+
+@formula
+def apply_point_impulse(k, v, B, i, at, x, y, z):
+    """What an impulse at that point does to node i."""
+    a, b, c, m = k[at], k[at + 1], k[at + 2], v[i, INVERSE_MASS_COLUMN]
+    e, f, g = b * z - c * y, c * x - a * z, a * y - b * x
+    v[i, 0] += m * x
+    v[i, 1] += m * y
+    v[i, 2] += m * z
+    v[i, 3] += B[i, 0] * e + B[i, 3] * f + B[i, 4] * g
+    v[i, 4] += B[i, 3] * e + B[i, 1] * f + B[i, 5] * g
+    v[i, 5] += B[i, 4] * e + B[i, 5] * f + B[i, 2] * g
+
+
+@formula
+def local_impulse(k, at, u, coulomb):
+    """The new impulse of a rough contact at velocities u without bias; what it was is still there."""
+    p, s, t = k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2]
+    n = p - (u[0] + k[at + BIAS] + k[at + SOFT] * p) * k[at + INVERSE_NN]
+    us, ut = u[1] + k[at + BIAS + 1], u[2] + k[at + BIAS + 2]
+    if coulomb:
+        n = n if n > k[at + LEAST_NORMAL] else k[at + LEAST_NORMAL]
+        us += k[at + NS] * (n - p)
+        ut += k[at + NT] * (n - p)
+        a = s - (k[at + ISS] * us + k[at + IST] * ut)
+        b = t - (k[at + IST] * us + k[at + ITT] * ut)
+        if a * a + b * b <= k[at + MU] * k[at + MU] * n * n:
+            return n, a, b
+    # it slides: only a step of one size in all directions ends with friction against the velocity
+    a, b = s - k[at + SLIDING_STEP] * us, t - k[at + SLIDING_STEP] * ut
+    q, part = limit_friction(n, sqrt(a * a + b * b), k[at + MU], k[at + METRIC_RATIO], coulomb, k[at + LEAST_NORMAL])
+    return q, part * a, part * b
+
+
+@formula
+def update_frictional(k, v, B, i, j, at, coulomb):
+    """Any nodes."""
+    u = frictional_velocity(k, v, i, j, at)
+    n, s, t = local_impulse(k, at, u, coulomb)
+    dn, ds, dt = n - k[at + IMPULSE], s - k[at + IMPULSE + 1], t - k[at + IMPULSE + 2]
+    if dn == 0.0 and ds == 0.0 and dt == 0.0:
+        return 0.0
+    k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2] = n, s, t
+    x = k[at] * dn + k[at + 3] * ds + k[at + 6] * dt
+    y = k[at + 1] * dn + k[at + 4] * ds + k[at + 7] * dt
+    z = k[at + 2] * dn + k[at + 5] * ds + k[at + 8] * dt
+    apply_point_impulse(k, v, B, j, at + ARM2, x, y, z)
+    apply_point_impulse(k, v, B, i, at + ARM1, -x, -y, -z)
+    return (abs(dn) + abs(ds) + abs(dt)) / k[at + INVERSE_NN]

@@ -1,0 +1,381 @@
+"""Contact solvers by name, and which solver takes which island: ``solver="auto"``.
+
+Solvers are called by addresses, so that only those in use are compiled. Contacts of several islands are copied
+into arrays of their own where each island's stand together, those that sweeps take at the end as one. A new
+solver is a file with a kernel, and a line in ``SOLVERS``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiler.formulas import by_address, call, formula
+from ...compiler.kernels import Kernel, kernel
+from ...compiler.struct_layout import Float1, Int1
+from .admm import admm
+from .apgd import apgd, scaled_apgd
+from .barzilai_borwein import barzilai_borwein
+from .contact_problem import (
+    CONVERGED,
+    LIMIT_REACHED,
+    SOLVE_FAILED,
+    STALLED,
+    STORAGE_TOO_SMALL,
+    ContactProblem,
+    ContactState,
+    ContactWorkspace,
+    FactorStorage,
+    SolverSettings,
+    allocate_solver,
+    empty_problem,
+)
+from .gauss_seidel import gauss_seidel
+from .islands import Islands, allocate_islands, find_islands
+from .jacobi import jacobi
+from .newton import newton
+
+# entries of Auto.doors: addresses of what takes small islands and of what takes the rest (0: all are small)
+SMALL_ISLAND_SOLVER, OTHER_SOLVER, SOLVER_SLOTS = range(3)
+# entries of Auto.limit: most contacts and most nodes of an island that is small; the same where masses are UNEVEN;
+# contacts of all islands above which it is a CROWD: what falls together hits anew in every step, and Newton's method
+# has no warm start there
+MAX_CONTACTS, MAX_NODES, MAX_CONTACTS_UNEVEN, MAX_NODES_UNEVEN, CROWD_CONTACTS, LIMITS = range(6)
+NEWTON_TOLERANCE_FACTOR, MIN_NEWTON_TOLERANCE = (
+    1e-5,
+    1e-10,
+)  # times the residual that is enough; but no finer than this [m/s], which rounding may hide
+UNEVEN_MASS_RATIO = 30.0  # ratio of masses in an island from which on sweeps take too long
+CROWD_ISLAND_CONTACTS, CROWD_ISLAND_NODES = 12, 4  # of an island that is small in a crowd
+# entries of Auto.told, added up over calls: calls, islands, islands by the one and by the other, what the one had to
+# hand on to the other, contacts by the one; the largest island's contacts
+CALLS, ISLANDS, SMALL_SOLVED, OTHER_SOLVED, PASSED_ON, SMALL_CONTACTS, LARGEST_ISLAND, STATISTICS = range(8)
+
+
+class IslandSolver(NamedTuple):
+    """In place of `FactorStorage`: rooms for factors, a copy of the problem by islands, addresses, what was picked."""
+
+    numbers: Float1
+    places: Int1
+    P: ContactProblem
+    X: ContactState
+    islands: Islands
+    pick: Int1  # (ni,): islands, the small ones first
+    doors: Int1
+    limit: Int1
+    told: Int1
+
+
+@formula
+def copy_contact(P, X, Q, Y, c, k):
+    """Contact c of (P, X) becomes contact k of (Q, Y)."""
+    for s in range(2):
+        Q.at[k, s], Q.block[k, s] = P.at[c, s], P.block[c, s]
+    for s in range(9):
+        Q.frame[k, s] = P.frame[c, s]
+    for s in range(6):
+        Q.arm[k, s] = P.arm[c, s]
+    for s in range(3):
+        Q.bias[k, s], Y.p[k, s] = P.bias[c, s], X.p[c, s]
+    Q.mu[k], Q.soft[k] = P.mu[c], P.soft[c]
+    if P.least.shape[0] > 0:
+        Q.least[k] = P.least[c]
+    if P.turn.shape[0] > 0:
+        Q.turn[k, 0], Q.turn[k, 1] = P.turn[c, 0], P.turn[c, 1]
+        for s in range(3):
+            Y.torque[k, s] = X.torque[c, s]
+
+
+@formula
+def copy_impulse_back(X, Y, c, k, turning):
+    """Impulses of contact k of Y become those of contact c of X."""
+    for s in range(3):
+        X.p[c, s] = Y.p[k, s]
+        if turning:
+            X.torque[c, s] = Y.torque[k, s]
+
+
+@formula
+def copy_line(P, X, Q, Y, line, k):
+    """Line ``line`` of (P, X) becomes line k of (Q, Y)."""
+    Q.line_at[k, 0], Q.line_at[k, 1], Y.line[k] = P.line_at[line, 0], P.line_at[line, 1], X.line[line]
+    for s in range(4):
+        Q.line_x[k, s] = P.line_x[line, s]
+
+
+@formula
+def is_small_island(P, F, I, k):
+    """Whether island k is for the solver of small islands."""
+    if P.turn.shape[0] > 0:
+        return False
+    contacts, nodes = I.island[k + 1] - I.island[k], I.member_p[k + 1] - I.member_p[k]
+    crowded = P.size[0] > F.limit[CROWD_CONTACTS] and (contacts > CROWD_ISLAND_CONTACTS or nodes > CROWD_ISLAND_NODES)
+    if not crowded and contacts <= F.limit[MAX_CONTACTS] and nodes <= F.limit[MAX_NODES]:
+        return True
+    if contacts > F.limit[MAX_CONTACTS_UNEVEN] or nodes > F.limit[MAX_NODES_UNEVEN]:
+        return False
+    return I.group_p[k + 1] > I.group_p[k] or mass_ratio(P, I, k) > UNEVEN_MASS_RATIO
+
+
+@formula
+def mass_ratio(P, I, k):
+    """Largest over smallest mass of the nodes of an island that impulses move."""
+    least, most = 1e300, 0.0
+    for e in range(I.member_p[k], I.member_p[k + 1]):
+        a = P.node[I.member[e], 0]
+        if a > 0.0:
+            least, most = min(least, a), max(most, a)
+    return most / least
+
+
+@formula
+def pick_islands(P, F, I, count):
+    """Islands in a new order, in ``F.pick``: the small ones first; returns how many these are."""
+    some = 0
+    for k in range(count):
+        F.told[LARGEST_ISLAND] = max(F.told[LARGEST_ISLAND], I.island[k + 1] - I.island[k])
+        if F.doors[SMALL_ISLAND_SOLVER] != 0 and is_small_island(P, F, I, k):
+            F.pick[some] = k
+            some += 1
+            F.told[SMALL_CONTACTS] += I.island[k + 1] - I.island[k]
+    rest = some
+    for k in range(count):
+        if F.doors[SMALL_ISLAND_SOLVER] == 0 or not is_small_island(P, F, I, k):
+            F.pick[rest] = k
+            rest += 1
+    F.told[CALLS] += 1
+    F.told[ISLANDS] += count
+    F.told[SMALL_SOLVED] += some
+    F.told[OTHER_SOLVED] += count - some
+    return some
+
+
+@formula
+def copy_islands(P, X, Q, Y, F, I, count, some):
+    """Copy by islands: the small ones, then the others as one."""
+    c, l, m = 0, 0, 0
+    Q.island[0] = Q.line_p[0] = Q.member_p[0] = 0
+    for i in range(count):
+        k = F.pick[i]
+        for e in range(I.island[k], I.island[k + 1]):
+            copy_contact(P, X, Q, Y, I.order[e], c)
+            c += 1
+        for e in range(I.line_p[k], I.line_p[k + 1]):
+            copy_line(P, X, Q, Y, I.line_order[e], l)
+            l += 1
+        for e in range(I.member_p[k], I.member_p[k + 1]):
+            Q.member[m] = I.member[e]
+            m += 1
+        end = min(i, some) + 1
+        Q.island[end], Q.line_p[end], Q.member_p[end] = c, l, m
+    Q.size[0], Q.size[1], Q.size[2], Q.size[3] = c, P.size[1], P.size[2], l
+
+
+@formula
+def copy_impulses_back(P, X, Y, F, I, count):
+    """Impulses back to where they came from."""
+    c, l, turning = 0, 0, P.turn.shape[0] > 0
+    for i in range(count):
+        k = F.pick[i]
+        for e in range(I.island[k], I.island[k + 1]):
+            copy_impulse_back(X, Y, I.order[e], c, turning)
+            c += 1
+        for e in range(I.line_p[k], I.line_p[k + 1]):
+            X.line[I.line_order[e]] = Y.line[l]
+            l += 1
+
+
+@formula
+def worst_outcome(O, sofar):
+    """The worst of what solvers said: (residual, force residual, used, status)."""
+    a, b, used, ended = sofar
+    return (
+        max(a, O.real.residual),
+        max(b, O.real.force_residual),
+        max(used, O.count.used),
+        max(ended, O.count.ended),
+    )
+
+
+@formula
+def solve_small_island(P, X, W, O, F, f):
+    """An island by the solver of small ones, or by the other where that cannot.
+
+    It is asked for ``FINER`` digits than are enough, since Newton's last steps bring many of them: what sticks then
+    does not creep. That it has not got them all is no fault.
+    """
+    enough, most = O.real.enough, O.count.most
+    O.real.enough = max(NEWTON_TOLERANCE_FACTOR * enough, min(enough, MIN_NEWTON_TOLERANCE))
+    if O.count.most_steps > 0:
+        O.count.most = O.count.most_steps
+    call(F.doors[SMALL_ISLAND_SOLVER], P, X, W, O, f, 0)
+    O.real.enough, O.count.most = enough, most
+    if (O.count.ended == LIMIT_REACHED or O.count.ended == STALLED) and O.real.residual <= enough:
+        O.count.ended = CONVERGED
+    if F.doors[OTHER_SOLVER] != 0 and (O.count.ended == STORAGE_TOO_SMALL or O.count.ended == SOLVE_FAILED):
+        F.told[PASSED_ON] += 1
+        call(F.doors[OTHER_SOLVER], P, X, W, O, f, 0)
+
+
+@formula
+def solve_islands(P, X, Y, W, O, F, f, count, some):
+    """Islands each by its solver, on the copy."""
+    Q, I = F.P, F.islands
+    copy_islands(P, X, Q, Y, F, I, count, some)
+    sofar = (0.0, 0.0, 0, 0)
+    for k in range(some):
+        O.count.island = k
+        solve_small_island(Q, Y, W, O, F, f)
+        sofar = worst_outcome(O, sofar)
+    if some < count:
+        O.count.island = some
+        call(F.doors[OTHER_SOLVER], Q, Y, W, O, f, 0)
+        sofar = worst_outcome(O, sofar)
+    O.count.island = -1
+    O.real.residual, O.real.force_residual, O.count.used, O.count.ended = sofar
+    copy_impulses_back(P, X, Y, F, I, count)
+
+
+@formula
+def solve_all_islands(P, X, W, O, F):
+    """See `auto`."""
+    f, I = by_address(FactorStorage(F.numbers[:], F.places[:])), F.islands
+    O.count.used, O.count.ended, O.count.island = 0, CONVERGED, -1
+    O.real.residual, O.real.force_residual = 0.0, 0.0
+    nc, nn, ng, nl = P.size[0], P.size[1], P.size[2], P.size[3]
+    count = find_islands(P.at, P.line_at, (nc, nn, ng, nl), I)
+    some = pick_islands(P, F, I, count)
+    if count == 0:
+        return 0
+    if some == 0:
+        call(F.doors[OTHER_SOLVER], P, X, W, O, f, 0)
+    elif count == 1:
+        solve_small_island(P, X, W, O, F, f)
+    else:
+        solve_islands(
+            P,
+            X,
+            by_address(ContactState(F.X.p[:], F.X.torque[:], F.X.line[:], X.v[:], X.wide[:])),
+            W,
+            O,
+            F,
+            f,
+            count,
+            some,
+        )
+    return O.count.used
+
+
+@kernel
+def auto(P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: IslandSolver, task: int) -> int:
+    """Every island by the solver picked for it; returns the most iterations that one took. F is `IslandSolver`."""
+    return solve_all_islands(P, X, W, O, F)
+
+
+SOLVERS: dict[str, Kernel] = {
+    "gauss-seidel": gauss_seidel,
+    "newton": newton,
+    "jacobi": jacobi,
+    "barzilai-borwein": barzilai_borwein,
+    "apgd": apgd,
+    "apgd-lean": scaled_apgd,
+    "admm": admm,
+}
+FACTORISING_SOLVERS = {
+    "newton",
+    "admm",
+}  # those that want `FactorStorage`: each island by itself, the rest to sweeps where it cannot
+
+# islands up to this size go to Newton, contacts and nodes: with masses that are alike, where 50 sweeps take as long as
+# five of its steps, and with uneven ones or joints, where sweeps do not get there
+EVEN_ISLAND, UNEVEN_ISLAND = (200, 40), (800, 150)
+CROWD_LIMIT = 400  # contacts of a crowd
+PLACES_PER_ITEM, NUMBERS_PER_ITEM = (
+    60,
+    250,
+)  # of `FactorStorage`, for each contact and node of the largest island that is to fit
+
+
+class PreparedSolver(NamedTuple):
+    """A solver with its rooms."""
+
+    kernel: Kernel
+    F: IslandSolver
+    told: np.ndarray  # see `choose`; empty for a solver that does all at once
+
+
+def solver_names() -> tuple[str, ...]:
+    """What solvers may be called."""
+    return ("auto", *SOLVERS)
+
+
+def prepare_solver(
+    name: str, P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings
+) -> PreparedSolver:
+    """A solver for problems of these capacities; compiles what it needs.
+
+    Parameters
+    ----------
+    name : str
+        One of `solver_names`.
+    P, X, W, O : Problem, State, Scratch, Choices
+        As large as they will be.
+
+    Returns
+    -------
+    Ready
+        To be asked for anew when the rooms are enlarged.
+
+    Raises
+    ------
+    KeyError
+        For another name.
+    """
+    if name != "auto" and name not in FACTORISING_SOLVERS:
+        made = allocate_island_solver(P, False)
+        made.doors[OTHER_SOLVER] = SOLVERS[name].address
+        return PreparedSolver(auto, made, np.zeros(0, np.int64))
+    whole = name != "auto"
+    made = allocate_island_solver(P, whole)
+    first = SOLVERS["newton" if name == "auto" else name]
+    made.doors[SMALL_ISLAND_SOLVER] = first.address
+    if name == "auto" and newton_suffices(len(P.node), len(P.group) - 1, len(P.turn) > 0):
+        made.limit[:] = unlimited_islands(P)  # few bodies: nothing is left for sweeps, which have no door
+    else:
+        made.doors[OTHER_SOLVER] = gauss_seidel.address
+    return PreparedSolver(auto, made, made.told)
+
+
+def newton_suffices(nodes: int, groups: int, turning: bool) -> bool:
+    """Whether Newton's method is all that `auto` needs."""
+    return nodes <= EVEN_ISLAND[1] and groups == 0 and not turning
+
+
+def unlimited_islands(P: ContactProblem) -> tuple[int, ...]:
+    """Limits by which every island is small, of problems of these capacities."""
+    nc, nn = len(P.mu), len(P.node)
+    return nc, nn, nc, nn, nc
+
+
+def allocate_island_solver(P: ContactProblem, whole: bool) -> IslandSolver:
+    """Rooms of `auto`; ``whole``: for islands of any size."""
+    nc, nn, ng, nl = len(P.mu), len(P.node), len(P.group) - 1, len(P.line_at)
+    limit = np.zeros(LIMITS, np.int64)
+    limit[:] = unlimited_islands(P) if whole or nn <= EVEN_ISLAND[1] else (*EVEN_ISLAND, *UNEVEN_ISLAND, CROWD_LIMIT)
+    contacts, nodes = min(nc, int(limit[MAX_CONTACTS_UNEVEN])), min(nn, int(limit[MAX_NODES_UNEVEN]))
+    wide = int(P.group[-1]) + 6 * ng
+    islands = allocate_islands(nc, nn, ng, nl)
+    most = len(islands.island) + 1
+    Q = empty_problem(nc, nn, ng, nl, 0, len(P.turn) > 0)._replace(
+        node=P.node, group=P.group, J=P.J, Y=P.Y, least=np.zeros(len(P.least)),
+        **{k: np.zeros(most, np.int64) for k in ("island", "member_p", "line_p")},
+    )  # fmt: skip
+    size = contacts + nodes + nl + wide
+    fill = min(nodes * nodes // 2, 40 * nodes)
+    return IslandSolver(
+        np.zeros(NUMBERS_PER_ITEM * size + 72 * fill),
+        np.zeros(PLACES_PER_ITEM * size + 4 * fill + nn + 3 * ng, np.int64),
+        Q, allocate_solver(Q)[0], islands, np.zeros(most, np.int64),
+        np.zeros(SOLVER_SLOTS, np.int64), limit, np.zeros(STATISTICS, np.int64),
+    )  # fmt: skip

@@ -1,0 +1,429 @@
+"""Steps that end on events: the first event in a step, and the callbacks of the `time_loop` that look for it.
+
+Guards are numbers that depend on time and state; an event is where one of them passes zero. Besides the
+callbacks of the loop there are ``watch(t, y, S, W, row)``, ``note(S, W, row)`` and ``look(t, h, x, S, W,
+row)``, which write guards to a row of ``W.g``: by the equations, at the state last evaluated (which it also
+keeps), and as predicted. W is a `GuardState`. The loop also returns when a step ends on events; the caller then
+changes the state as they require, sets ``c.count.started`` to 0 and calls again.
+
+Where a guard may pass zero (`root_finding.find_crossing_interval`), the crossing is located with the equations,
+and the step is taken again. As a last check, whatever was found in between: what has to stay above zero does so
+at the step's end, or where it first does not is found by bisection.
+"""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ..integrators.time_loop import (
+    ACCEPT_STEP,
+    CHECK_MISSED_CHANGE,
+    CURRENT,
+    INSPECT_END,
+    PROPOSED,
+    ULP,
+    output_buffer_full,
+    set_rejected_width,
+    shorten_for_interpolation,
+    shorten_step,
+    step_end_time,
+    write_output,
+)
+from .guards import (
+    CORNER_DEPTHS,
+    END_ROUNDING,
+    END_SLOPES,
+    END_VALUES,
+    EVENT_FOUND,
+    EXACT_VALUES,
+    HIGHEST_VALUES,
+    LOWEST_VALUES,
+    PREDICTED_VALUES,
+    ROUNDING_FACTOR,
+    SIDES,
+    START_ROUNDING,
+    START_VALUES,
+    TRIGGER_VALUES,
+    UNKNOWN_SIDE,
+    ZERO_BANDS,
+    compare_predictions,
+    crossing_floor,
+    evaluate_guards,
+    evaluate_guards_exactly,
+    exact_guard,
+    note_state_drift,
+    rounding_floor_with_time,
+    side_at_start,
+)
+from .root_finding import (
+    TRIGGERED_ZERO_TOLERANCE,
+    allowed_depth,
+    end_step_on_event,
+    find_crossing_interval,
+    find_start_sides,
+    locate_crossing,
+    retake_step,
+    side_of,
+    triggers,
+)
+
+SIMULTANEOUS_FRACTION = 1e-11  # part of the step within which events are at the same instant
+MIN_SKIP = 2.0**-20  # part of the step that is gone on by at least, where there was no event after all
+SLOPE_STEP_FRACTION = (
+    1e-2  # part of the distance between places between which a guard passes zero over which its slope is found
+)
+MIN_SLOPE_PLACE = 1e-7  # part of the step before which no slope is found
+END_SLOPE_STEP = 1e-4  # part of the step over which slopes at its end are found
+SLOPE_STEP_GROWTH = 100.0  # times that part where a guard changes by no more than rounding over it
+MAX_EARLIER_EVENTS = 20  # guards that may turn out to be earlier
+MAX_BISECTIONS = 44  # times that it is halved where a guard has been left unseen
+MAX_START_CUTS = 6  # times that a step is made shorter since what begins at zero does not go as expected
+STEP_CUT, EVALUATION_FAILED = 2, 1  # why a step is not gone on from: not looked through; not to be evaluated
+
+
+@formula
+def end_on_first_event(callbacks, S, W, R, c):
+    """End the step on the first event in it, if there is one: (status, width to try next, whether there is one).
+
+    Where the status is `STEP_CUT` the step is not gone on from, and the width is one to try next.
+    """
+    watch, look = callbacks[5], callbacks[7]
+    h = most = c.real.tried
+    hit = False
+    for i in range(W.fired.shape[0]):
+        W.fired[i] = 0
+    W.real.same = SIMULTANEOUS_FRACTION * h + 8.0 * ULP * (abs(c.real.t) + h)
+    compare_predictions(look, S, W, c.real.t, h, c.real.span)
+    if W.count.plain == 0 and W.count.fresh == 1 and W.count.cuts < MAX_START_CUTS and begins_at_zero(W):
+        return STEP_CUT, 0.25 * h, False
+    for _ in range(MAX_EARLIER_EVENTS):
+        status, i, x, s = find_next_event(callbacks, S, W, R, c, h)
+        if status == STEP_CUT and not hit:
+            return STEP_CUT, max(W.real.searched_to, MIN_SKIP) * h, False
+        if status == EVALUATION_FAILED:
+            return EVALUATION_FAILED, h, False
+        if status != 0 or i < 0:
+            break
+        if hit and x * h >= h - W.real.same:
+            W.fired[i] = 1
+            continue
+        for j in range(W.fired.shape[0]):
+            W.fired[j] = 0
+        if W.count.leaves_kept_side == 1:
+            status = retake_step(callbacks, S, W, R, c, x * h)
+        else:
+            slope = predicted_slope(callbacks, S, W, R, c, h, x, i)
+            status, found = end_step_on_event(callbacks, S, W, R, c, x * h, slope, i, s, (W.real.beyond * h, most))
+            if not found and W.count.cuts < MAX_BISECTIONS:  # the dense output told of what the step does not do
+                return STEP_CUT, 0.5 * h, False
+            if status == 0 and not found and s * W.g[END_VALUES, i] > 0.0:  # nothing happened
+                break
+        h = c.real.tried
+        if status != 0:
+            return EVALUATION_FAILED, h, False
+        hit = True
+        compare_predictions(look, S, W, c.real.t, h, c.real.span)
+        W.fired[i] = 1
+        if W.count.leaves_kept_side == 1:
+            break
+        mark_simultaneous(callbacks, S, W, R, c, h, i)
+    if not hit and h == c.real.t_end - c.real.t:
+        hit = mark_at_final_time(callbacks, S, W, R, c, h)
+    if hit and c.count.extended > 0:  # places within were looked at: back to the end
+        return watch(c.real.t + h, c.y[PROPOSED], S, W, EXACT_VALUES), h, True
+    return 0, h, hit
+
+
+@formula
+def begins_at_zero(W):
+    """Whether a guard is zero as the step begins."""
+    n = 0
+    for i in range(W.way.shape[0]):
+        if W.g[START_VALUES, i] == 0.0 or W.side[i] == 0.0:
+            n += 1
+    return n > 0
+
+
+@formula
+def find_next_event(callbacks, S, W, R, c, h):
+    """The first place where a guard leaves its side: (status, guard or -1, place, side)."""
+    W.real.searched_to = 1.0
+    i, a, b, at = find_start_sides(callbacks, S, W, R, c, h)
+    if i >= 0 and W.count.leaves_kept_side == 1:
+        return bisect_violation(callbacks, S, W, R, c, h, i, b, allowed_depth(W, i))
+    if i < 0:
+        i, a, b = find_crossing_interval(callbacks, S, W, R, c, h, at)
+    skip = MIN_SKIP
+    while i >= 0:
+        s = W.g[SIDES, i]
+        status, x = locate_crossing(callbacks, S, W, R, c, h, i, a, b, s)
+        if status != 0 or x > 0.0:
+            return status, i, x, (s if triggers(W.way[i], s) else -s)
+        before, at = at, max(at + skip, b)
+        skip *= 2.0  # of what is rounding there is no end
+        if at >= 1.0:
+            break
+        status, i, x, s = update_sides(callbacks, S, W, R, c, h, before, at)
+        if status != 0 or i >= 0:
+            return status, i, x, s
+        i, a, b = find_crossing_interval(callbacks, S, W, R, c, h, at)
+    if W.count.lost == 1:
+        return EVALUATION_FAILED, -1, 0.0, 0.0
+    if W.real.searched_to < 1.0:
+        return STEP_CUT, -1, 0.0, 0.0
+    return find_missed_crossing(callbacks, S, W, R, c, h)
+
+
+@formula
+def find_missed_crossing(callbacks, S, W, R, c, h):
+    """The first guard that is not where it began, or not above zero as it has to be, as `find_next_event` returns it.
+
+    Or on the other side than that which was taken for it, as the side of a law's corner is.
+
+    Whatever was seen of it within the step.
+    """
+    best, at, side, away = -1, 2.0, 0.0, 0
+    for i in range(W.way.shape[0]):
+        f, s = W.g[END_VALUES, i], side_at_start(W, i)
+        if W.fired[i] == 1 or not W.g[START_VALUES, i] == W.g[START_VALUES, i]:
+            continue
+        if W.g[ZERO_BANDS, i] < 0.0 and s * f < -crossing_floor(W, i, 1.0) and triggers(W.way[i], s):
+            W.count.leaves_kept_side = 0
+            status, x = locate_crossing(callbacks, S, W, R, c, h, i, 0.0, 1.0, s)
+        elif (W.kept[i] == 1 and f < -allowed_depth(W, i)) or f < -W.g[CORNER_DEPTHS, i]:
+            W.real.beyond = 0.0
+            least = allowed_depth(W, i) if W.kept[i] == 1 else W.g[CORNER_DEPTHS, i]
+            status, _, x, s = bisect_violation(callbacks, S, W, R, c, h, i, 1.0, least)
+        else:
+            continue
+        if status != 0:
+            return EVALUATION_FAILED, -1, 0.0, 0.0
+        if 0.0 < x < at:
+            best, at, side, away = i, x, s, W.count.leaves_kept_side
+    W.count.leaves_kept_side = away
+    return 0, best, at, side
+
+
+@formula
+def bisect_violation(callbacks, S, W, R, c, h, i, b, least):
+    """Where guard i, below zero at b, goes there by more than rounding, as `find_next_event` returns it."""
+    W.count.leaves_kept_side = 1
+    a = 0.0
+    for _ in range(MAX_BISECTIONS):
+        x = 0.5 * (a + b)
+        status, f = exact_guard(callbacks, S, W, R, c, h, x, i)
+        if status != 0:
+            return EVALUATION_FAILED, i, x, 1.0
+        if f < -least:
+            b = x
+        else:
+            a = x
+    return 0, i, b, 1.0
+
+
+@formula
+def update_sides(callbacks, S, W, R, c, h, a, x):
+    """Sides at a place in the step, by the equations, nothing having happened up to a; as `find_next_event` returns it.
+
+    What has left its side in between is an event.
+    """
+    if evaluate_guards_exactly(callbacks, S, W, R, c, h, x, PREDICTED_VALUES) != 0:
+        return EVALUATION_FAILED, -1, 0.0, 0.0
+    best, at, side = -1, 2.0, 0.0
+    for i in range(W.way.shape[0]):
+        f, s = W.g[PREDICTED_VALUES, i], W.g[SIDES, i]
+        if W.fired[i] == 1 or (W.kept[i] == 1 and f <= 0.0 and W.g[ZERO_BANDS, i] >= 0.0):
+            continue
+        if s * f < -crossing_floor(W, i, x) and triggers(W.way[i], s):
+            status, z = locate_crossing(callbacks, S, W, R, c, h, i, a, x, s)
+            if status != 0:
+                return EVALUATION_FAILED, -1, 0.0, 0.0
+            if 0.0 < z < at:
+                best, at, side = i, z, s
+        elif f == f and abs(f) > crossing_floor(W, i, x):
+            W.g[SIDES, i] = side_of(f)
+    return 0, best, at, side
+
+
+@formula
+def predicted_slope(callbacks, S, W, R, c, h, x, i):
+    """How fast guard i is expected to change as it gets there [1/s]; 0 where that is so soon that it is rounding.
+
+    Beyond it may be another function: one that jumps, or has a corner.
+    """
+    d = min(END_SLOPE_STEP, SLOPE_STEP_FRACTION * W.real.bracket, 0.25 * x)
+    if x < MIN_SLOPE_PLACE:
+        return 0.0
+    evaluate_guards(callbacks, S, W, R, c, h, x - 2.0 * d, PREDICTED_VALUES)
+    f = W.g[PREDICTED_VALUES, i]
+    evaluate_guards(callbacks, S, W, R, c, h, x - d, PREDICTED_VALUES)
+    return (W.g[PREDICTED_VALUES, i] - f) / (d * h)
+
+
+@formula
+def end_slopes(callbacks, S, W, R, c, h):
+    """Slopes of guards at the end of the step into W.g[SLOPE]; 0 of what has none that is more than rounding.
+
+    Where it changes by no more than that so close to the end, it is asked farther off.
+    """
+    back, asked = END_SLOPE_STEP, True
+    for i in range(W.way.shape[0]):
+        W.g[END_SLOPES, i] = 0.0
+    while asked and back <= 1.0:
+        evaluate_guards(callbacks, S, W, R, c, h, 1.0 - back, PREDICTED_VALUES)
+        asked = False
+        for i in range(W.way.shape[0]):
+            if W.g[END_SLOPES, i] != 0.0:
+                continue
+            change = W.g[END_VALUES, i] - (W.g[PREDICTED_VALUES, i] if back < 1.0 else W.g[START_VALUES, i])
+            if W.kept[i] == 1 or not abs(change) <= 2.0 * crossing_floor(W, i, 1.0):
+                W.g[END_SLOPES, i] = change / (back * h)
+            elif change != 0.0:
+                asked = True
+        back *= SLOPE_STEP_GROWTH
+
+
+@formula
+def mark_simultaneous(callbacks, S, W, R, c, h, first):
+    """Note in W.fired all other guards that leave their sides with the first, at the end of the step."""
+    end_slopes(callbacks, S, W, R, c, h)
+    for i in range(W.way.shape[0]):
+        if i == first:
+            continue
+        f, slope = W.g[END_VALUES, i], W.g[END_SLOPES, i]
+        came = -1.0 if slope > 0.0 else 1.0  # the side that it comes from
+        if triggers(W.way[i], came) and abs(f) <= W.real.same * abs(slope) and slope != 0.0:
+            W.fired[i] = 1
+
+
+@formula
+def mark_at_final_time(callbacks, S, W, R, c, h):
+    """Note in W.fired the guards that are zero where the motion ends, to rounding of time; whether there are any.
+
+    What passes zero at the very end belongs to the motion that ends there.
+    """
+    n = 0
+    end_slopes(callbacks, S, W, R, c, h)
+    for i in range(W.way.shape[0]):
+        f, s, slope = W.g[END_VALUES, i], W.g[SIDES, i], W.g[END_SLOPES, i]
+        if W.kept[i] == 1 or not f - f == 0.0:
+            continue
+        if triggers(W.way[i], s) and s * slope < 0.0 and abs(f) <= rounding_floor_with_time(W, c, i, slope, 1.0):
+            W.fired[i] = 1
+            n += 1
+    return n > 0
+
+
+MAX_EVENT_STEP_RATIO = 64.0  # times as long as from event to event that the step after one is at most
+EVENT_TIME_ULPS = 4.0  # units in the last place: an output time so little before an event is the event's
+
+
+@formula
+def start_event_segment(callbacks, S, W, c, back):
+    """See where guards are as a stretch of the motion begins, or where a step was taken back to. Returns a status."""
+    watch, note = callbacks[5], callbacks[6]
+    W.count.fresh = 1
+    note_state_drift(W, c)
+    if back:
+        for i in range(W.side.shape[0]):
+            W.side[i] = UNKNOWN_SIDE
+    return evaluate_start_guards(watch, note, S, W, c)
+
+
+@formula
+def finish_step_with_events(callbacks, S, W, R, c, out, used):
+    """Go on to the end of a step that is good, or to the first event in it.
+
+    Returns (rows written, whether the loop returns); a step that cannot be taken makes the next one shorter.
+    """
+    ask, own, note = callbacks[0], callbacks[1], callbacks[6]
+    most = c.real.tried
+    note(S, W, END_VALUES)
+    note_state_drift(W, c)
+    if c.seen.shape[1] > 0 and ask(own, S, W, R, c, CHECK_MISSED_CHANGE) != 0:
+        shorten_step(c, 0.5 * most)
+        return used, False
+    status, h, hit = end_on_first_event(callbacks, S, W, R, c)
+    if status == 0:
+        if hit:
+            ask(own, S, W, R, c, INSPECT_END)
+        status, used = write_output(callbacks, S, W, R, c, out, used)
+    if status == STEP_CUT:
+        W.count.cuts += 1
+        set_rejected_width(c, h)
+        return used, False
+    if status != 0:  # what lies inside the step cannot be told: take a shorter one
+        shorten_for_interpolation(c, most)
+        return used, False
+    at_once = step_end_time(c) - EVENT_TIME_ULPS * ULP * abs(step_end_time(c))
+    if hit and used > 0 and out[used - 1, 0] >= at_once:  # written when it is known how the motion goes on
+        used -= 1
+        c.count.next -= 1
+    elif output_buffer_full(c):
+        return used, True
+    ask(own, S, W, R, c, ACCEPT_STEP)
+    W.count.steps += 1
+    W.count.cuts = 0
+    if hit:
+        c.real.h, c.real.wide = max(c.real.h, most), max(c.real.wide, most)
+        if c.real.t > W.real.latest:  # as wide as it can be looked through for more that come as soon
+            c.real.h = min(c.real.h, MAX_EVENT_STEP_RATIO * (c.real.t - W.real.latest))
+            W.real.latest = c.real.t
+        c.count.status = EVENT_FOUND
+        W.count.events += 1
+        set_sides_after_event(W, c, c.real.tried)
+    else:
+        shift_guards_to_start(W)
+    return used, hit
+
+
+@formula
+def evaluate_start_guards(watch, note, S, W, c):
+    """Guards where the next step begins, and what they depend on. Returns a status."""
+    status = watch(c.real.t, c.y[CURRENT], S, W, START_VALUES)
+    if status == 0:
+        note(S, W, START_VALUES)
+    for i in range(W.side.shape[0]):  # what jumped since is on no known side
+        f = W.side[i] * W.g[START_VALUES, i] + 2.0 * crossing_floor(W, i, 0.0)
+        if abs(W.side[i]) == 1.0 and not f >= 0.5 * abs(W.g[END_VALUES, i]):
+            W.side[i] = UNKNOWN_SIDE
+    return status
+
+
+@formula
+def set_sides_after_event(W, c, h):
+    """Sides of guards at the end of a step that ends on an event: 0 of what fired; others are known beyond rounding.
+
+    So what is to fire next, however soon, is not taken for what has just fired. W.g[MARK] is what is zero of each.
+    """
+    for i in range(W.side.shape[0]):
+        f, s, slope = W.g[END_VALUES, i], side_at_start(W, i), (W.g[HIGHEST_VALUES, i] - W.g[LOWEST_VALUES, i]) / h
+        nothing = rounding_floor_with_time(W, c, i, slope, 1.0)
+        W.side[i] = UNKNOWN_SIDE
+        if W.fired[i] == 1:
+            W.side[i], W.g[TRIGGER_VALUES, i] = 0.0, abs(f)
+            if abs(f) <= TRIGGERED_ZERO_TOLERANCE * max(
+                abs(W.g[LOWEST_VALUES, i]), abs(W.g[HIGHEST_VALUES, i])
+            ):  # it did not jump
+                nothing = max(nothing, ROUNDING_FACTOR * abs(f))
+        elif W.kept[i] == 0 and f - f == 0.0 and abs(f) > nothing:
+            W.side[i] = side_of(f)
+        elif W.kept[i] == 0 and abs(f) < crossing_floor(W, i, 1.0):  # it may be about to pass: it has not yet
+            W.side[i] = s if s != 0.0 else UNKNOWN_SIDE
+        W.g[ZERO_BANDS, i] = nothing
+
+
+@formula
+def shift_guards_to_start(W):
+    """The end of the step is the start of the next."""
+    W.count.fresh = 0
+    for i in range(W.way.shape[0]):
+        W.side[i] = 0.0 if W.kept[i] == 1 and abs(W.g[END_VALUES, i]) <= ROUNDING_FACTOR * W.grain[i] else W.g[SIDES, i]
+        W.g[START_VALUES, i], W.g[START_ROUNDING, i] = W.g[END_VALUES, i], W.g[END_ROUNDING, i]
+    for i in range(W.way.shape[0], W.way.shape[0] + W.count.terms):
+        W.g[START_VALUES, i] = W.g[END_VALUES, i]
+    for k in range(W.moving.shape[1]):
+        for m in range(W.moving.shape[2]):
+            W.moving[0, k, m] = W.moving[1, k, m]
+    last = W.levels.shape[0] - 1
+    for m in range(W.levels.shape[1]):
+        W.levels[0, m] = W.levels[last, m]

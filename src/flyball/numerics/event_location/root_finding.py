@@ -1,0 +1,646 @@
+"""Where in a step a guard passes zero: search in subintervals, brackets, root refinement.
+
+A step is searched in subintervals. In each the guards are a polynomial through their values at eight nodes; two
+more places check that, else the subinterval is halved. `guards.evaluate_guards` writes the guards at t + x h to
+a row of ``W.g``.
+
+Where a guard may pass zero, the sign change is bracketed on the dense output, or shown not to exist. Then the
+step is taken again, by the secant of its width, until it ends on the event: the instant is as accurate as the
+integration, not as its interpolant.
+"""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ..integrators.time_loop import TRY_STEP, ULP
+from .guards import (
+    CHECK_NODES,
+    END_VALUES,
+    HIGHEST_VALUES,
+    LOWEST_VALUES,
+    NODE_VALUES,
+    NODES,
+    POLYNOMIAL_TOLERANCE,
+    PREDICTED_VALUES,
+    ROUNDING_FACTOR,
+    SIDES,
+    SIZE_ROUNDING,
+    START_VALUES,
+    TIME_RESOLUTION,
+    TRIGGER_VALUES,
+    ZERO_BANDS,
+    crossing_floor,
+    evaluate_guards,
+    exact_guard,
+    group_may_dip,
+    has_left_side,
+    is_law_corner,
+    rounding_floor,
+    rounding_floor_with_time,
+)
+
+MAX_LOOKS = 4000  # places that are looked at before panels are taken as they are: what is not smooth then is rounding
+MAX_EXACT_LOOKS = 1000  # of those with the equations, before the step is cut where it was looked through to
+MIN_CUT_PLACE = 0.1  # part of a step below which it is not cut but taken as it is
+MAX_CUTS = 8  # times that a step is cut before it is taken as it is
+MIN_SUBINTERVAL = 2.0**-14  # part of a step that a panel is not narrower than
+NEAR_ZERO_TOLERANCE = (
+    1e-6  # the same, where it might be zero between two places that are looked at, at slopes seen in the panel
+)
+SLOPE_SAFETY = 1.5  # times the steepest of these that its slope may be between them
+QUIET_DISTANCE = 0.3  # a guard that stays farther from zero than this part of its change has nothing to hide
+ZERO_GUARD = 1e-200  # a guard that is no larger is zero
+GRAZING_DISTANCE = 2e-2  # part of its change within which an extremum is looked at with the equations
+SLOPE_SAMPLES = 16  # of a panel, in which slopes are compared
+START_SLOPE_STEP = 2.0**-40  # part of a step over which slopes at its start are found
+CLOSEST_START_POWER, FARTHEST_START_POWER = (
+    44,
+    5,
+)  # powers of a half: places near the start where a guard that begins at zero is looked at
+TRIGGERED_ZERO_TOLERANCE = (
+    1e-6  # part of its size in a step by which a guard that has just fired is not more than about zero
+)
+START_ZERO_TOLERANCE = 1e-12  # part of its size in a step by which any other guard is not more than zero
+
+
+@formula
+def find_crossing_interval(callbacks, S, W, R, c, h, first):
+    """The first place after ``first`` where a guard passes zero or comes near: (guard or -1, from, to).
+
+    From and to are parts of the step. Sides go on from W.g[SIDE]. W.real[DONE_TO] is 1, or how far it has come.
+    """
+    a = first
+    w = 1.0 - first
+    most = W.count.looks + MAX_LOOKS
+    W.real.searched_to = 1.0
+    while a < 1.0:
+        w = min(w, 1.0 - a)
+        W.real.subinterval, W.real.width = a, w
+        evaluate_subinterval(callbacks, S, W, R, c, h, a, w)
+        smooth = subinterval_resolved(W)
+        if not smooth and w > MIN_SUBINTERVAL and W.count.looks < most:
+            if (
+                W.count.plain == 0
+                and W.count.exact_looks > MAX_EXACT_LOOKS
+                and a > MIN_CUT_PLACE
+                and W.count.cuts < MAX_CUTS
+            ):
+                W.real.searched_to = a
+                return -1, a, a
+            w *= 0.5
+            continue
+        best = -1
+        xa, xb = a, 2.0
+        for i in range(W.way.shape[0]):
+            if W.fired[i] == 0 and may_cross(W, i):
+                a1, b1 = crossing_of_polynomial(W, i) if smooth else crossing_at_nodes(W, i)
+                if b1 >= 0.0 and a + w * b1 < xb:
+                    best, xa, xb = i, a + w * a1, a + w * b1
+        if best >= 0:
+            return best, xa, xb
+        if a + w >= 1.0:
+            return -1, 1.0, 1.0
+        a += w
+        w *= 2.0
+    return -1, 1.0, 1.0
+
+
+@formula
+def evaluate_subinterval(callbacks, S, W, R, c, h, a, w):
+    """Guards at the nodes of a panel and where it is checked; at the ends of the step they are known."""
+    for j in range(NODES + CHECK_NODES):
+        x = a + w * W.nodes[j]
+        row = NODE_VALUES + j
+        if x <= 0.0 or x >= 1.0:
+            for i in range(W.way.shape[0] + W.count.terms):
+                W.g[row, i] = W.g[START_VALUES if x <= 0.0 else END_VALUES, i]
+        else:
+            evaluate_guards(callbacks, S, W, R, c, h, x, row)
+
+
+@formula
+def subinterval_resolved(W):
+    """Whether every guard is the polynomial through its values at the nodes.
+
+    A corner, as of the distance of what flies past or through something, is hardly seen where this is checked: 8 in 30
+    differ by less than `POLYNOMIAL_TOLERANCE`. So it is asked closely of a guard that may have been zero between two nodes.
+    """
+    for i in range(W.way.shape[0]):
+        low, high = value_range(W, i)
+        if not both_finite(low, high):
+            continue
+        odd = NEAR_ZERO_TOLERANCE if may_cross_between_nodes(W, i) else POLYNOMIAL_TOLERANCE
+        allowed = odd * (high - low) + SIZE_ROUNDING * max(abs(low), abs(high)) + subinterval_floor(W, i)
+        for j in range(CHECK_NODES):
+            f = W.g[NODE_VALUES + NODES + j, i]
+            for k in range(NODES):
+                f -= W.checks[j, k] * W.g[NODE_VALUES + k, i]
+            if not abs(f) <= allowed:
+                return False
+    return not group_may_dip(W)
+
+
+@formula
+def may_cross_between_nodes(W, i):
+    """Whether a guard may fire and come back between two nodes: the sum of both is less than it can fall and rise."""
+    steepest = 0.0
+    for j in range(1, NODES):
+        steepest = max(
+            steepest, abs(W.g[NODE_VALUES + j, i] - W.g[NODE_VALUES + j - 1, i]) / (W.nodes[j] - W.nodes[j - 1])
+        )
+    for j in range(1, NODES):
+        f, g = W.g[NODE_VALUES + j - 1, i], W.g[NODE_VALUES + j, i]
+        near = abs(f) + abs(g) <= SLOPE_SAFETY * steepest * (W.nodes[j] - W.nodes[j - 1])
+        if near and f * g > 0.0 and triggers(W.way[i], side_of(f)):
+            return True
+    return False
+
+
+@formula
+def value_range(W, i):
+    """Least and largest value of a guard in the panel; both nan if it is not a number somewhere."""
+    low = W.g[NODE_VALUES, i]
+    high = low
+    for j in range(1, NODES + CHECK_NODES):
+        f = W.g[NODE_VALUES + j, i]
+        if f != f:
+            return f, f
+        low = min(low, f)
+        high = max(high, f)
+    return low, high
+
+
+@formula
+def both_finite(low, high):
+    """Whether both are numbers."""
+    return low - low == 0.0 and high - high == 0.0
+
+
+@formula
+def may_cross(W, i):
+    """Whether a guard comes near zero in the panel. One that does not is on the side that it stays on."""
+    low, high = value_range(W, i)
+    if not both_finite(low, high):  # not watched, or not everywhere
+        return both_finite(W.g[NODE_VALUES, i], 0.0) or both_finite(W.g[NODE_VALUES + NODES - 1, i], 0.0)
+    if max(abs(low), abs(high)) < ZERO_GUARD + (0.0 if is_law_corner(W, i) else subinterval_floor(W, i)):
+        return False
+    most = QUIET_DISTANCE * (high - low)
+    if low > most and W.g[SIDES, i] >= 0.0:
+        W.g[SIDES, i] = 1.0
+        return False
+    if high < -most and W.g[SIDES, i] <= 0.0:
+        W.g[SIDES, i] = -1.0
+        return False
+    return True
+
+
+@formula
+def subinterval_floor(W, i):
+    """What is rounding of guard i anywhere in the panel."""
+    return min(rounding_floor(W, i, W.real.subinterval), rounding_floor(W, i, W.real.subinterval + W.real.width))
+
+
+@formula
+def side_of(f):
+    """On which side of zero a value is; 0 if it is none."""
+    return 1.0 if f > 0.0 else (-1.0 if f < 0.0 else 0.0)
+
+
+@formula
+def triggers(way, side):
+    """Whether a guard that leaves that side fires."""
+    return side != 0.0 and way * side <= 0.0
+
+
+@formula
+def crossing_of_polynomial(W, i):
+    """Where in a panel guard i first passes zero, or may: (from, to), or to < 0. Its side goes on to there."""
+    low, high = value_range(W, i)
+    if not both_finite(low, high):
+        return crossing_at_nodes(W, i)
+    polynomial_coefficients(W, i)
+    graze = GRAZING_DISTANCE * (high - low)
+    s = W.g[SIDES, i]
+    _, d = polynomial_value(W, 0.0)
+    for n in range(SLOPE_SAMPLES):
+        x = n / SLOPE_SAMPLES
+        y = (n + 1.0) / SLOPE_SAMPLES
+        f1, d1 = polynomial_value(W, y)
+        if n == SLOPE_SAMPLES - 1:
+            f1 = W.g[NODE_VALUES + NODES - 1, i]
+        if s * d < 0.0 and s * d1 >= 0.0:  # it goes towards zero, and away again
+            z = x + (y - x) * d / (d - d1)
+            fz, _ = polynomial_value(W, z)
+            left = has_left_side(W, i, s, fz, place_in_step(W, z)) and triggers(W.way[i], s)
+            if left or (s * fz <= graze and s * f1 > 0.0):
+                W.g[SIDES, i] = s
+                return x, z if left else y
+        if s != 0.0 and has_left_side(W, i, s, f1, place_in_step(W, y)) and (f1 != 0.0 or triggers(W.way[i], s)):
+            if triggers(W.way[i], s):
+                W.g[SIDES, i] = s
+                return x, y
+            s = side_of(f1)
+        elif s == 0.0 and (f1 if W.kept[i] == 1 else abs(f1)) > W.g[ZERO_BANDS, i]:
+            s = side_of(f1)
+        d = d1
+    W.g[SIDES, i] = s
+    return 0.0, -1.0
+
+
+@formula
+def crossing_at_nodes(W, i):
+    """As `crossing_of_polynomial`, of a guard that is no polynomial: by its values at the nodes."""
+    s = W.g[SIDES, i]
+    for j in range(1, NODES):
+        f = W.g[NODE_VALUES + j, i]
+        if f != f:
+            s = 0.0
+        elif (
+            s != 0.0 and has_left_side(W, i, s, f, place_in_step(W, W.nodes[j])) and (f != 0.0 or triggers(W.way[i], s))
+        ):
+            if triggers(W.way[i], s):
+                W.g[SIDES, i] = s
+                return W.nodes[j - 1], W.nodes[j]
+            s = side_of(f)
+        elif s == 0.0 and (f if W.kept[i] == 1 else abs(f)) > W.g[ZERO_BANDS, i]:
+            s = side_of(f)
+    W.g[SIDES, i] = s
+    return 0.0, -1.0
+
+
+@formula
+def place_in_step(W, y):
+    """What place in the step a place in the panel is."""
+    return W.real.subinterval + W.real.width * y
+
+
+@formula
+def polynomial_coefficients(W, i):
+    """The polynomial of guard i in powers of the place in the panel."""
+    for p in range(NODES):
+        s = 0.0
+        for j in range(NODES):
+            s += W.basis[p, j] * W.g[NODE_VALUES + j, i]
+        W.polynomial[p] = s
+
+
+@formula
+def polynomial_value(W, x):
+    """That polynomial and its slope."""
+    f = 0.0
+    d = 0.0
+    for p in range(NODES - 1, -1, -1):
+        d = d * x + f
+        f = f * x + W.polynomial[p]
+    return f, d
+
+
+@formula
+def find_start_sides(callbacks, S, W, R, c, h):
+    """Sides as the step begins, in W.g[SIDE]: (guard that leaves its side at once or -1, from, to, where to go on).
+
+    A guard that is about zero as a segment of the motion begins, above all one that has just fired (its side is 0), is
+    on the side that it goes to: places closer and closer to the start tell which that is, and whether it comes back
+    soon. One that has to stay above zero (W.kept) has not to go below: W.count[AWAY] says that it does.
+    """
+    look, t, ng = callbacks[7], c.real.t, W.way.shape[0]
+    W.count.leaves_kept_side = 0
+    if W.count.fresh == 0 and not has_doubtful_side(W):
+        for i in range(ng):
+            W.g[SIDES, i] = W.side[i]
+            W.g[ZERO_BANDS, i] = rounding_floor(W, i, 0.0) if W.side[i] == 0.0 and W.kept[i] == 0 else -1.0
+        return -1, 0.0, 0.0, 0.0
+    if not mark_zero_starts(callbacks, S, W, R, c, h):
+        return -1, 0.0, 0.0, 0.0
+    before = 0.0
+    for n in range(CLOSEST_START_POWER, FARTHEST_START_POWER - 1, -1):
+        x = 0.5**n
+        look(t, h, x, S, W, PREDICTED_VALUES)
+        W.count.looks += 1
+        i = leaves_start_side(W, 0)
+        while i >= 0 and W.count.leaves_kept_side == 1:  # the equations tell whether it is: interpolation is less exact
+            status, f = exact_guard(callbacks, S, W, R, c, h, x, i)
+            if status != 0 or not f >= -allowed_depth(W, i):
+                break
+            W.count.leaves_kept_side = 0
+            i = leaves_start_side(W, i + 1)
+        if i >= 0:
+            return i, before, x, x
+        before = x
+        if not has_undecided_side(W):
+            break
+    return -1, 0.0, 0.0, before
+
+
+@formula
+def has_doubtful_side(W):
+    """Whether a guard that has to stay above zero is about zero since the motion's segment began."""
+    n = 0
+    for i in range(W.way.shape[0]):
+        if W.kept[i] == 1 and W.side[i] <= 0.0 and W.g[START_VALUES, i] == W.g[START_VALUES, i]:
+            n += 1
+    return n > 0
+
+
+@formula
+def mark_zero_starts(callbacks, S, W, R, c, h):
+    """Note in W.g[MARK] what is zero of guards that begin about there, -1 of others; whether there are any."""
+    evaluate_subinterval(callbacks, S, W, R, c, h, 0.0, 1.0)
+    first = min(1.0, max(START_SLOPE_STEP, 4.0 * TIME_RESOLUTION * max(abs(c.real.t), c.real.largest) / h))
+    callbacks[7](c.real.t, h, first, S, W, PREDICTED_VALUES)
+    near = False
+    for i in range(W.way.shape[0]):
+        low, high = value_range(W, i)
+        fresh = W.count.fresh == 1 and (W.kept[i] == 1 or abs(W.side[i]) != 1.0)
+        W.g[SIDES, i] = side_of(W.g[START_VALUES, i]) if fresh else W.side[i]
+        W.g[ZERO_BANDS, i] = -1.0
+        if not fresh and (W.count.fresh == 1 or not (W.kept[i] == 1 and W.side[i] <= 0.0)):
+            continue
+        size = max(abs(low), abs(high))
+        now = abs(W.g[START_VALUES, i])
+        just = W.side[i] == 0.0
+        below = W.kept[i] == 1 and W.g[START_VALUES, i] < 0.0
+        nothing = 0.0
+        if W.kept[i] == 0 and both_finite(low, high):
+            slope = min(high - low, abs(W.g[PREDICTED_VALUES, i] - W.g[START_VALUES, i]) / first) / h
+            nothing = max(
+                rounding_floor_with_time(W, c, i, slope, 0.0), ROUNDING_FACTOR * W.g[TRIGGER_VALUES, i] if just else 0.0
+            )
+        if both_finite(low, high) and (
+            below or now <= max((TRIGGERED_ZERO_TOLERANCE if just else START_ZERO_TOLERANCE) * size, nothing)
+        ):
+            W.g[SIDES, i] = 0.0
+            mark = allowed_depth_factor(W, i) * now if just or below else START_ZERO_TOLERANCE * size
+            W.g[ZERO_BANDS, i] = max(mark, W.kept[i] * ROUNDING_FACTOR * W.grain[i], nothing)
+            near = True
+    return near
+
+
+@formula
+def leaves_start_side(W, first):
+    """A guard from ``first`` on that leaves at once the side that it went to, or has to keep, by W.g[THERE]; or -1."""
+    for i in range(first, W.way.shape[0]):
+        f = W.g[PREDICTED_VALUES, i]
+        s = W.g[SIDES, i]
+        if W.g[ZERO_BANDS, i] < 0.0 or W.fired[i] != 0:
+            continue
+        if W.kept[i] == 1 and s <= 0.0 and f < -allowed_depth(W, i):
+            W.count.leaves_kept_side = 1
+            return i
+        if s == 0.0:
+            if abs(f) > W.g[ZERO_BANDS, i]:
+                W.g[SIDES, i] = side_of(f)
+        elif s * f < -crossing_floor(W, i, 0.0):
+            if triggers(W.way[i], s):
+                return i
+            W.g[SIDES, i] = side_of(f)
+    return -1
+
+
+@formula
+def has_undecided_side(W):
+    """Whether a guard that begins about zero is on no side yet, or has to be followed to the end."""
+    n = 0
+    for i in range(W.way.shape[0]):
+        if W.g[ZERO_BANDS, i] >= 0.0 and (W.g[SIDES, i] == 0.0 or W.kept[i] == 1):
+            n += 1
+    return n > 0
+
+
+@formula
+def allowed_depth(W, i):
+    """How far below zero a guard that has to stay above may be by rounding."""
+    size = max(abs(W.g[LOWEST_VALUES, i]), abs(W.g[HIGHEST_VALUES, i]))
+    return max(
+        W.g[ZERO_BANDS, i],
+        START_ZERO_TOLERANCE * size,
+        ROUNDING_FACTOR * W.grain[i],
+        allowed_depth_factor(W, i) * -W.g[START_VALUES, i],
+    )
+
+
+@formula
+def allowed_depth_factor(W, i):
+    """How many times as far below zero as it begins a guard may be by rounding: no farther where it is firm.
+
+    What bounces beneath a stop would sink by that factor from bounce to bounce.
+    """
+    return 1.0 if W.no_deeper[i] == 1 else ROUNDING_FACTOR
+
+
+GOLDEN_SECTION = 0.381966011250105
+MAX_EVALUATIONS = 60  # evaluations in which a bracket is closed, or an extremum found
+BRACKET_TOLERANCE = 1e-13  # part of the step that a bracket is closed to
+EXTREMUM_TOLERANCE = 1e-8  # part of the step to which the place of an extremum is found
+MAX_RETAKES = 80  # times that a step is taken again
+JUMP_SLOPE_RATIO = (
+    1.5  # times the slope seen before: a guard that falls so past zero may jump there, and tells no place
+)
+END_VALUE_FACTOR = 1e3  # times that by which a guard may be beside zero where a step ends on it
+WIDTH_TOLERANCE = 1e-14  # part of a step's width to which it ends on an event: solutions of equations are no better
+
+
+@formula
+def locate_crossing(callbacks, S, W, R, c, h, i, a, b, s):
+    """Where in the step guard i fires, on side s at a, expected by b: (status, place or -1 if it does not).
+
+    Where it only fires as it comes back to that side, it has to be on the other one in between. W.real[BEYOND] is a
+    place where it has not fired yet, which the start need not be.
+    """
+    W.real.beyond = 0.0
+    first, last = a, b
+    status, fa = exact_guard(callbacks, S, W, R, c, h, a, i)
+    wide = max(b - a, BRACKET_TOLERANCE)  # a place may be told twice
+    while status == 0 and not s * fa > 0.0 and a > 0.0:  # earlier than expected
+        b = a
+        a = max(0.0, a - wide)
+        wide *= 4.0
+        status, fa = exact_guard(callbacks, S, W, R, c, h, a, i)
+    if status != 0:
+        return status, -1.0
+    if a <= 0.0 and W.kept[i] == 0 and abs(fa) <= W.g[ZERO_BANDS, i]:
+        fa = 0.0  # on no side: it is rounding
+    elif a <= 0.0 and s * W.side[i] == 1.0 and s * fa <= 0.0 and -s * fa < crossing_floor(W, i, 0.0):
+        status, fb = exact_guard(callbacks, S, W, R, c, h, last, i)  # the step before ended beside it
+        return status, (BRACKET_TOLERANCE if s * fb < -crossing_floor(W, i, last) else -1.0)
+    if not s * fa > 0.0:  # it is on that side nowhere before: only for a while, perhaps, or not at all
+        b = last
+        status, a, fa = find_minimum(callbacks, S, W, R, c, h, i, max(0.0, first - (last - first)), last, -s)
+        if status != 0 or not s * fa > 0.0:
+            return status, -1.0
+    status, fb = exact_guard(callbacks, S, W, R, c, h, b, i)
+    if status != 0:
+        return status, -1.0
+    if s * fb > 0.0:  # it may come back in between
+        status, m, fm = find_minimum(callbacks, S, W, R, c, h, i, a, b, s)
+        if status != 0 or s * fm > (0.0 if W.kept[i] == 1 else -crossing_floor(W, i, m)):
+            return status, -1.0
+        if triggers(W.way[i], s):
+            b, fb = m, fm
+        else:
+            a, fa = m, fm
+    elif W.kept[i] == 0 and s * fb >= -crossing_floor(W, i, b) and not (fb == 0.0 and s * fa > crossing_floor(W, i, a)):
+        return 0, -1.0  # it gets to zero, and no farther
+    begun = W.kept[i] == 0 and abs(W.g[START_VALUES, i]) <= W.g[ZERO_BANDS, i]  # about zero, on no side
+    if a > 0.0 and (begun or W.g[START_VALUES, i] * fa < 0.0):
+        W.real.beyond = a
+    W.real.bracket = b - a
+    status, x = refine_root(callbacks, S, W, R, c, h, i, (a, fa, b, fb))
+    return status, max(x, BRACKET_TOLERANCE)  # one within rounding of the step's start is an event too
+
+
+@formula
+def find_minimum(callbacks, S, W, R, c, h, i, a, b, s):
+    """The least of s times guard i between a and b, or a place where it is not above zero: (status, place, value).
+
+    Golden section with parabolas (Brent 1973, chapter 5).
+    """
+    x = w = v = a + GOLDEN_SECTION * (b - a)
+    status, f = exact_guard(callbacks, S, W, R, c, h, x, i)
+    fx = fw = fv = s * f
+    e = d = 0.0
+    for _ in range(MAX_EVALUATIONS):
+        if status != 0 or fx <= 0.0:
+            break
+        m = 0.5 * (a + b)
+        tol = EXTREMUM_TOLERANCE * max(abs(x), b - a, EXTREMUM_TOLERANCE)
+        if abs(x - m) <= 2.0 * tol - 0.5 * (b - a):
+            break
+        p = q = 0.0
+        if abs(e) > tol:
+            r = (x - w) * (fx - fv)
+            q = (x - v) * (fx - fw)
+            p = (x - v) * q - (x - w) * r
+            q = 2.0 * (q - r)
+            if q > 0.0:
+                p = -p
+            q = abs(q)
+        if q != 0.0 and abs(p) < abs(0.5 * q * e) and q * (a - x) < p and p < q * (b - x):
+            e = d
+            d = p / q
+        else:
+            e = (b if x < m else a) - x
+            d = GOLDEN_SECTION * e
+        u = x + (d if abs(d) >= tol else (tol if d > 0.0 else -tol))
+        status, f = exact_guard(callbacks, S, W, R, c, h, u, i)
+        fu = s * f
+        if fu <= fx:
+            if u < x:
+                b = x
+            else:
+                a = x
+            v, fv, w, fw, x, fx = w, fw, x, fx, u, fu
+        else:
+            if u < x:
+                a = u
+            else:
+                b = u
+            if fu <= fw or w == x:
+                v, fv, w, fw = w, fw, u, fu
+            elif fu <= fv or v == x or v == w:
+                v, fv = u, fu
+    return status, x, s * fx
+
+
+@formula
+def refine_root(callbacks, S, W, R, c, h, i, bracket):
+    """Where in a bracket (a, f, b, f) guard i passes zero: (status, place). Chandrupatla (1997)."""
+    x2, f2, x1, f1 = bracket  # the newest is 1; 1 and 2 are on two sides
+    x3, f3 = x2, f2
+    t = 0.5
+    for n in range(MAX_EVALUATIONS):
+        if f1 == 0.0:
+            return 0, x1
+        if n == 0 and f1 != f2:
+            t = f1 / (f1 - f2)
+        tol = BRACKET_TOLERANCE / max(abs(x2 - x1), BRACKET_TOLERANCE)
+        if tol > 0.5:
+            break
+        t = min(max(t, tol), 1.0 - tol)
+        x = x1 + t * (x2 - x1)
+        status, f = exact_guard(callbacks, S, W, R, c, h, x, i)
+        if status != 0:
+            return status, -1.0
+        if (f > 0.0) == (f1 > 0.0):
+            x3, f3 = x1, f1
+        else:
+            x3, f3, x2, f2 = x2, f2, x1, f1
+        x1, f1 = x, f
+        u = (x1 - x2) / (x3 - x2) if x3 != x2 else 0.5
+        p = (f1 - f2) / (f3 - f2) if f3 != f2 else 0.5
+        t = 0.5
+        if p * p < u and (1.0 - p) * (1.0 - p) < 1.0 - u:
+            t = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
+    return 0, (x1 if abs(f1) < abs(f2) else x2)
+
+
+@formula
+def retake_step(callbacks, S, W, R, c, h):
+    """Take the step again with width h, and note its end. Returns a status."""
+    ask, own, note = callbacks[0], callbacks[1], callbacks[6]
+    W.count.again += 1
+    c.real.tried = h
+    status = ask(own, S, W, R, c, TRY_STEP)
+    if status == 0:
+        note(S, W, END_VALUES)
+    return status
+
+
+@formula
+def end_step_on_event(callbacks, S, W, R, c, h, slope, i, s, between):
+    """Take the step again until it ends where guard i leaves side s, near width h: (status, whether it does).
+
+    The secant on the width; by halves where a guard jumps. ``slope``: of the guard by time, before it leaves;
+    ``between``: a width at which it has not left, and the width of the step as it was. It does not end there where
+    the guard was on that side nowhere, or has not left it at the end: the dense output told of what did not happen.
+    """
+    least, most = between
+    ulp = ULP * max(abs(c.real.t) + h, 1e-3 * c.real.largest)
+    near = 2.0 * ulp + WIDTH_TOLERANCE * h
+    low, high = least, most
+    bound = False  # whether a step that does not reach the event is known
+    rough = stride = BRACKET_TOLERANCE * most + 4.0 * ulp
+    last, before, gone = 0.0, 0.0, 1e300
+    status, done = 0, False
+    for n in range(MAX_RETAKES):
+        status = retake_step(callbacks, S, W, R, c, h)
+        f = W.g[END_VALUES, i]
+        if status != 0 or f == 0.0 or done:
+            break
+        leap = False
+        if n > 0 and h != before and (f != last or abs(h - before) > near):
+            secant = (f - last) / (h - before)
+            leap = f * last < 0.0 and abs(secant) > JUMP_SLOPE_RATIO * abs(slope)
+            slope = secant
+        way = -f / slope if slope * s < 0.0 and not leap else 1e300
+        if abs(way) <= near or (n > 2 and abs(way) >= 0.5 * gone and abs(way) < rough):
+            break
+        if s * f > 0.0:
+            low, bound = h, True
+        else:
+            high = h
+        last, before = f, h
+        if high - low <= 4.0 * ulp:
+            if s * f <= 0.0 or high >= most:
+                break
+            h, done = high, True
+        elif abs(way) < 0.5 * gone and low < h + way and h + way < high:
+            gone = abs(way)
+            h += way
+        else:
+            h = bisected_width(h, low, high, stride, bound, high < most, s * f > 0.0)
+            stride *= 8.0
+    f = W.g[END_VALUES, i]
+    there = abs(f) <= max(END_VALUE_FACTOR * near * abs(slope), rounding_floor(W, i, 1.0))
+    found = there or (not s * f > 0.0 and (not least > 0.0 or bound or done))
+    return status, found
+
+
+@formula
+def bisected_width(h, low, high, stride, lower, upper, forward):
+    """A width between those known to fall short of the event and to reach it; ``lower``, ``upper``: which are known."""
+    if lower and upper:
+        return 0.5 * (low + high)
+    if forward:
+        return min(h + stride, 0.5 * (h + high)) if h + stride >= high else h + stride
+    return max(h - stride, 0.5 * (low + h))

@@ -1,0 +1,537 @@
+"""Explicit Runge-Kutta pairs as a method of the `time_loop`: adaptive steps, dense output, rejected steps.
+
+One step, its error and its dense output; step control after Hairer, Norsett and Wanner, *Solving Ordinary
+Differential Equations I* (1993), section II.4. It is given ``derivative(t, y, dy, S, W)``, ``arrive(t, y, dy,
+S, W)``, which also projects y, ``tangent(y, e, S, W)``, which projects an error, and ``inspect(t, h, span, k,
+seen, S, W)``, which reports where in a step laws change in a way that its stages have not seen.
+
+A rejected step is followed by a shorter one, unless its error is rounding: near a singular position of a
+mechanism rounding grows without bound, and shorter steps lead into it. There the previous step is undone and
+ended elsewhere, or the position is passed by a wide step.
+"""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ...math.scalar import sqrt
+from .time_loop import (
+    ACCEPT_STEP,
+    AT_END,
+    AT_START,
+    BEGIN_SEGMENT,
+    CHECK_MISSED_CHANGE,
+    CURRENT,
+    INSPECT_END,
+    INSPECTED_END,
+    INSPECTED_END_RATE,
+    INSPECTED_START,
+    INSPECTED_START_RATE,
+    INTEGRAL_TOLERANCE_FACTOR,
+    INTERPOLATE,
+    INTERPOLATED,
+    NOT_FINITE,
+    PREVIOUS,
+    PREVIOUS_RATE,
+    PROPOSED,
+    REJECT_STEP,
+    SAVED,
+    SAVED_RATE,
+    STEP_FAILED,
+    TRY_STEP,
+    set_rejected_width,
+    step_end_time,
+)
+
+DISTANT_SIZE_WEIGHT = 1e-3  # of a coordinate beyond the mechanism's size, what its tolerance still grows with
+UNKNOWN_ERROR = 1e300  # the error of a step that was not tried, or is no number
+MIN_FIRST_STEP = 1e-7  # part of the largest step: the least that is tried first
+
+
+@formula
+def stage_state(y, K, weights, stages, h, out):
+    """Out = y + h sum_j weights[j] K[j]."""
+    n = y.shape[0]
+    for i in range(n):
+        out[i] = 0.0
+    for j in range(stages):
+        w = h * weights[j]
+        if w != 0.0:
+            for i in range(n):
+                out[i] += w * K[j, i]
+    for i in range(n):
+        out[i] += y[i]
+
+
+@formula
+def component_tolerance(c, i, size):
+    """Tolerance of component i of that size.
+
+    Of the first c.count.positions what is beyond the size of what moves counts little: that a wheel has turned a
+    hundred times, or that the world's origin is far away, is no reason to be less accurate.
+    """
+    if i < c.count.positions:
+        size = max(min(size, max(1.0, c.real.scale)), DISTANT_SIZE_WEIGHT * size)
+    return c.real.atol + c.real.rtol * size
+
+
+@formula
+def scaled_norm(c, a, y, n):
+    """Root mean square of a in units of the tolerance, over the first n components."""
+    s = 0.0
+    for i in range(n):
+        e = a[i] / component_tolerance(c, i, y[i] if y[i] > 0.0 else -y[i])
+        s += e * e
+    return sqrt(s / max(n, 1))
+
+
+@formula
+def first_step_width(derivative, S, W, R, c):
+    """A first step width from the sizes of y, y' and y'' (Hairer, Norsett and Wanner, section II.4).
+
+    A state that begins at rest near zero is small without changing fast: hence the least.
+    """
+    n = c.count.controlled
+    y = c.y[CURRENT]
+    d0 = scaled_norm(c, y, y, n)
+    d1 = scaled_norm(c, c.K[0], y, n)
+    h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+    h0 = min(max(h0, MIN_FIRST_STEP * c.real.h_max), c.real.h_max)
+    for i in range(y.shape[0]):
+        c.y[PROPOSED, i] = y[i] + h0 * c.K[0, i]
+    if derivative(c.real.t + h0, c.y[PROPOSED], c.K[1], S, W) != 0:
+        return 1e-3 * h0
+    for i in range(n):
+        c.y[INTERPOLATED, i] = (c.K[1, i] - c.K[0, i]) / h0
+    d2 = scaled_norm(c, c.y[INTERPOLATED], y, n)
+    m = max(d1, d2)
+    h1 = max(1e-6, h0 * 1e-3) if m <= 1e-15 else (0.01 / m) ** (1.0 / R.order_i[0])
+    return min(100.0 * h0, h1)
+
+
+@formula
+def attempt_explicit_step(derivative, arrive, tangent, S, W, R, c, h):
+    """One step of width h into c.y[NEW]. Returns (status, error in units of the tolerance; 0 if it is fixed)."""
+    y = c.y[CURRENT]
+    new = c.y[PROPOSED]
+    stages = R.order_i[1]
+    t = c.real.t
+    for i in range(1, stages):
+        stage_state(y, c.K, R.A[i], i, h, new)
+        status = derivative(t + R.c[i] * h, new, c.K[i], S, W)
+        if status != 0:
+            return status, 0.0
+    stage_state(y, c.K, R.A[stages], stages, h, new)
+    status, moved = arrive(t + h, new, c.K[stages], S, W)
+    if status != 0:
+        return status, 0.0
+    moved /= c.real.rtol + c.real.atol / c.real.scale
+    moved = max(moved, integral_error(R, c, h))
+    error = step_error(tangent, S, W, R, c, h, False)
+    if error > 1.0 and c.real.accepted_error > 0.0:
+        error = step_error(tangent, S, W, R, c, h, True)
+    error = moved if error <= moved else error  # an error that is no number stays one, and is refused
+    return 0, 0.0 if c.real.step > 0.0 and error < UNKNOWN_ERROR else error
+
+
+@formula
+def step_error(tangent, S, W, R, c, h, projected):
+    """Error of the step in units of the tolerance; ``projected``: of what is left of it once the state is projected."""
+    e5 = error_square_sum(tangent, S, W, R, c, 0, projected)
+    e3 = error_square_sum(tangent, S, W, R, c, 1, projected)
+    return 0.0 if e5 == 0.0 and e3 == 0.0 else h * e5 / sqrt((e5 + 0.01 * e3) * max(c.count.controlled, 1))
+
+
+@formula
+def error_square_sum(tangent, S, W, R, c, k, projected):
+    """Sum of squares of one of the two error estimates, per second, in units of the tolerance."""
+    y, new, e = c.y[CURRENT], c.y[PROPOSED], c.y[INTERPOLATED]
+    n = c.count.controlled
+    for i in range(n):
+        e[i] = 0.0
+    for j in range(R.order_i[1] + 1):
+        w = R.E[k, j]
+        if w != 0.0:
+            for i in range(n):
+                e[i] += w * c.K[j, i]
+    if projected:
+        tangent(new, e, S, W)
+    s = 0.0
+    for i in range(n):
+        s += (e[i] / component_tolerance(c, i, max(abs(y[i]), abs(new[i])))) ** 2
+    return s
+
+
+@formula
+def integral_tolerance(c):
+    """Tolerance of the accounts: relative to all that stands in them and to c.real.ledger."""
+    size = c.real.energy_size
+    for k in range(c.integrals.shape[0]):
+        size += abs(c.y[PROPOSED, c.integrals[k]])
+    return INTEGRAL_TOLERANCE_FACTOR * c.real.rtol * size
+
+
+@formula
+def integral_error(R, c, h):
+    """Error of the accounts in units of their tolerance.
+
+    Where coordinates follow a driver their errors say nothing of forces that change abruptly; works do.
+    """
+    n = c.integrals.shape[0]
+    s = integral_tolerance(c)
+    e5 = 0.0
+    e3 = 0.0
+    for k in range(n):
+        i = c.integrals[k]
+        a = 0.0
+        b = 0.0
+        for j in range(R.order_i[1] + 1):
+            a += R.E[0, j] * c.K[j, i]
+            b += R.E[1, j] * c.K[j, i]
+        e5 += (a / s) ** 2
+        e3 += (b / s) ** 2
+    if e5 == 0.0 and e3 == 0.0:
+        return 0.0
+    return h * e5 / sqrt((e5 + 0.01 * e3) * n)
+
+
+@formula
+def dense_output(R, c, x, h, out):
+    """Dense output at t + x h."""
+    n = out.shape[0]
+    for i in range(n):
+        out[i] = 0.0
+    for j in range(R.order_i[2]):
+        w = 0.0
+        for p in range(R.P.shape[1] - 1, -1, -1):
+            w = (w + R.P[j, p]) * x
+        w *= h
+        if w != 0.0:
+            for i in range(n):
+                out[i] += w * c.K[j, i]
+    for i in range(n):
+        out[i] += c.y[CURRENT, i]
+
+
+@formula
+def dense_output_error(R, c, h):
+    """By how much the dense output is off within the step, in units of the tolerance; 0 where steps bound that.
+
+    From its stages alone, which `evaluate_dense_stages` has made: no evaluation.
+    """
+    n, m = c.count.controlled, c.integrals.shape[0]
+    s = integral_tolerance(c)
+    e = less = a = a_less = 0.0
+    for i in range(n):
+        size = component_tolerance(c, i, max(abs(c.y[CURRENT, i]), abs(c.y[PROPOSED, i])))
+        e += (dense_output_residual(R, c, 0, i) / size) ** 2
+        less += (dense_output_residual(R, c, 1, i) / size) ** 2
+    for k in range(m):
+        a += (dense_output_residual(R, c, 0, c.integrals[k]) / s) ** 2
+        a_less += (dense_output_residual(R, c, 1, c.integrals[k]) / s) ** 2
+    of_state = e / (e + less) * sqrt(e / n) if e > 0.0 else 0.0
+    of_accounts = a / (a + a_less) * sqrt(a / m) if a > 0.0 else 0.0
+    return h * max(of_state, of_accounts)
+
+
+@formula
+def stiffness_estimate(R, c, h):
+    """About the step's width times the largest eigenvalue, as its last two stages tell, which are both at its end.
+
+    The first look of Hairer and Wanner's dop853.f at whether a problem is stiff. Exact for y' = lambda y.
+    """
+    last = R.order_i[1]
+    a = b = 0.0
+    for i in range(c.count.controlled):
+        size = component_tolerance(c, i, max(abs(c.y[CURRENT, i]), abs(c.y[PROPOSED, i])))
+        d = 0.0
+        for j in range(last):
+            d += (R.A[last, j] - R.A[last - 1, j]) * c.K[j, i]
+        a += ((c.K[last, i] - c.K[last - 1, i]) / size) ** 2
+        b += (d / size) ** 2
+    return sqrt(a / b) if b > 0.0 else 0.0
+
+
+@formula
+def dense_output_residual(R, c, k, i):
+    """One of the two sums over stages that tell what the dense output of component i is off by, per second."""
+    e = 0.0
+    for j in range(R.order_i[2]):
+        e += R.D[k, j] * c.K[j, i]
+    return e
+
+
+@formula
+def evaluate_dense_stages(derivative, S, W, R, c, h):
+    """The stages that only dense output needs. Returns a status."""
+    for k in range(R.order_i[1] + 1, R.order_i[2]):
+        stage_state(c.y[CURRENT], c.K, R.A[k], k, h, c.y[INTERPOLATED])
+        status = derivative(c.real.t + R.c[k] * h, c.y[INTERPOLATED], c.K[k], S, W)
+        if status != 0:
+            return status
+    return 0
+
+
+@formula
+def equation_defect(derivative, S, W, R, c, h, x):
+    """By how much the dense output at t + x h misses the equations, times h, in units of the tolerance.
+
+    Not finite if they cannot be evaluated there.
+    """
+    n = c.count.controlled
+    at = c.y[INTERPOLATED]
+    gap = c.K[R.order_i[2]]
+    dense_output(R, c, x, h, at)
+    if derivative(c.real.t + x * h, at, gap, S, W) != 0:
+        return 1e300
+    for j in range(R.order_i[2]):
+        w = 0.0
+        for p in range(R.P.shape[1] - 1, -1, -1):
+            w = w * x + (p + 1.0) * R.P[j, p]
+        if w != 0.0:
+            for i in range(n):
+                gap[i] -= w * c.K[j, i]
+    s = 0.0
+    for i in range(n):
+        s += (gap[i] / component_tolerance(c, i, max(abs(c.y[CURRENT, i]), abs(at[i])))) ** 2
+    return h * sqrt(s / max(n, 1))
+
+
+STEP_SAFETY = 0.85
+STATE_ROUNDING = 1e-14  # part of a state that its last digits are, once rounding has built up
+ROUNDING_ERROR_CHANGE = (
+    0.1  # an error that changes by more than this part of it with the state's last digits is rounding
+)
+MAX_ROUNDING_ERROR = 1e-7  # a relative error of a step above which rounding is no excuse
+WIDE_STEP_DECAY = 0.8  # what the width of wide steps falls by with each that is not
+WIDTH_LIMIT_GROWTH = 0.005  # what the width that steps are not wider than of late grows by, times the steps since
+ACCEPTED_ROUNDING_ERROR = 10.0  # an error from rounding that is accepted before a step is taken back
+
+
+@formula
+def reset_rejections(c):
+    """No step was refused since the last accepted one."""
+    c.real.last = c.real.best = UNKNOWN_ERROR
+    c.real.accepted_error = 0.0
+
+
+@formula
+def accept_explicit_step(R, c, t, h, error):
+    """Make the state in the making the present one, and choose the width of the next step."""
+    for i in range(c.y.shape[1]):
+        c.y[PREVIOUS, i] = c.y[CURRENT, i]
+        c.y[PREVIOUS_RATE, i] = c.K[0, i]
+        c.y[CURRENT, i] = c.y[PROPOSED, i]
+        c.K[0, i] = c.K[R.order_i[1], i]
+    for i in range(c.seen.shape[1]):
+        c.seen[INSPECTED_START, i] = c.seen[INSPECTED_END, i]
+        c.seen[INSPECTED_START_RATE, i] = c.seen[INSPECTED_END_RATE, i]
+    c.real.before = c.real.t
+    if error > c.real.largest_error:
+        c.real.largest_error = error
+        c.real.largest_error_at = c.real.t
+    if c.real.max_growth > 1.0:
+        c.real.wide = max(h, WIDE_STEP_DECAY * c.real.wide)
+    grow = c.real.max_growth
+    c.real.h = h * (min(grow, max(0.2, STEP_SAFETY * error ** (-1.0 / R.order_i[0]))) if error > 0.0 else grow)
+    if c.real.interpolation_limit > 0.0:
+        c.real.h = min(c.real.h, c.real.interpolation_limit)
+        c.real.interpolation_limit *= 1.0 + WIDTH_LIMIT_GROWTH * (
+            c.count.accepted + 1 - c.real.interpolation_limit_since
+        )
+    if c.real.step > 0.0:
+        c.real.h = c.real.step
+    c.real.t = t
+    c.real.max_growth = 6.0
+    c.count.accepted += 1
+    reset_rejections(c)
+
+
+@formula
+def reject_explicit_step(derivative, arrive, tangent, S, W, R, c, h, status, error):
+    """Choose what to try after a step with that status and error; fixed steps that fail are the end."""
+    if c.real.step > 0.0:
+        set_rejected_width(c, 0.0)
+        return
+    if status != 0 or not error < UNKNOWN_ERROR:
+        set_rejected_width(c, 0.25 * h)
+        return
+    set_rejected_width(c, h * max(0.2, STEP_SAFETY * error ** (-1.0 / R.order_i[0])))
+    first = c.real.last == UNKNOWN_ERROR
+    c.real.last = error
+    if error < c.real.best:
+        c.real.best = error
+        c.real.best_h = h
+    if c.real.accepted_error > 0.0:
+        if h > c.real.best_h:
+            c.real.h = c.real.best_h
+        return
+    wide = c.real.t - c.real.before > 0.5 * c.real.wide
+    small = c.real.best * c.real.rtol < MAX_ROUNDING_ERROR
+    back = wide and small and c.real.best > ACCEPTED_ROUNDING_ERROR and c.real.back < c.real.before
+    if first or not small or not error_is_rounding(derivative, arrive, tangent, S, W, R, c, h, error):
+        return
+    c.real.rounding_found_at = c.real.t
+    if back:
+        undo_last_step(c)
+    else:
+        c.real.accepted_error = max(ACCEPTED_ROUNDING_ERROR, 2.0 * c.real.best)
+        c.real.h = max(c.real.wide, c.real.best_h)
+
+
+@formula
+def undo_last_step(c):
+    """Go back to where the last accepted step began, to end it elsewhere."""
+    c.count.accepted -= 1
+    c.real.h = 0.5 * (c.real.t - c.real.before)
+    c.real.t = c.real.back = c.real.before
+    for i in range(c.y.shape[1]):
+        c.y[CURRENT, i] = c.y[PREVIOUS, i]
+        c.K[0, i] = c.y[PREVIOUS_RATE, i]
+    reset_rejections(c)
+
+
+@formula
+def error_is_rounding(derivative, arrive, tangent, S, W, R, c, h, error):
+    """Whether the error of a step is mostly rounding: another one from a state that differs in its last digits."""
+    y, kept = c.y[CURRENT], c.y[SAVED]
+    for i in range(y.shape[0]):
+        kept[i] = y[i]
+        c.y[SAVED_RATE, i] = c.K[0, i]
+        if i < c.count.controlled:
+            y[i] += (STATE_ROUNDING if i % 2 == 0 else -STATE_ROUNDING) * max(abs(y[i]), 1.0)
+    status, _ = arrive(c.real.t, y, c.K[0], S, W)
+    other = error
+    if status == 0:
+        status, other = attempt_explicit_step(derivative, arrive, tangent, S, W, R, c, h)
+    for i in range(y.shape[0]):
+        y[i] = kept[i]
+        c.K[0, i] = c.y[SAVED_RATE, i]
+    return status != 0 or not abs(other - error) < ROUNDING_ERROR_CHANGE * max(other, error)
+
+
+STABILITY_LIMITED_FACTOR = (
+    4.0  # times the error of a step, if that is more than the tolerance, that the dense output may be off by
+)
+ACCURACY_LIMITED_FACTOR = (
+    8.0  # the same where accuracy limits steps, and of the tolerance: so it is there, now and then
+)
+STABILITY_BOUND = 3.5  # h |lambda| of steps that stability may limit
+REPEATED_WITHIN = 20  # steps from one that is so refused to the next, by which the width of those to come is bounded
+DENSE_STAGES_KNOWN, DENSE_OUTPUT_GOOD = (
+    1,
+    2,
+)  # what c.count.extended says: the stages of dense output are there; it is good
+
+
+@formula
+def begin_explicit(derivative, inspect, S, W, R, c):
+    """First derivative and first step width. Returns a status."""
+    if derivative(c.real.t, c.y[CURRENT], c.K[0], S, W) != 0:
+        return STEP_FAILED
+    inspect(c.real.t, 0.0, c.real.span, AT_START, c.seen, S, W)
+    for i in range(c.y.shape[1]):
+        if not c.K[0, i] - c.K[0, i] == 0.0:
+            return NOT_FINITE
+    if c.real.h <= 0.0:
+        c.real.h = first_step_width(derivative, S, W, R, c)
+    c.real.max_growth = 6.0
+    c.real.largest_error = 1.0
+    c.real.before = c.real.back = c.real.t
+    c.real.rounding_found_at = c.real.t - c.real.span
+    reset_rejections(c)
+    return 0
+
+
+@formula
+def interpolate_explicit(derivative, S, W, R, c):
+    """Dense output at a part of the step. Returns a status."""
+    if c.count.extended == 0 and evaluate_dense_stages(derivative, S, W, R, c, c.real.tried) != 0:
+        return 1
+    if c.count.extended != DENSE_OUTPUT_GOOD:
+        c.count.extended = DENSE_STAGES_KNOWN
+        if not dense_output_is_accurate(R, c):
+            return 1
+        c.count.extended = DENSE_OUTPUT_GOOD
+    dense_output(R, c, c.real.part, c.real.tried, c.y[INTERPOLATED])
+    return 0
+
+
+@formula
+def dense_output_is_accurate(R, c):
+    """Whether the dense output is as good as steps are. If not, c.real.clearer is a width at which it may be.
+
+    Where stability limits steps, not accuracy, their ends are good and the dense output may be far off. A step that is
+    read within has to be narrower there, and where that comes again so have the next ones (c.real.calm). Elsewhere
+    it is off by a few tolerances, and steps are as they would be. Steps of fixed width are not judged.
+    """
+    if c.real.step > 0.0:
+        return True
+    h = c.real.tried
+    gap = dense_output_error(R, c, h)
+    if gap <= 1.0:
+        return True
+    limited = stiffness_estimate(R, c, h) > STABILITY_BOUND
+    most = (
+        max(1.0, STABILITY_LIMITED_FACTOR * c.real.error)
+        if limited
+        else ACCURACY_LIMITED_FACTOR * max(1.0, c.real.error)
+    )
+    if gap <= most:
+        return True
+    c.real.interpolation_width = h * max(0.2, STEP_SAFETY * (gap / most) ** (-1.0 / R.order_i[0]))
+    if limited:
+        now = c.count.accepted + 1
+        if c.real.interpolation_limit_since > 0.0 and 0.0 < now - c.real.interpolation_limit_since <= REPEATED_WITHIN:
+            c.real.interpolation_limit = STEP_SAFETY * h
+        c.real.interpolation_limit_since = now
+    return False
+
+
+@formula
+def missed_change(derivative, inspect, S, W, R, c):
+    """Whether laws do something within the step that its stages have not seen, and that matters.
+
+    ``inspect`` names places where a law is not as its values elsewhere in the step let expect; what this comes to is
+    what the dense output misses of the equations there, over the part of the step for which it lasts. What lasts for
+    more than a step is another branch of a formula: no width is right. Steps of fixed width look for that only.
+    """
+    h = c.real.tried
+    inspect(c.real.t, h, c.real.span, AT_END, c.seen, S, W)
+    k, x, share = inspect(c.real.t, h, c.real.span, 0, c.seen, S, W)
+    if k > 0 and c.count.extended == 0:
+        if evaluate_dense_stages(derivative, S, W, R, c, h) != 0:
+            return 1
+        c.count.extended = DENSE_STAGES_KNOWN
+    while k > 0:
+        if share > 1.0:
+            return 1
+        if c.real.step == 0.0 and not equation_defect(derivative, S, W, R, c, h, x) * share <= 1.0:
+            return 1
+        k, x, share = inspect(c.real.t, h, c.real.span, k, c.seen, S, W)
+    return 0
+
+
+@formula
+def run_explicit_task(functions, S, W, R, c, task):
+    """What the `loop` asks of a method; ``functions`` are derivative, arrive, tangent, inspect."""
+    derivative, arrive, tangent, inspect = functions
+    if task == TRY_STEP:
+        c.count.extended = 0
+        status, c.real.error = attempt_explicit_step(derivative, arrive, tangent, S, W, R, c, c.real.tried)
+        return status
+    if task == INTERPOLATE:
+        return interpolate_explicit(derivative, S, W, R, c)
+    if task == ACCEPT_STEP:
+        accept_explicit_step(R, c, step_end_time(c), c.real.tried, c.real.error)
+        return 0
+    if task == REJECT_STEP:
+        reject_explicit_step(derivative, arrive, tangent, S, W, R, c, c.real.tried, c.count.step_status, c.real.error)
+        return 0
+    if task == CHECK_MISSED_CHANGE:
+        return missed_change(derivative, inspect, S, W, R, c)
+    if task == INSPECT_END:
+        inspect(c.real.t, c.real.tried, c.real.span, AT_END, c.seen, S, W)
+        return 0
+    if task == BEGIN_SEGMENT:
+        return begin_explicit(derivative, inspect, S, W, R, c)
+    return 0

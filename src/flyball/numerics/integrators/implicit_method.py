@@ -1,0 +1,245 @@
+"""Implicit methods of equations of motion as the `time_loop` calls them, and what the fixed-step ones share.
+
+A method is ``attempt(callbacks, S, K, c, h)`` (the step to c.y[PROPOSED] and c.K[1]: status, error, what it
+asks for), ``between(K, x, h, d, v, z)`` (increments, velocities, integrals within it), ``enter(K, c, t, h,
+error, asked)`` and ``refuse(K, c)`` (what to try next). It is given ``residual`` (see `radau_stages`);
+``linearise(t, k, S, K, c)``, which fills row k of the numbers of the Jacobian at stage k, or where the step
+begins; ``compose(y, d, v, z, out, S)``, which makes a state of increments; ``arrive`` (which leaves the
+multipliers in ``K.found``) and ``inspect``.
+
+Methods of order 2 interpolate within a step by cubics through the values and rates at its ends. Rows STEP_START
+and END_ROW of ``v``, ``z``, ``rate`` hold the values, ``d`` the increments at the end, ``ends`` the
+accelerations at both ends, ``turns`` the first of three components of each increment that is a rotation. Such
+increments are Cayley's steps, axis times 2 tan(angle / 2), which no polynomial follows far: a rotation is
+interpolated by one at the mean of the angular velocities of its ends, followed by a cubic for the small rest.
+Steady rotations are exact, whole turns too.
+"""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ...math.rotation import cayley_quaternion, cayley_rate, cayley_step, rotation_change
+from ...math.scalar import cos, sin, sqrt
+from ...math.vec import add, dot, quaternion_product, scale, sub
+from .explicit_runge_kutta import reset_rejections
+from .implicit_workspace import STEP_START
+from .radau_stages import radau_defect
+from .time_loop import (
+    ACCEPT_STEP,
+    AT_END,
+    AT_START,
+    BEGIN_SEGMENT,
+    CHECK_MISSED_CHANGE,
+    CURRENT,
+    FORCES_JUMPED,
+    INSPECT_END,
+    INTERPOLATE,
+    INTERPOLATED,
+    NOT_FINITE,
+    PROPOSED,
+    REJECT_STEP,
+    SAVED,
+    STEP_FAILED,
+    TRY_STEP,
+    set_rejected_width,
+    step_end_time,
+)
+
+MIN_STEP_FRACTION = 1e-3  # part of the step below which none is tried
+NOT_REJECTED = 6.0  # what tells that the last step was not refused
+
+
+@formula
+def integrate_by_trapezoids(c, h):
+    """Integrals of the motion at the end of the step, by their rates at its ends."""
+    for n in range(c.integrals.shape[0]):
+        i = c.integrals[n]
+        c.y[PROPOSED, i] = c.y[CURRENT, i] + 0.5 * h * (c.K[0, i] + c.K[1, i])
+
+
+@formula
+def accept_fixed_step(c, t):
+    """Make the end of the step the present state."""
+    for i in range(c.y.shape[1]):
+        c.y[CURRENT, i] = c.y[PROPOSED, i]
+        c.K[0, i] = c.K[1, i]
+    c.real.h = c.real.step
+    c.real.t = t
+    c.real.max_growth = NOT_REJECTED
+    c.count.accepted += 1
+
+
+@formula
+def halve_fixed_step(K, c):
+    """Try half the width where slopes of laws may be infinite. Returns 0, or that there is nothing to try."""
+    h = 0.5 * c.real.tried
+    if K.count.infinite_slopes == 0 or h < MIN_STEP_FRACTION * c.real.step:
+        return 1
+    set_rejected_width(c, h)
+    K.count.fresh = -1
+    return 0
+
+
+END_ROW = 2  # row of the end of a step
+START_ACCELERATION, END_ACCELERATION = range(2)  # rows of ends
+SMALL_HALF_ANGLE = 1e-4  # half a turn [rad] below which its sine is its series
+
+
+@formula
+def interpolate_hermite(K, x, h, d, v, z):
+    """Increments, velocities and integrals at t + x h.
+
+    What does not change stays as it is, to the last digit: of a place on an outline that tells the edge.
+    """
+    y = 1.0 - x
+    out, end, back = h * x * y * y, x * x * (3.0 - 2.0 * x), -h * x * x * y
+    for i in range(d.shape[0]):
+        v0 = K.v[STEP_START, i]
+        d[i] = out * v0 + end * K.d[END_ROW, i] + back * K.v[END_ROW, i]
+        v[i] = (
+            v0 + out * K.ends[START_ACCELERATION, i] + end * (K.v[END_ROW, i] - v0) + back * K.ends[END_ACCELERATION, i]
+        )
+    for n in range(K.turns.shape[0]):
+        interpolate_rotation(K, x, h, d, K.turns[n])
+    for i in range(z.shape[0]):
+        z0 = K.z[STEP_START, i]
+        z[i] = z0 + out * K.rate[STEP_START, i] + end * (K.z[END_ROW, i] - z0) + back * K.rate[END_ROW, i]
+
+
+@formula
+def interpolate_rotation(K, x, h, d, i):
+    """The turn whose components begin at i, at t + x h.
+
+    It is exp(x h w) cay(c): w is the mean angular velocity, and c goes from nothing at the begin to what the end asks
+    for, its rate being what the angular velocities there leave: w0 - w, and those of w1 - R(c)^T w.
+    """
+    first = (K.v[STEP_START, i], K.v[STEP_START, i + 1], K.v[STEP_START, i + 2])
+    last = (K.v[END_ROW, i], K.v[END_ROW, i + 1], K.v[END_ROW, i + 2])
+    mean = scale(0.5, add(first, last))
+    left = cayley_step(
+        quaternion_product(
+            rotation_quaternion(mean, -h),
+            cayley_quaternion((K.d[END_ROW, i], K.d[END_ROW, i + 1], K.d[END_ROW, i + 2])),
+        )
+    )
+    left_rate = cayley_rate(left, sub(sub(last, mean), rotation_change(left, mean)))
+    y = 1.0 - x
+    c = add(scale(h * x * y * y, sub(first, mean)), scale(-h * x * x * y, left_rate))
+    c = add(c, scale(x * x * (3.0 - 2.0 * x), left))
+    there = cayley_step(quaternion_product(rotation_quaternion(mean, x * h), cayley_quaternion(c)))
+    for k in range(3):
+        d[i + k] = there[k]
+
+
+@formula
+def rotation_quaternion(w, time):
+    """The quaternion of a turn at an angular velocity, for a time."""
+    half = 0.5 * time * sqrt(dot(w, w))
+    by = sin(half) / half if abs(half) > SMALL_HALF_ANGLE else 1.0 - half * half / 6.0
+    e = scale(0.5 * time * by, w)
+    return (cos(half), e[0], e[1], e[2])
+
+
+REUSE_RATE = 1e-3  # a rate of the iteration below which the Jacobian serves on
+MAX_WIDTH_GROWTH = 8.0  # what the width changes by at most
+FIRST_STEP_FRACTION = 1e-4  # part of the time span that is tried first
+MAX_START_CORRECTION = (
+    1e-5  # part of size and speed by which a state that is off its constraints has not moved by itself
+)
+
+
+@formula
+def begin_implicit(arrive, inspect, S, K, c):
+    """The state as a stretch of time begins, put on its constraints, and its derivative. Returns a status.
+
+    Where nothing but what pushes has jumped (JUMPED), Jacobian and factors serve on, as from step to step.
+    """
+    y = c.y[PROPOSED]
+    for i in range(y.shape[0]):
+        y[i] = c.y[CURRENT, i]
+    status, moved = arrive(c.real.t, y, c.K[0], S, K)
+    if status != 0 or moved > MAX_START_CORRECTION:
+        return STEP_FAILED
+    for i in range(y.shape[0]):
+        c.y[CURRENT, i] = y[i]
+        if not c.K[0, i] - c.K[0, i] == 0.0:
+            return NOT_FINITE
+    inspect(c.real.t, 0.0, c.real.span, AT_START, c.seen, S, K)
+    for i in range(K.found.shape[0]):
+        K.lam[STEP_START, i] = K.found[i]
+    K.count.before = 0
+    K.real.last_error = 0.0
+    c.real.max_growth = MAX_WIDTH_GROWTH
+    if c.count.started != FORCES_JUMPED:
+        K.count.fresh = 0
+        K.real.width = 0.0
+        K.real.rate, K.real.theta = 1.0, REUSE_RATE
+        c.real.largest_error = 1.0
+        c.real.wide = 0.0  # steps of before tell nothing of what is narrow now
+    c.real.before = c.real.t
+    c.real.rounding_found_at = c.real.back = c.real.t - c.real.span
+    if c.real.h <= 0.0:
+        c.real.h = FIRST_STEP_FRACTION * c.real.span
+    reset_rejections(c)
+    return 0
+
+
+@formula
+def missed_implicit_change(residual, inspect, S, K, c):
+    """Whether laws do something within the step that its stages have not seen, and that matters; see `explicit`."""
+    h = c.real.tried
+    inspect(c.real.t, h, c.real.span, AT_END, c.seen, S, K)
+    k, x, share = inspect(c.real.t, h, c.real.span, 0, c.seen, S, K)
+    while k > 0:
+        if share > 1.0:
+            return 1
+        if c.real.step == 0.0 and not radau_defect(residual, S, K, c, h, x) * share <= 1.0:
+            return 1
+        k, x, share = inspect(c.real.t, h, c.real.span, k, c.seen, S, K)
+    return 0
+
+
+@formula
+def restore_start_rates(K, c):
+    """Rates of integrals where the step begins: what else is looked at may have overwritten them."""
+    at = c.y.shape[1] - K.z.shape[1]
+    for i in range(K.z.shape[1]):
+        K.rate[STEP_START, i] = c.K[0, at + i]
+
+
+@formula
+def interpolate_implicit(between, compose, S, K, c):
+    """The state at a part of the step."""
+    z = c.y[SAVED, : K.z.shape[1]]
+    restore_start_rates(K, c)
+    between(K, c.real.part, c.real.tried, K.d[STEP_START], K.a[STEP_START], z)
+    compose(c.y[CURRENT], K.d[STEP_START], K.a[STEP_START], z, c.y[INTERPOLATED], S)
+    c.count.extended = 1
+    return 0
+
+
+@formula
+def run_implicit_task(method, callbacks, S, K, c, task):
+    """What the `loop` asks of a method."""
+    attempt, between, enter, refuse = method
+    residual, compose, arrive, inspect = callbacks[0], callbacks[2], callbacks[3], callbacks[4]
+    if task == TRY_STEP:
+        c.count.extended = 0
+        status, c.real.error, K.real.asked = attempt(callbacks, S, K, c, c.real.tried)
+        return status
+    if task == INTERPOLATE:
+        return interpolate_implicit(between, compose, S, K, c)
+    if task == ACCEPT_STEP:
+        c.real.before = c.real.t
+        enter(K, c, step_end_time(c), c.real.tried, c.real.error, K.real.asked)
+        return 0
+    if task == REJECT_STEP:
+        return refuse(K, c)
+    if task == CHECK_MISSED_CHANGE:
+        return missed_implicit_change(residual, inspect, S, K, c)
+    if task == INSPECT_END:
+        inspect(c.real.t, c.real.tried, c.real.span, AT_END, c.seen, S, K)
+        return 0
+    if task == BEGIN_SEGMENT:
+        return begin_implicit(arrive, inspect, S, K, c)
+    return 0

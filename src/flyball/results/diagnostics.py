@@ -1,0 +1,614 @@
+"""Diagnostics of a motion: energy balance, acceleration defects, orientation errors, creep, pulling contacts.
+
+Each check returns a text with a remedy, or nothing for a sound motion.
+
+Orientation errors: a turn in space is integrated as a quaternion, q' = q w / 2. A method of order p is off by
+about (w h)^(p + 1) a step there, and neither energy nor constraints show it. The error of a steady turn is known:
+of explicit methods from u' = i w u / 2 of a number u that every evaluation normalises, of `radau` from d' = w (1
++ d^2 / 4), d being Cayley's step. Methods that control their error bound it, and generalised-alpha and the
+variational method have none.
+
+Acceleration defects: accelerations are solved anew at every output time, from a position and velocity that are
+right to the tolerance. A stiff spring makes a large force of a small error of its length. Where output times are
+closer than steps, the rate of the velocities between them is that of the method's polynomial; the difference is
+its defect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..engine.kinematics import quaternion_at
+from ..engine.loads import force_row
+from ..model.joint import Joint
+from ..numerics.integrators.butcher_tableaux import TABLEAUX, tableau
+from ..numerics.integrators.radau_stages import RADAU_A as RADAU
+from ..tables.law_inputs import forces_in_events
+from .energy_balance import EnergyBudget, budgets_by_part, kinetic_energy_gain, lag_warning, total_budget
+
+if TYPE_CHECKING:
+    from ..model.model import Model
+    from .result import Result
+
+
+PULL_TOLERANCE = 1e-5  # part of the largest force of the motion above which a pull is no error of the integration
+
+
+def pull_warnings(result: Result) -> list[str]:
+    """A warning for each joint that stands for a one-sided contact and pulls at some output time.
+
+    Its normal force is the multiplier of its first row. Where redundant constraints leave that undetermined, its sign
+    says nothing.
+    """
+    x, undetermined = result.values, result.health.undetermined
+    s = x.structure
+    found = []
+    for joint in s.model.joints:
+        if joint.one_sided and not any(k.startswith("force") for k in undetermined.get(joint.name, ())):
+            sign = joint.pushing_sign(x.numbers[joint.name], *x.poses.ends(joint))
+            if sign is not None:
+                found.append((joint, sign, result.multipliers[:, s.slices[joint.name].start]))
+    if not found:
+        return []
+    near = PULL_TOLERANCE * _largest_force(result)
+    return [text for joint, sign, force in found if (text := _pull_warning(result, joint, sign, force, near))]
+
+
+def _largest_force(result: Result) -> float:
+    """The largest multiplier that is a force, or weight [N]."""
+    s, x = result.values.structure, result.values
+    metric = sorted({t.row for t in s.terms if not t.measured and t.formula.measure == "m"})
+    weight = float(np.linalg.norm(x.system.gravity) * x.system.bodies.mass.max(initial=0.0))
+    return max(weight, float(np.abs(result.multipliers[:, metric]).max(initial=0.0)))
+
+
+def _pull_warning(result: Result, joint: Joint, sign: float, force: np.ndarray, near: float) -> str:
+    """Of one joint; ``sign`` is that of the force while it pushes, 0 if nothing tells the side."""
+    remedy = f"press it on more strongly, or model the contact by shapes and Contact(...){joint.both_sides}"
+    if sign == 0.0:
+        if not min(force.max(), -force.min()) > near:
+            return ""
+        return (
+            f"{joint.title} pushes to both sides, with {force.min():.4g} N to {force.max():.4g} N: a real follower "
+            f"would lift off; {remedy}"
+        )
+    k = int(np.argmin(sign * force))
+    if not -sign * force[k] > near:
+        return ""
+    return (
+        f"{joint.title} pulls with up to {-sign * force[k]:.4g} N (at t = {result.t[k]:.6g} s): a real contact would "
+        f"separate there; {remedy}"
+    )
+
+
+# Friction along one coordinate of a joint's surface where the surface slips along others too.
+
+
+TRANSVERSE_SLIP = (
+    0.1  # part of the slip along a friction's coordinate above which that across it counts: it takes 0.5 % there
+)
+MIN_SLIP = 1e-3  # part of the mechanism's length above which slip across it is worth a word
+MIN_TURN = 1.0  # the same of a turn whose slip is unknown, since no radius is given [rad]
+
+
+def transverse_slip_warnings(result: Result) -> list[str]:
+    """What is said of frictions on `Cylindrical`, `Planar` and `PointInPlane` that slip across their coordinate.
+
+    A surface has one friction force, mu N against its whole slip. Friction in a joint knows the slip along its own
+    coordinate only: there it is too large by |v| / v, so that it may stick where the surface creeps, and across there
+    is none.
+    """
+    if len(result.t) < 2:
+        return []
+    model, found = result.model, []
+    frictions: list[Any] = result.values.structure.loads
+    for f in frictions:
+        if not (hasattr(f, "load") and model[f.joint].one_surface):
+            continue
+        own = f.coordinate_text()
+        slips = {
+            f"{f.joint}.{what}": _slip_distance(result, f, what) for what in model[f.joint].measured(result.planar)
+        }
+        along = slips[own][0]
+        for text, (way, unit) in slips.items():
+            least = max(TRANSVERSE_SLIP * along, MIN_SLIP * result.values.length) if unit == "m" else MIN_TURN
+            if text != own and way > least:
+                found.append(
+                    f"{f.title} acts along {own!r} only, where the surface slips {along:.3g} {slips[own][1]}; along "
+                    f"{text!r} it slips {way:.3g} {unit} without friction. One surface has one friction force, mu N "
+                    f"against its whole slip, so that while it slips along {text!r} little force moves it along "
+                    f"{own!r}. Give the bodies shapes and a Contact(friction=...) in place of the joint, or put a body "
+                    f"between them with a joint for each motion, if these are two surfaces"
+                )
+    return found
+
+
+def _slip_distance(result: Result, f: Any, what: str) -> tuple[float, str]:
+    """How far the surfaces slip along a coordinate of the joint [m]; a turn without a radius [rad]."""
+    angle, radius = what.startswith("angle"), result.values.numbers[f.name].radius
+    arm = 1.0 if not angle or radius is None else float(radius)
+    speed = np.abs(result[f.joint].quantity(f"{what}_rate")[1])
+    return arm * float(0.5 * (speed[1:] + speed[:-1]) @ np.diff(result.t)), "rad" if angle and radius is None else "m"
+
+
+MAX_ORIENTATION_ERROR = 0.02  # angle [rad] by which a body may be turned wrongly
+MAX_TURN, TURN_STEP = 12.0, 0.01  # turn in a step [rad] up to which its error is known; between two of which that is
+MAX_TURN_RADAU = 2.0 * np.arctan(3.0**0.5)  # the same of `radau`, which takes no wider steps
+NEWTON_ITERATIONS = 20  # iterations of Newton's method
+
+
+def orientation_error_warning(result: Result) -> str:
+    """What is to be said of a motion whose steps turn a body too far for their method; nothing where none does."""
+    if not _has_fixed_step(result):
+        return ""
+    off, name, turn = 0.0, "", 0.0
+    for body, b in result.values.structure.place.items():
+        i = quaternion_at(result.values.system, b)[1] if b >= 0 else -1
+        if i < 0:
+            continue
+        pieces = result.pieces or (result,)
+        size = sum(_orientation_error(x, i) for x in pieces)
+        fastest = max(float(np.linalg.norm(x.v[:, i : i + 3], axis=1).max(initial=0.0)) for x in pieces)
+        off, name, turn = max((off, name, turn), (size, body, fastest * result.health.options["step"]))
+    if not off > MAX_ORIENTATION_ERROR:
+        return ""
+    return (
+        f"{name!r} turns by up to {turn:.2g} rad a step, which method={result.health.options['method']!r} is not exact "
+        f"for: by that alone its angle comes to be off by about {off:.2g} rad, whatever the energy balance says; give "
+        f"a shorter step"
+    )
+
+
+def _has_fixed_step(result: Result) -> bool:
+    o = result.health.options
+    return bool(o.get("step")) and (o.get("method") in TABLEAUX or o.get("method") == "radau") and len(result.t) > 1
+
+
+def _orientation_error(result: Result, i: int) -> float:
+    """Largest angle [rad] by which a body is turned wrongly; i: first of its angular velocities."""
+    o, w = result.health.options, result.v[:, i : i + 3]
+    h = o["step"]
+    turn, error = _turn_errors(o["method"])
+    size = np.linalg.norm(w, axis=1)
+    rate = w * (np.interp(size * h, turn, error) / (h * np.maximum(size, 1e-300)))[:, None]
+    ways = 0.5 * (rate[1:] + rate[:-1]) * np.diff(result.t)[:, None]
+    return float(np.linalg.norm(np.cumsum(ways, axis=0), axis=1).max(initial=0.0))
+
+
+@lru_cache
+def _turn_errors(method: str) -> tuple[np.ndarray, np.ndarray]:
+    """Turns in a step [rad], and how much farther each comes out."""
+    x = np.arange(0.0, MAX_TURN_RADAU if method == "radau" else MAX_TURN, TURN_STEP)
+    return x, (_radau_turns(x) if method == "radau" else _explicit_turns(method, x)) - x
+
+
+def _explicit_turns(method: str, x: np.ndarray) -> np.ndarray:
+    R = tableau(method)
+    stages = int(R.order_i[1])
+    K: list[np.ndarray] = []
+    for i in range(stages + 1):
+        u = 1.0 + sum((a * k for a, k in zip(R.A[i], K, strict=False)), np.zeros(len(x), complex))
+        if i < stages:
+            K.append(0.5j * x * u / np.abs(u))
+    return 2.0 * np.unwrap(np.angle(u))
+
+
+def _radau_turns(x: np.ndarray) -> np.ndarray:
+    A, d, out = np.array(RADAU), np.zeros(3), np.zeros(len(x))
+    for n, turn in enumerate(x.tolist()):
+        for _ in range(NEWTON_ITERATIONS):
+            d = d - np.linalg.solve(np.eye(3) - turn * A * (0.5 * d), d - turn * A @ (1.0 + 0.25 * d * d))
+        out[n] = 2.0 * np.arctan(0.5 * d[2])
+    return out
+
+
+DEFECT_PART = 0.1  # of a body's largest acceleration by which it may miss the rate of the velocity
+DEFECT_SHARE = 0.1  # part of the output times at which it may miss it by more: jumps and short transients
+OUTPUTS_PER_STEP = (
+    2  # output times to a step on average at least: else velocities between them are not one polynomial's
+)
+REFERENCE_PART = (
+    0.1  # part of the fastest body's acceleration, and of gravity, that counts where a body has less of its own
+)
+MIN_OUTPUTS = 16  # output times at least
+
+
+def acceleration_defect_warning(result: Result) -> str:
+    """What is to be said of accelerations that are not the rates of the velocities; nothing where they are.
+
+    Of 1100 random motions, stiff ones among them, at tolerances from 0.1 to 1e-7, none is named whose accelerations
+    were right; none at 1e-4 and less.
+    """
+    steps = result.health.steps
+    if (
+        not 0 < OUTPUTS_PER_STEP * steps <= len(result.t)
+        or len(result.t) < MIN_OUTPUTS
+        or result.health.contact is not None
+    ):
+        return ""
+    found = (_worst_defect(piece, angular) for piece in result.pieces or (result,) for angular in (False, True))
+    often, name, off, own, unit = max(found, default=(0.0, "", 0.0, 0.0, ""))
+    if not often > DEFECT_SHARE:
+        return ""
+    finer = "shorter step" if result.health.options.get("step") else "smaller rtol"
+    return (
+        f"accelerations, and forces and reactions with them, are rough: that of {name!r} misses the rate of its "
+        f"velocity by up to {off:.2g} {unit}, where that comes to {own:.2g} {unit}; a {finer} makes them better"
+    )
+
+
+def _worst_defect(r: Result, angular: bool) -> tuple[float, str, float, float, str]:
+    """Part of the output times at which a body's acceleration is off, its name, by how much, of what, and the unit."""
+    S, length, inner = r.values.system, r.values.length, slice(2, -2)
+    rows = np.flatnonzero(np.r_[True, np.diff(r.t) > 0.0])
+    t, unit = r.t[rows], "rad/s^2" if angular else "m/s^2"
+    if len(t) < MIN_OUTPUTS:
+        return 0.0, "", 0.0, 0.0, unit
+    least = (
+        REFERENCE_PART
+        * (float(np.linalg.norm(S.gravity)) + length / float(np.ptp(t)) ** 2)
+        / (length if angular else 1.0)
+    )
+    found = []
+    for name, b in r.values.structure.place.items():
+        if b < 0:
+            continue
+        _, _, w, v, alpha, a = r.records.body(b)
+        v, a = (np.transpose(x)[rows] for x in ((w, alpha) if angular else (v, a)))
+        near = _parabola_rate(t, v, 1)
+        unsure = 2.0 * np.linalg.norm((near - _parabola_rate(t, v, 2))[inner], axis=1)
+        off = np.linalg.norm((a - near)[inner], axis=1) - unsure
+        found.append((name, off, float(np.linalg.norm(near[inner], axis=1).max())))
+    least = max(least, REFERENCE_PART * max((own for _, _, own in found), default=0.0))
+    parts = (
+        (float((off > DEFECT_PART * max(own, least)).mean()), n, float(off.max()), own, unit) for n, off, own in found
+    )
+    return max(parts, default=(0.0, "", 0.0, 0.0, unit))
+
+
+def _parabola_rate(t: np.ndarray, v: np.ndarray, k: int) -> np.ndarray:
+    """Derivative at every time of the parabola through it and those k before and after; nothing at the ends."""
+    out = np.zeros_like(v)
+    before, after = (t[k:-k] - t[: -2 * k])[:, None], (t[2 * k :] - t[k:-k])[:, None]
+    slopes = (v[k:-k] - v[: -2 * k]) / before, (v[2 * k :] - v[k:-k]) / after
+    out[k:-k] = (slopes[0] * after + slopes[1] * before) / (before + after)
+    return out
+
+
+DEFAULT_IMBALANCE = (
+    1e-4  # part of the energy moved above which the balance is worth a word, where no tolerance was asked for
+)
+RTOL_FACTOR, RTOL_FACTOR_PER_STEP = (
+    10.0,
+    0.1,
+)  # times rtol that the balance of a sound motion may be off: of a short one, and more with each step
+FINE_RTOL_FACTOR = (
+    3e-2  # times the root of rtol, the same where rtol is so small that a digit more or less is no matter
+)
+MAX_IMBALANCE, ROUGH_RTOL_FACTOR = (
+    1e-2,
+    5.0,
+)  # part of the energy moved that no number of steps excuses, or so many times a rough rtol
+MAX_ROUGH_IMBALANCE = 2e-2  # part of the energy moved that no tolerance excuses
+DISSIPATED_PART = (
+    0.1  # part of what impacts and friction dissipate, beside which a numerical loss changes a motion little
+)
+LIFTING_PART = (
+    1e-6  # part of the energy that lifts all bodies by one's size, which the residuals of solves may take at rest
+)
+MAX_INTERVALS, MIN_OUTPUTS_PER_INTERVAL = (
+    64,
+    4,
+)  # stretches that the balance is judged by at most, and rows of output in each at least
+SEEN_PART = 0.1  # part of the energy that accelerations tell of; where less stands in rows they miss the motion
+MAX_VIOLATION = 1e-6  # part of the mechanism's length above which violated constraints are
+MAX_ACCELERATION_VIOLATION = (
+    1e-8  # part by which accelerations may miss the constraints: reactions miss by up to 1e4 times it
+)
+REST_SPEED = 1e-7  # lengths of the mechanism a second that count as rest
+MIN_CREEP = 1e-3  # part of the mechanism's length above which creep is
+
+
+def motion_warnings(result: Result) -> tuple[str, ...]:
+    """Reasons to look at a result twice, each with what can be done; none for a sound one."""
+    _ = result.vdot  # finding accelerations adds to the remarks where there are none
+    texts = [
+        *result.health.remarks,
+        *doubt_messages(result),
+        _acceleration_warning(result),
+        *_undetermined_load_warnings(result),
+        *_undetermined_force_warnings(result),
+        *_creep_warnings(result),
+        *transverse_slip_warnings(result),
+        *pull_warnings(result),
+    ]
+    return tuple(text for text in texts if text)
+
+
+def doubt_messages(result: Result) -> tuple[str, ...]:
+    """Reasons to think that a motion is not what its tolerance asks for; none for a sound one."""
+    ledger = total_budget(result)
+    balance = _balance_warning(ledger) or lag_warning(ledger)
+    return tuple(
+        text
+        for text in (
+            balance,
+            orientation_error_warning(result),
+            acceleration_defect_warning(result),
+            _violation_warning(result),
+        )
+        if text
+    )
+
+
+def impulse_stepping_doubts(result: Result) -> tuple[str, ...]:
+    """The same of a motion by impulse time stepping: what the method itself took or gave, and contacts that failed."""
+    taken = result.energy.exchanged("numerical_loss")
+    lost = float(np.max(np.abs(taken), initial=0.0))
+    own = result.health.contact.doubts if result.health.contact else ()
+    moved = max(energy_moved(result), lost)
+    losses = result.energy.exchanged("friction_loss") + result.energy.exchanged("impact_loss")
+    dissipated = float(np.max(losses, initial=0.0))
+    if not lost > max(MAX_IMBALANCE * moved, DISSIPATED_PART * dissipated, LIFTING_PART * _lifting_energy(result)):
+        return own
+    what = "took" if taken[int(np.argmax(np.abs(taken)))] > 0.0 else "gave"
+    text = (
+        f"impulse time stepping itself {what} {lost:.2g} J (energy.numerical_loss), "
+        f"{100.0 * lost / moved:.2g} per cent of the energy moved: take shorter steps, "
+        f"method=fb.Stepping(step=...)"
+    )
+    return (text, *own)
+
+
+def _lifting_energy(result: Result) -> float:
+    """Energy [J] that lifts all bodies by the size of the smallest that touches: no origin of coordinates counts."""
+    if result.health.contact is None:
+        return 0.0
+    mass = float(sum(total_budget(result).mass)) + sum(float(b.mass.sum()) for b in result.bulk.values())
+    return mass * float(np.linalg.norm(result.values.system.gravity)) * result.health.contact.size
+
+
+def impulse_stepping_warnings(result: Result) -> tuple[str, ...]:
+    """All that there is to say about a motion by impulse time stepping."""
+    return (*result.health.remarks, *result.health.doubtful, *pull_warnings(result))
+
+
+def expected_imbalance(result: Result) -> float:
+    """Part of the energy moved by which the balance of a sound motion may be off.
+
+    Errors of steps add up: a motion of few steps comes out to some units of its tolerance, one of ten thousand to a
+    thousand. Of 1270 random motions, stiff ones among them, by three methods at tolerances from 1e-2 to 1e-7, that came
+    out to ten times their tolerance, 1.6 in a hundred are off by more.
+    """
+    o = result.health.options
+    rtol = o.get("rtol")
+    if rtol is None or o.get("step"):
+        return DEFAULT_IMBALANCE
+    expected = max(FINE_RTOL_FACTOR * rtol**0.5, rtol * (RTOL_FACTOR + RTOL_FACTOR_PER_STEP * result.health.steps))
+    return float(min(expected, max(MAX_IMBALANCE, min(ROUGH_RTOL_FACTOR * rtol, MAX_ROUGH_IMBALANCE))))
+
+
+def energy_moved(result: Result) -> float:
+    """How much energy the motion shifted about [J]: what the balance is measured by.
+
+    The largest kinetic energy, and the ranges of gravity's and the springs' energies and of every work.
+    """
+    return float(total_budget(result).moved(0, len(result.t)))
+
+
+def _balance_warning(x: EnergyBudget) -> str:
+    """What is said of all of it; or else of the part whose balance is worst, of those that nothing connects."""
+    found, result = _worst_imbalance(x), x.result
+    if not found and result.health.options.get("rtol") is not None:
+        found = max(
+            (_worst_imbalance(x) for piece in result.pieces or (result,) for x in budgets_by_part(piece)), default=()
+        )
+    return found[1] if found else ""
+
+
+def _worst_imbalance(x: EnergyBudget) -> tuple[float, str] | tuple[()]:
+    """How many times more than expected a balance is off, and that in words; nothing where it is not.
+
+    What moves together is as accurate as the energy of all of it, and what nothing connects with others as its own.
+    """
+    rows, t = len(x.result.t), x.result.t
+    if all(lost <= allowed for _, _, lost, _, allowed in _imbalances(x, rows, np.zeros(rows), 0.0)):
+        return ()  # what stands in no row, and rounding, only allow for more
+    for begin, end, lost, there, allowed in _imbalances(x, rows, _kinetic_between_outputs(x), _rest_energy(x)):
+        if lost > allowed and x.known(begin, end):
+            when = "" if end - begin == rows else f" between t = {t[begin]:.6g} and {t[end - 1]:.6g} s"
+            return _imbalance_text(x, when, lost, there, allowed)
+    return ()
+
+
+def _imbalances(
+    x: EnergyBudget, rows: int, between_outputs: np.ndarray, least: float
+) -> Iterator[tuple[int, int, float, float, float]]:
+    """First row and last (not counted), what is lost there, moved and to be expected [J].
+
+    ``between_outputs`` and ``least``: see `_kinetic_between_outputs` and `_rest_energy`. Of all rows, then of the stretches where more may be lost than
+    that.
+    """
+    part, moved = expected_imbalance(x.result), x.moved(0, rows) + float(between_outputs.max(initial=0.0))
+    yield 0, rows, float(np.abs(x.balance).max(initial=0.0)), moved, part * moved + least
+    for begin, end in _suspect_intervals(x, rows, x.kinetic + between_outputs, (part, moved, least)):
+        # velocities v are as far off as those of what moves most, u: by m v du
+        lost = float(np.ptp(x.balance[begin:end]))
+        there = x.moved(begin, end) + float(between_outputs[begin:end].max())
+        yield begin, end, lost, there, part * (moved * there) ** 0.5 + least
+
+
+def _suspect_intervals(
+    x: EnergyBudget, rows: int, kinetic: np.ndarray, known: tuple[float, float, float]
+) -> Iterator[tuple[int, int]]:
+    """Stretches in which more may be lost than is to be expected, by the kinetic energy there alone."""
+    part, moved, least = known
+    for edges in _intervals(x.result, rows):
+        begins, ends = edges[:-1], edges[1:] + 1
+        at = np.stack([begins, ends], axis=1).ravel()[:-1]  # each stretch, and what is between its end and the next
+        high, low, most = (
+            f.reduceat(a, at)[::2] for f, a in ((np.maximum, x.balance), (np.minimum, x.balance), (np.maximum, kinetic))
+        )
+        lost = high - low
+        fine = (lost <= least) | (lost <= part * (moved * most) ** 0.5)
+        for k in np.flatnonzero(~fine):
+            yield int(begins[k]), int(ends[k])
+
+
+def _imbalance_text(x: EnergyBudget, when: str, lost: float, moved: float, allowed: float) -> tuple[float, str]:
+    finer = "shorter step" if x.result.health.options.get("step") else "smaller rtol"
+    return lost / allowed if allowed > 0.0 else np.inf, (
+        f"the energy balance{x.of} is off by {lost:.3g} J{when} where {moved:.3g} J were moved and {allowed:.1g} J "
+        f"are to be expected; a {finer} may tell whether the motion can be trusted"
+    )
+
+
+def _intervals(result: Result, rows: int) -> Iterator[np.ndarray]:
+    """Ends of the halves, quarters and so on of the rows of a motion that was integrated: what something else
+    dissipated before, or moves after, does not speak for what happens in one.
+    """
+    pieces = 2
+    while (
+        result.health.options.get("rtol") is not None
+        and pieces <= MAX_INTERVALS
+        and rows >= MIN_OUTPUTS_PER_INTERVAL * pieces
+    ):
+        yield np.arange(pieces + 1) * (rows - 1) // pieces
+        pieces *= 2
+
+
+def _kinetic_between_outputs(x: EnergyBudget) -> np.ndarray:
+    """Kinetic energy [J] that is moved about every output time and stands in none: rows once a turn see bodies at rest.
+
+    What accelerations make of them within a step, where steps outnumber rows and that is much more than rows have.
+    """
+    r = x.result
+    none = np.zeros_like(x.kinetic)
+    if not len(r.t) or r.health.steps <= len(r.t) or r.health.options.get("step"):
+        return none
+    found = kinetic_energy_gain(r, x.bodies.tolist(), float(np.ptp(r.t)) / r.health.steps)
+    return found if SEEN_PART * found.max(initial=0.0) > x.moved(0, len(r.t)) else none
+
+
+def _rest_energy(x: EnergyBudget) -> float:
+    """Energy [J] below which nothing is said to move: rounding of the potential energy, and a creep of all bodies.
+
+    The potential energy is that stored and that of the weight at the mechanism's length: where it is counted from is
+    arbitrary.
+
+    Where works are done, some of it perhaps between two rows, also what moves all bodies in the time there is to where
+    rows have them.
+    """
+    length, t = x.result.values.length, x.result.t
+    rounding = 1e-11 * (float(np.abs(x.stored[0] + x.stored[1]).max(initial=0.0)) + x.weight * length)
+    least = rounding + float(x.mass.sum()) * (REST_SPEED * length) ** 2
+    span = float(np.ptp(t)) if len(t) else 0.0
+    if not x.works or not span > 0.0:
+        return least
+    return least + expected_imbalance(x.result) * float(x.mass @ x.squared_travel) / max(span, 1e-150) ** 2
+
+
+def _violation_warning(result: Result) -> str:
+    worst, length = result.health.violation, result.values.length
+    if not worst > MAX_VIOLATION * length:
+        return ""
+    return f"constraints are violated by up to {worst:.3g} (m or rad); stabilization='projection' keeps them"
+
+
+def _acceleration_warning(result: Result) -> str:
+    worst = result.health.acceleration_violation
+    if not worst > MAX_ACCELERATION_VIOLATION:
+        return ""
+    return (
+        f"accelerations miss the constraints by a part of {worst:.1e}: a position is all but singular, or masses "
+        f"differ too much. Reactions may miss by thousands of times that part; equilibrium() has those at rest"
+    )
+
+
+def _undetermined_load_warnings(result: Result) -> list[str]:
+    return [
+        f"{f.title} follows the reaction of {f.joint!r}, which redundant constraints leave undetermined "
+        f"({', '.join(what)}): its load is one choice of many. Replace a joint by one that holds less, as Spherical"
+        for f, what in undetermined_loads(_frictions_with_load(result), result.health.undetermined)
+    ]
+
+
+def _undetermined_force_warnings(result: Result) -> list[str]:
+    return [
+        f"an event names {name!r}, which redundant constraints leave undetermined ({', '.join(what)}): it is one "
+        f"choice of many. Replace a joint by one that holds less, as Spherical"
+        for name, what in undetermined_event_forces(result.model, result.health.undetermined)
+    ]
+
+
+def undetermined_event_forces(model: Model, undetermined: Mapping[str, tuple[str, ...]]) -> list[tuple[str, tuple]]:
+    """Forces and torques of joints that events name and that are undetermined, with what of these is.
+
+    Parameters
+    ----------
+    model : Model
+    undetermined : mapping
+        Joint -> components, as of `Mobility`.
+    """
+    found = []
+    for name, x in forces_in_events(model).items():
+        kind = "force" if name.partition(".")[2].startswith("f") else "torque"
+        found.append((name, tuple(k for k in undetermined.get(x.element.name, ()) if k.startswith(kind))))
+    return [(name, what) for name, what in found if what]
+
+
+def undetermined_loads(
+    frictions: Iterable[Any], undetermined: Mapping[str, tuple[str, ...]]
+) -> list[tuple[Any, tuple]]:
+    """Frictions whose load counts components of their joint's reaction that are undetermined, with these.
+
+    Parameters
+    ----------
+    frictions : iterable of JointFriction
+    undetermined : mapping
+        Joint -> components, as of `Mobility`.
+    """
+    found = [(f, f.loading_components(undetermined.get(f.joint, ()))) for f in frictions]
+    return [(f, what) for f, what in found if what]
+
+
+def _creep_warnings(result: Result) -> list[str]:
+    limit = MIN_CREEP * result.values.length
+    return [
+        f"{result.model[name].title} crept {distance:.3g} m, at up to {speed:.3g} m/s, while it should stick; a "
+        f"smaller stick_speed makes it less"
+        for name, (speed, distance) in result.health.creep.items()
+        if distance > limit
+    ]
+
+
+def friction_creep(result: Result) -> dict[str, tuple[float, float]]:
+    """Joint friction -> (largest speed [m/s], distance [m]) of its surfaces while it should stick.
+
+    Of the regularised law: it should stick while it slides at less than three times its stick speed, for two output
+    times running or more; what passes through rest between two output times is no creep.
+    """
+    found = {}
+    S, forces = result.values.system, result.values.structure.forces
+    for f in _frictions_with_load(result):
+        if f.stick_speed is None:
+            continue
+        k = next(k for k, e in enumerate(forces) if e is f)
+        arm, limit = f.sticking(force_row(S.force_parameters, k))
+        x, rate = result.measured.quantity(int(S.forces.F[k]))
+        speed = np.abs(arm * rate)
+        slow = speed < limit
+        both = slow[1:] & slow[:-1]
+        stuck = np.r_[both, False] | np.r_[False, both]
+        distance = (arm * np.abs(np.diff(x)))[both].sum()
+        found[f.name] = float(speed[stuck].max(initial=0.0)), float(distance)
+    return found
+
+
+def _frictions_with_load(result: Result) -> list[Any]:
+    """Forces that follow what a joint carries: friction."""
+    return [e for e in result.values.structure.loads if hasattr(e, "load")]

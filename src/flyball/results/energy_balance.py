@@ -1,0 +1,377 @@
+"""Energies over time, their balance as a whole and of unconnected parts, and the phase error they cause.
+
+`Energy` is what a result shows. `EnergyBudget` holds the terms of the balance for all bodies, or for those that
+joints and forces connect; ``results/diagnostics.py`` judges it. Without drives and damping the speed of a motion
+of one freedom follows from its energy: where the kinetic energy T is off by dE, it is faster by the part dE / 2T,
+and the integral of that is how far it comes to be early.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from ..math.vec import dot, mtv, mv
+from ..model.contact_point import Touch
+from ..model.force import Force
+from ..model.quantities import ENERGY, Quantity, quantities
+from ..numerics.graphs import find_root, unite
+from ..tables.table_definitions import BETWEEN, SLIDING, System
+from .part_views.base import NamedQuantities
+from .phases import EVENT_WORK, stored_reference
+
+if TYPE_CHECKING:
+    from .result import Result
+
+
+EXCHANGE_SIGNS = {"friction_loss": -1.0, "impact_loss": -1.0, "surface_work": 1.0, "numerical_loss": -1.0}
+"""Energies that contacts exchange, and by which sign the bodies have them.
+
+The last is the error of impulse time stepping: what the method itself took.
+"""
+CONTACT_ELASTIC = "contact_elastic"
+"""Energy stored in contacts that give way, among what contacts exchange."""
+
+
+def kinetic_energy(result: Result, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
+    """Sum of m v^2 / 2 + w . I w / 2 over rows of the body table [J]."""
+    _, R, w, v, _, _ = result.motions.bodies(bodies)
+    return _kinetic_energy_of(result, bodies, R, w, v)
+
+
+def kinetic_energy_gain(result: Result, bodies: Sequence[int] | np.ndarray, time: float) -> np.ndarray:
+    """Kinetic energy [J] that the accelerations at every output time give bodies at rest in a time [s]."""
+    _, R, _, _, alpha, a = result.records.bodies(bodies)
+    return time**2 * _kinetic_energy_of(result, bodies, R, alpha, a)
+
+
+def _kinetic_energy_of(result: Result, bodies: Sequence[int] | np.ndarray, R: tuple, w: tuple, v: tuple) -> np.ndarray:
+    table = result.values.system.bodies
+    w_B, inertia = mtv(R, w), tuple(table.inertia[bodies].T[..., None])
+    return (0.5 * table.mass[bodies, None] * dot(v, v) + 0.5 * dot(w_B, mv(inertia, w_B))).sum(axis=0)
+
+
+def gravity_energy(result: Result, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
+    """Potential energy of gravity of rows of the body table [J]."""
+    S = result.values.system
+    return -(S.bodies.mass[bodies][:, None] * dot(tuple(S.gravity), result.motions.bodies(bodies)[0])).sum(axis=0)
+
+
+class Energy(NamedQuantities):
+    """Energies of a motion [J]: kinetic, potential (gravity and springs), and the work done from outside."""
+
+    instead: ClassVar = {"work": "the work of each part is part.work; all of them are in result.energy.work"}
+
+    def __init__(self, result: Result) -> None:
+        self._result = result
+
+    @property
+    def title(self) -> str:
+        """What it is called."""
+        return ENERGY
+
+    @property
+    def names(self) -> dict[str, Quantity]:
+        """Everything that it has, by name."""
+        return quantities(self._result.model, ENERGY)
+
+    @cached_property
+    def _bodies(self) -> list[int]:
+        """Rows of the body table, but for bodies that stand for something else."""
+        s = self._result.values.structure
+        aside = {s.place[name] for name in s.model.aside if name in s.place}
+        return [b for b in range(len(self._result.values.system.tree.parent)) if b not in aside]
+
+    @cached_property
+    def kinetic(self) -> np.ndarray:
+        """Sum of m v^2 / 2 + w . I w / 2 over the bodies."""
+        if self._result.pieces:
+            return self._concatenated("kinetic")
+        return sum((b.kinetic for b in self._result.bulk.values()), kinetic_energy(self._result, self._bodies))
+
+    @cached_property
+    def gravity(self) -> np.ndarray:
+        """Potential energy of gravity, zero where every centre of mass lies in the world's origin."""
+        if self._result.pieces:
+            return self._concatenated("gravity")
+        S = self._result.values.system
+        total = gravity_energy(self._result, self._bodies)
+        return sum((b.potential(S.gravity) for b in self._result.bulk.values()), total)
+
+    @cached_property
+    def elastic(self) -> np.ndarray:
+        """Energy stored in springs, and in contacts that give way."""
+        return sum((self._result[f.name].energy for f in self._result.model.acting()), self.exchanged(CONTACT_ELASTIC))
+
+    @property
+    def potential(self) -> np.ndarray:
+        """Gravity and springs."""
+        return self.gravity + self.elastic
+
+    @property
+    def total(self) -> np.ndarray:
+        """Kinetic and potential."""
+        return self.kinetic + self.potential
+
+    @cached_property
+    def work(self) -> dict[str, np.ndarray]:
+        """Work that each damper, actuator, motor, given force and driver has put in since the start.
+
+        What a spring inside the same element stores is not counted: it is in the potential energy. Nor is what a
+        change of its stiffness gave it, which an event did.
+        """
+        out = {}
+        r = self._result
+        for name in r.values.structure.states:
+            if name.endswith(".work"):
+                element = r[name.removesuffix(".work")]
+                own = element.element
+                stores = isinstance(own, Force) and own.energy is not None
+                out[own.name] = element.work + (element.energy - stored_reference(r, own.name) if stores else 0.0)
+        return out
+
+    def _concatenated(self, name: str) -> np.ndarray:
+        """One of the energies, where parameters changed on the way."""
+        return np.concatenate([getattr(p.energy, name) for p in self._result.pieces])
+
+    def exchanged(self, name: str) -> np.ndarray:
+        """Energy since the start that contacts and events lost or gave, by its name; zeros where there are none."""
+        found = self._result.exchanged.get(name)
+        return self._result.motions.zeros() if found is None else found
+
+    def _friction_loss(self) -> np.ndarray:
+        """Lost in friction of contacts since the start: that of places is a work, integrated with the motion."""
+        r = self._result
+        at = r.values.structure.state_at
+        own = (at.get(f"{e.name}.work") for e in r.values.structure.model.forces if isinstance(e, Touch))
+        return sum((-r.states[:, k] for k in own if k is not None), self.exchanged("friction_loss"))
+
+    def _found(self, name: str) -> np.ndarray:
+        return self._friction_loss() if name == "friction_loss" else self.exchanged(name)
+
+    @cached_property
+    def balance(self) -> np.ndarray:
+        """Total energy less all work put in less the total at the start: zero for an exact motion."""
+        if not len(self._result.t):
+            return np.zeros(0)
+        put_in = sum(self.work.values(), self._result.motions.zeros())
+        put_in = sum((sign * self.exchanged(k) for k, sign in (*EXCHANGE_SIGNS.items(), (EVENT_WORK, 1.0))), put_in)
+        residue = self.total - put_in
+        return residue - residue[0]
+
+    @property
+    def drift(self) -> float:
+        """Largest deviation from the balance [J]; nan where fewer than two output times leave nothing to compare."""
+        return float(np.abs(self.balance).max()) if len(self._result.t) > 1 else float("nan")
+
+
+@dataclass(frozen=True)
+class EnergyBudget:
+    """Energies [J] of some bodies at every output time.
+
+    Attributes
+    ----------
+    result : Result
+    bodies : ndarray of int
+        Rows of the body table.
+    kinetic, balance : ndarray (n,)
+    stored : tuple of two ndarray (n,)
+        Of gravity, and in springs.
+    works : tuple of ndarray (n,)
+    foreign : ndarray (n,)
+        What impacts, contacts and events exchanged that the balance does not know of: it holds where this is constant.
+    """
+
+    result: Result
+    bodies: np.ndarray
+    kinetic: np.ndarray
+    balance: np.ndarray
+    stored: tuple[np.ndarray, np.ndarray]
+    works: tuple[np.ndarray, ...]
+    foreign: np.ndarray
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Of each of the bodies [kg]."""
+        return self.result.values.system.bodies.mass[self.bodies]
+
+    @property
+    def weight(self) -> float:
+        """Of all of the bodies [N]."""
+        return float(self.mass.sum() * np.linalg.norm(self.result.values.system.gravity))
+
+    @property
+    def squared_travel(self) -> np.ndarray:
+        """Square of how far each of the bodies came about [m^2]."""
+        r = self.result.motions
+        x, y, z = (np.ptp(p, axis=1) for p in r.bodies(self.bodies)[0])
+        return x**2 + y**2 + z**2
+
+    def known(self, begin: int, end: int) -> bool:
+        """Whether the balance holds between two rows, the last not counted."""
+        return not np.ptp(self.foreign[begin:end]) > 0.0
+
+    @property
+    def of(self) -> str:
+        """Whose it is, in words; empty: that of all."""
+        if len(self.bodies) == len(self.result.values.system.tree.parent):
+            return ""
+        place = {b: name for name, b in self.result.values.structure.place.items()}
+        names = [place[b] for b in self.bodies.tolist() if b in place]  # massless links have none
+        name, more = names[0], len(names) - 1
+        others = f" and the {more} bodies" if more > 1 else " and the body"
+        return f" of {name!r}" + (f"{others} connected with it" if more else "")
+
+    def moved(self, begin: int, end: int) -> float:
+        """How much energy was shifted about between two rows, the last not counted [J].
+
+        The largest kinetic energy, and the ranges of gravity's and the springs' energies and of every work.
+        """
+        if end <= begin:
+            return 0.0
+        ranges = sum(np.ptp(x[begin:end]) for x in (*self.stored, *self.works))
+        return float(self.kinetic[begin:end].max() + ranges)
+
+
+def total_budget(result: Result) -> EnergyBudget:
+    """That of everything."""
+    e = result.energy
+    every = np.arange(len(result.values.system.tree.parent))
+    none = result.motions.zeros()
+    return EnergyBudget(result, every, e.kinetic, e.balance, (e.gravity, e.elastic), tuple(e.work.values()), none)
+
+
+def budgets_by_part(result: Result) -> list[EnergyBudget]:
+    """Those of parts that neither joints nor forces connect; none where all hangs together.
+
+    What impacts and events exchanged nobody knows by parts.
+    """
+    S = result.values.system
+    part = result.values.structure.kept.get("connected", None, 1, partial(connected_parts, S))
+    many = int(part.max(initial=0)) + 1
+    if many < 2 or result.bulk or not len(result.t):
+        return []
+    of = [np.flatnonzero(part == p) for p in range(many)]
+    elastic = [result.motions.zeros() for _ in of]
+    works: list[list[np.ndarray]] = [[] for _ in of]
+    for f in result.model.acting():
+        at = _part_of(result, f, part)
+        if at >= 0:
+            elastic[at] = elastic[at] + result[f.name].energy
+    for name, work in result.energy.work.items():
+        at = _part_of(result, result[name].element, part)
+        if at >= 0:
+            works[at].append(work)
+    out, foreign = [], _exchanged_by_events(result)
+    for p, bodies in enumerate(of):
+        moving, weight = kinetic_energy(result, bodies), gravity_energy(result, bodies)
+        residue = moving + weight + elastic[p] - sum(works[p], result.motions.zeros())
+        out.append(
+            EnergyBudget(result, bodies, moving, residue - residue[0], (weight, elastic[p]), tuple(works[p]), foreign)
+        )
+    return out
+
+
+def connected_parts(S: System) -> np.ndarray:
+    """The part to which each row of the body table belongs, (nb,): joints, couplings and forces connect them."""
+    first = list(
+        range(len(S.tree.parent))
+    )  # of what each hangs together with, as far as it is known: a body before it, or itself
+    pairs = [(b, parent) for b, parent in enumerate(S.tree.parent.tolist()) if parent >= 0]
+    some = [
+        *(_bodies_of_row(S, k) for k in range(len(S.rows.law))),
+        *(_bodies_of_force(S, k) for k in range(len(S.forces.F))),
+    ]
+    pairs += [(int(bodies[0]), int(b)) for bodies in some for b in bodies[1:]]
+    for i, j in pairs:
+        unite(first, i, j)
+    return np.unique([find_root(first, b) for b in range(len(first))], return_inverse=True)[1]
+
+
+def _bodies_of_row(S: System, k: int) -> np.ndarray:
+    """Bodies of a row, or of a measured quantity behind all rows."""
+    body = np.repeat(np.arange(len(S.tree.parent)), S.tree.nv)
+    return np.unique(body[S.column[S.row_start[k] : S.row_start[k + 1]]])
+
+
+def _bodies_of_force(S: System, k: int) -> np.ndarray:
+    ends, family = np.array([S.forces.F[k], S.forces.M[k]]), S.forces.family[k]
+    if family == BETWEEN:
+        at = S.frame_body[ends[ends >= 0]]
+        return np.unique(at[at >= 0])
+    lines = ends[ends >= 0] if family == SLIDING else ends[:1]
+    return np.unique(np.concatenate([_bodies_of_row(S, len(S.rows.law) + m) for m in lines]))
+
+
+def _part_of(result: Result, e: Any, part: np.ndarray) -> int:
+    """The part that an element acts on, or -1."""
+    s, S = result.values.structure, result.values.system
+    if e.name in s.prescribed:
+        return int(part[s.prescribed[e.name]])
+    k = next((k for k, f in enumerate(s.forces) if f is e or f.name == e.name), None)
+    if k is not None:
+        bodies = _bodies_of_force(S, k)
+    else:
+        rows = s.slices.get(e.name, slice(0, 0))
+        bodies = np.concatenate([np.zeros(0, np.int64), *(_bodies_of_row(S, r) for r in range(rows.start, rows.stop))])
+    return int(part[bodies[0]]) if len(bodies) else -1
+
+
+def _exchanged_by_events(result: Result) -> np.ndarray:
+    """What impacts, contacts and events took or gave since the start, (n,) [J]."""
+    e = result.energy
+    return sum((np.abs(e.exchanged(k)) for k in (*EXCHANGE_SIGNS, EVENT_WORK)), result.motions.zeros())
+
+
+MAX_LAG = 0.05  # part of the longest way of a body by which one may be off
+NEGLIGIBLE_TRAVEL = 1e-6  # part of the mechanism's length that is no way
+TURNING_POINT = 0.1  # part of the largest kinetic energy below which a motion that comes back is at its turning point
+
+
+def lag_warning(x: EnergyBudget) -> str:
+    """What is to be said of a motion of one freedom whose energy is off; nothing where it comes out in time.
+
+    Not where steps outnumber output times, which may miss when it is slow.
+    """
+    r = x.result
+    unknown = x.works or r.exchanged or r.bulk or r.pieces
+    if unknown or not 1 < r.health.steps <= len(r.t) or not x.kinetic.max() > 0.0:
+        return ""
+    faster = _speed_excess(x)
+    faster[_turning_points(x)] = 0.0
+    lag = np.r_[0.0, np.cumsum(0.5 * (faster[1:] + faster[:-1]) * np.diff(r.t))]
+    off, name, way = 0.0, "", NEGLIGIBLE_TRAVEL * r.values.length
+    for body, b in r.values.structure.place.items():
+        if b < 0:
+            continue
+        p, _, _, v, _, _ = r.motions.body(b)
+        way = max(way, float(np.linalg.norm(np.ptp(p, axis=1))))
+        off, name = max((off, name), (float((np.abs(lag) * np.linalg.norm(v, axis=0)).max()), body))
+    if not off > MAX_LAG * way or r.health.freedoms != 1:
+        return ""
+    finer = "shorter step" if r.health.options.get("step") else "smaller rtol"
+    return (
+        f"the energy is off by up to {np.abs(x.balance).max():.2g} J where down to {x.kinetic.min():.2g} J move: by "
+        f"that alone the motion comes to be {np.abs(lag).max():.2g} s early or late, and {name!r} off by about "
+        f"{off:.2g} m; a {finer} may tell whether it can be trusted"
+    )
+
+
+def _speed_excess(x: EnergyBudget) -> np.ndarray:
+    """Part by which it is too fast at every output time, dE / 2T: half of what moves at most."""
+    return x.balance / (2.0 * (x.kinetic + np.abs(x.balance)) + 1e-300)
+
+
+def _turning_points(x: EnergyBudget) -> np.ndarray:
+    """Rows about turning points, where a motion comes back: its speed is off by much there, its time is not."""
+    slow, v = x.kinetic < TURNING_POINT * x.kinetic.max(), x.result.v
+    edges = np.flatnonzero(np.diff(np.r_[False, slow, False]))
+    out = np.zeros(len(slow), bool)
+    for begin, end in edges.reshape(-1, 2):
+        before, after = v[max(begin - 1, 0)], v[min(end, len(v) - 1)]
+        out[begin:end] = begin == 0 or end == len(v) or float(before @ after) <= 0.0
+    return out

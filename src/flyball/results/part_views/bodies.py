@@ -1,0 +1,223 @@
+"""Motion of bodies, named frames, sets of bodies and their members."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from ...math.scalar import atan2
+from ...math.vec import quaternion_matrix
+from ...model.body import Body, Frame
+from ...model.geometry import matrix_to_quaternion
+from ...model.quantities import Quantity, quantities
+from ..recorded_kinematics import KinematicRecord
+from .base import NamedQuantities, PartView, components_array, continuous_quaternions
+
+if TYPE_CHECKING:
+    from ..body_sets import BodySetMotion
+    from ..result import Result
+
+
+class FrameView(PartView):
+    """Motion of a frame: a body's reference frame or a named one."""
+
+    instead: ClassVar = {"angle": "what moves in space has no single angle: use rotation or quaternion"}
+
+    def __init__(self, result: Result, element: Body | Frame) -> None:
+        super().__init__(result, element)
+        self._placed = self._body, _, self._turn = result.motions.placed(element.name)
+
+    @cached_property
+    def _moving(self) -> KinematicRecord:
+        """Its record without accelerations."""
+        return self._result.motions.carried(*self._placed)
+
+    @cached_property
+    def _record(self) -> KinematicRecord:
+        return self._result.records.carried(*self._placed)
+
+    @property
+    def position(self) -> np.ndarray:
+        """Position of its origin in the world [m], (n, 2) or (n, 3)."""
+        return components_array(self._moving[0], self._result.planar)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocity of its origin, world axes [m/s]."""
+        return components_array(self._moving[3], self._result.planar)
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """Acceleration of its origin, world axes [m/s^2]."""
+        return components_array(self._record[5], self._result.planar)
+
+    def _found(self, name: str) -> np.ndarray:
+        """Of a body: what holds a coordinate that events lock, or the sum of contact forces on it [N], world axes."""
+        if name.endswith("_effort"):
+            return self._effort(f"{self.element.name}.{name.removesuffix('_effort')}")
+        found, n = self._result.contacts, 2 if self._result.planar else 3
+        if found is None or self.element.name not in found.sides.names:
+            return np.zeros((len(self._result.t), n))
+        return found.force_on(*found.sides.span(self.element.name))[:, 0, :n]
+
+    def _effort(self, coordinate: str) -> np.ndarray:
+        """Force [N] or torque [N m] along a coordinate while it is locked, else 0: where no events happen, too."""
+        rows = [w.row for w in self._result.values.structure.switches if w.switch.label == coordinate]
+        return self._result.multipliers[:, rows[0]] if rows else self._result.motions.zeros()
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Rotation matrices, world from frame, (n, 3, 3)."""
+        R = [x + self._result.motions.zeros() for x in self._moving[1]]  # in the plane some are plain numbers
+        return np.stack(R, axis=1).reshape(-1, 3, 3)
+
+    @property
+    def quaternion(self) -> np.ndarray:
+        """Unit quaternions, scalar first, (n, 4): of the sign of the one before; in the plane of half the angle."""
+        if self._result.planar:
+            half, zero = 0.5 * self.angle, self._result.motions.zeros()
+            return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=1)
+        return continuous_quaternions(matrix_to_quaternion(self.rotation))
+
+    @property
+    def angle(self) -> np.ndarray:
+        """Planar: orientation [rad], whole turns counted."""
+        if not self._result.planar:
+            raise AttributeError(self._unknown("angle"))
+        return self._result.motions.angle(self._body) + atan2(self._turn[3], self._turn[0])
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """Angular velocity, world axes [rad/s]; planar: one number a time."""
+        return self._moving[2][2] if self._result.planar else np.stack(self._moving[2], axis=1)
+
+    @property
+    def angular_acceleration(self) -> np.ndarray:
+        """Angular acceleration, world axes [rad/s^2]; planar: one number a time."""
+        return self._record[4][2] if self._result.planar else np.stack(self._record[4], axis=1)
+
+
+class BodySetView(NamedQuantities):
+    """Motion of a whole set: arrays (n, m, ...), times first, bodies second."""
+
+    def __init__(self, result: Result, bulk: BodySetMotion) -> None:
+        self._result, self._bulk = result, bulk
+        self._axes = 2 if result.planar else 3
+
+    @property
+    def title(self) -> str:
+        """What it is called."""
+        return f"set of bodies {self._bulk.name!r}"
+
+    @cached_property
+    def names(self) -> dict[str, Quantity]:
+        """Everything that the result says of it, by name."""
+        return quantities(self._result.model, self._bulk.name)
+
+    def __len__(self) -> int:
+        return len(self._bulk)
+
+    @property
+    def position(self) -> np.ndarray:
+        """Of the reference frames' origins in the world [m], (n, m, 3) or (n, m, 2)."""
+        return self._bulk.origin[:, :, : self._axes]
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Of the reference frames' origins [m/s], world axes."""
+        return self._bulk.origin_velocity[:, :, : self._axes]
+
+    @property
+    def quaternion(self) -> np.ndarray:
+        """Unit quaternions, scalar first, world from body, (n, m, 4)."""
+        return self._bulk.quaternion
+
+    @property
+    def angle(self) -> np.ndarray:
+        """Planar: orientations [rad], (n, m), whole turns counted from the start as far as outputs tell."""
+        if not self._result.planar:
+            raise AttributeError(self._unknown("angle"))
+        half = np.arctan2(self._bulk.quaternion[:, :, 3], self._bulk.quaternion[:, :, 0])
+        return 2.0 * np.unwrap(half, axis=0, period=np.pi)
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """Angular velocities, world axes [rad/s], (n, m, 3); planar: (n, m)."""
+        w = self._bulk.angular_velocity
+        return w[:, :, 2] if self._result.planar else w
+
+    @cached_property
+    def contact_force(self) -> np.ndarray:
+        """Sum of the contact forces on each [N], world axes, (n, m, 3) or (n, m, 2)."""
+        found = self._result.contacts
+        if found is None:
+            return np.zeros((len(self._result.t), len(self), self._axes))
+        return found.force_on(*found.sides.span(self._bulk.name))[:, :, : self._axes]
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} bodies {self._bulk.name!r} over {len(self._result.t)} times: {', '.join(self.names)}>"
+
+
+class SetMemberView(BodySetView):
+    """Motion of one member of a set."""
+
+    def __init__(self, result: Result, bulk: BodySetMotion, k: int) -> None:
+        super().__init__(result, bulk)
+        self._k = k
+
+    @property
+    def title(self) -> str:
+        """What it is called."""
+        return f"body '{self._bulk.name}[{self._k}]'"
+
+    @cached_property
+    def names(self) -> dict[str, Quantity]:
+        """Everything that the result says of it, by name."""
+        return quantities(self._result.model, f"{self._bulk.name}[{self._k}]")
+
+    def __len__(self) -> int:
+        return len(self._result.t)
+
+    @property
+    def position(self) -> np.ndarray:
+        """Of the reference frame's origin in the world [m], (n, 3) or (n, 2)."""
+        return super().position[:, self._k]
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Of the reference frame's origin [m/s], world axes."""
+        return super().velocity[:, self._k]
+
+    @property
+    def quaternion(self) -> np.ndarray:
+        """Unit quaternions, scalar first, world from body, (n, 4); neighbours have the same sign."""
+        return continuous_quaternions(self._bulk.quaternion[:, self._k])
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Rotation matrices, world from body, (n, 3, 3)."""
+        return np.stack(quaternion_matrix(*self.quaternion.T), axis=1).reshape(-1, 3, 3)
+
+    @property
+    def angle(self) -> np.ndarray:
+        """Planar: orientation [rad], (n,), whole turns counted from the start as far as outputs tell."""
+        return super().angle[:, self._k]
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """Angular velocity, world axes [rad/s]; planar: one number a time."""
+        return super().angular_velocity[:, self._k]
+
+    @cached_property
+    def contact_force(self) -> np.ndarray:
+        """Sum of the contact forces on it [N], world axes, (n, 3) or (n, 2)."""
+        found = self._result.contacts
+        if found is None:
+            return np.zeros((len(self), self._axes))
+        low = found.sides.span(self._bulk.name)[0] + self._k
+        return found.force_on(low, low + 1)[:, 0, : self._axes]
+
+    def __repr__(self) -> str:
+        return f"<{self.title} over {len(self)} times: {', '.join(self.names)}>"

@@ -1,0 +1,308 @@
+"""Quantities that force elements and contact places measure, and the forces they exert."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...constraints.switch_kinds import BY_RATE
+from ...engine.loads import force_row, rest_speed, wrench_power
+from ...errors import AnalysisError
+from ...laws.bytecode import STACK_RESERVE, evaluate, evaluate_over_time, takes_arrays
+from ...math.scalar import divide, sign, unless_zero
+from ...math.vec import cross, dot, norm, sub
+from ...model.force import CoordinateForce, JointForce
+from ...tables.table_definitions import HELD
+from ..event_driven_contacts import ContactHistory
+from ..phases import RecordedModes, stored_reference
+from ..recorded_kinematics import coordinate_frames, turned_record
+from .base import Curves, PartView
+
+
+class ForceView(PartView):
+    """What a force element measures and does."""
+
+    def _index(self) -> int:
+        return next(i for i, f in enumerate(self._x.structure.forces) if f is self.element)
+
+    def _between(self) -> tuple[tuple, tuple, tuple]:
+        """(inputs, force on M, torque on M) over time, of a force between frames."""
+        e, S = self.element, self._x.system
+        k = self._index()
+        F, M, par = self._frames
+        a, b = (np.broadcast_to(i, (self._result.motions.n,)) for i in e.inputs(par, F, M))
+        laws = tuple(self._law(int(S.forces.laws[k, i]), a, b) for i in range(3))
+        force, torque = e.wrench(par, F, M, laws, (a, b))
+        return (a, b), force, torque
+
+    @property
+    def _frames(self) -> tuple[tuple, tuple, Any]:
+        """Records of F and M over time, and its numbers, of a force between frames."""
+        r, S = self._result.motions, self._x.system
+        k = self._index()
+        F, M = (r.frame(int(side[k])) for side in (S.forces.F, S.forces.M))
+        return F, M, force_row(S.force_parameters, k)
+
+    def acts(self) -> tuple[tuple[int, int], tuple, tuple, tuple]:
+        """Of a force between frames: bodies of F and M, point, force and torque there on M's body over time."""
+        S = self._x.system
+        _, force, torque = self._between()
+        k = self._index()
+        i, j = (int(S.frame_body[side[k]]) for side in (S.forces.F, S.forces.M))
+        return (i, j), self._frames[1][0], force, torque
+
+    def pushes(self) -> tuple[int, np.ndarray]:
+        """Of a force along a measured quantity: number of that, and its effort along it over time; without its row."""
+        return int(self._x.system.forces.F[self._index()]), self._along()[2]
+
+    def _along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(value, rate, effort) over time, of a force along a measured quantity."""
+        e, S = self.element, self._x.system
+        k = self._index()
+        x, rate = self._result.measured.quantity(int(S.forces.F[k]))
+        laws = (self._law(int(S.forces.laws[k, 0]), x, rate), 0.0 * x, self._way(k, rate))
+        load = 0.0 * x
+        if S.forces.load[k] >= 0:
+            force, torque = self._result.reactions.of(e.joint)
+            load = e.load(
+                force_row(S.force_parameters, k), self._result.motions.frame(int(S.forces.M[k])), force, torque
+            )
+        return x, rate, e.effort(force_row(S.force_parameters, k), x, rate, laws, load) + 0.0 * x
+
+    def _way(self, k: int, rate: np.ndarray) -> np.ndarray:
+        """Which way it slides: as its switch said then; where there is none by the sign of the rate."""
+        s = int(self._x.system.forces.switch[k])
+        stretches = self._result.phases
+        if s < 0 or stretches is None:
+            return sign(rate)
+        by_rate = np.where(np.abs(rate) > rest_speed(self._x.system), sign(rate), 0.0)
+        return np.where(stretches.sigma[s] == BY_RATE, by_rate, stretches.sigma[s] + 0.0 * rate)
+
+    def _rows(self) -> list[int]:
+        """Its switches, by number."""
+        return [k for k, x in enumerate(self._x.structure.switches) if x.element is self.element and x.row >= 0]
+
+    def _whole_along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """(value, rate, effort, side that is closed): with what its rows carry while they hold.
+
+        What is rigid and has no row, since the motion was not computed with any, has efforts that nothing tells: nan.
+        """
+        s, own = self._x.structure, self._rows()
+        if any(f is self.element for f in s.forces):
+            x, rate, effort = self._along()
+        elif own:
+            x, rate = self._result.measured.quantity(s.switches[own[0]].measured)
+            effort = 0.0 * x
+        else:
+            e = self.element
+            m = s.measured.get(e.coordinate_text() or f"{e.name}:length")
+            nothing = self._result.motions.zeros() + np.nan
+            x, rate = (nothing, nothing) if m is None else self._result.measured.quantity(m)
+            effort = nothing
+        side = sign(effort) * (effort != 0.0)
+        stretches = self._result.phases
+        if own and stretches is not None:
+            side = 0.0 * x
+            for k in own:
+                held, way = stretches.mode[k] == HELD, stretches.sigma[k]
+                effort = effort + self._result.multipliers[:, s.switches[k].row]
+                side = np.where(held, np.where(way == 0.0, 1.0, way), side)
+        return x, rate, effort, side
+
+    def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Values of a law over time."""
+        if at < 0:
+            return self._result.motions.zeros()
+        s, S, t = self._x.structure, self._x.system, self._result.t
+        if self._result.motions.dtype == float and takes_arrays(S.code, at):
+            slots = self._result.measured.slots[0]
+            behind = len(slots) - len(s.switches)
+            return evaluate_over_time(S.code, S.const, at, (t, a, b), (slots[:behind], slots[behind:]))
+        stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3), self._result.motions.dtype)
+        sensed = self._result.measured.slots
+        x = np.stack([t, a, b], axis=1)
+        out = self._result.motions.zeros()
+        for i in range(len(t)):
+            try:
+                out[i] = evaluate(S.code, S.const, at, stack, tuple(x[i]), sensed[:, :, i])
+            except Exception as error:  # a user's function may raise anything
+                raise AnalysisError(
+                    f"{self.element.title}: its law raises {type(error).__name__} at t = {t[i]:.6g} s: {error}. A law "
+                    f"must give the same number whenever it is asked; give a function without a memory"
+                ) from error
+        return out
+
+    @property
+    def wrench(self) -> tuple[np.ndarray, np.ndarray]:
+        """Force [N] and torque [N m] on the second body, world axes; of a two-point force at the second point.
+
+        Raises
+        ------
+        AttributeError
+            For forces along coordinates in general, which may act on several bodies.
+        """
+        n = len(self._result.t)
+        if isinstance(self.element, JointForce):
+            (k, turn), _, _ = coordinate_frames(self._x, self._x.structure.model[self.element.joint], "angle")
+            axis = turned_record(self._result.motions.frame(k), turn)[1]
+            effort = self._whole_along()[2]
+            return np.zeros((n, 3)), np.stack([a * effort for a in (axis[2], axis[5], axis[8])], axis=1)
+        if isinstance(self.element, CoordinateForce):
+            raise AttributeError(f"{self.element.title} acts along a coordinate; it has {', '.join(self.names)}")
+        _, force, torque = self._between()
+        return tuple(np.stack([np.broadcast_to(c, (n,)) for c in w], axis=1) for w in (force, torque))  # type: ignore[return-value]
+
+    @property
+    def pulls(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """For a rope: each of its points over time [m] and the force on the body there [N], world axes, (n, 3)."""
+        r, s = self._result.records, self._x.structure
+        points = [np.stack(r.frame(s.frame_at[self.element.name, role, ""])[0], axis=1) for role in self.element.ends()]
+        tension = -self._whole_along()[2]
+        forces = [np.zeros_like(p) for p in points]
+        for k in range(len(points) - 1):
+            d = points[k + 1] - points[k]
+            pull = d * (tension / np.sqrt((d * d).sum(axis=1)))[:, None]
+            forces[k] += pull
+            forces[k + 1] -= pull
+        return list(zip(points, forces, strict=True))
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Potential energy stored in it [J]."""
+        e = self.element
+        if e.energy is None:
+            return self._result.motions.zeros()
+        if isinstance(e, CoordinateForce):
+            if not any(f is e for f in self._x.structure.forces):
+                return self._result.motions.zeros()
+            S, k = self._x.system, self._index()
+            x = self._result.measured.quantity(int(S.forces.F[k]))[0]
+            return self._in_force() * e.energy(force_row(S.force_parameters, k), x)
+        F, M, par = self._frames
+        return e.energy(par, F, M)
+
+    def _in_force(self) -> Any:
+        """Whether it is there: 0 from where an event has released it."""
+        stretches = self._result.phases
+        own = [k for k, x in enumerate(self._x.structure.switches) if x.element is self.element]
+        return 1.0 if stretches is None or not own else RecordedModes(*stretches.over("switch")).released[own[0]] == 0.0
+
+    @property
+    def power(self) -> np.ndarray:
+        """Power that it gives to the bodies [W]."""
+        if isinstance(self.element, CoordinateForce):
+            _, rate, effort, _ = self._whole_along()
+            return rate * effort
+        _, force, torque = self._between()
+        F, M, _ = self._frames
+        return wrench_power(F, M, force, torque)
+
+    @property
+    def work(self) -> np.ndarray:
+        """Work given to the bodies since the start [J]: integrated with the motion, or what it stores no more."""
+        name = f"{self.element.name}.work"
+        states = self._x.structure.state_at
+        if name in states:
+            return self._result.states[:, states[name]]
+        return stored_reference(self._result, self.element.name) - self.energy
+
+    @property
+    def _whole(self) -> tuple[np.ndarray, np.ndarray]:
+        """Force and torque of a force between frames: (n, 2) and (n,) in the plane."""
+        force, torque = self.wrench
+        return (force[:, :2], torque[:, 2]) if self._result.planar else (force, torque)
+
+    def _found(self, name: str) -> np.ndarray:
+        """One of its outputs: length, rate and tension of a two-point force; angle, rate and torque about a joint.
+
+        Of a force on a body, or between two frames, force and torque there.
+        """
+        outputs = list(self.element.outputs)
+        if name not in outputs:
+            return self._whole[name == "torque"]
+        k = outputs.index(name)
+        if isinstance(self.element, CoordinateForce):
+            value = self._whole_along()[k]
+            if k > 2:
+                return np.abs(value) if name == "taut" else value
+            seen = self.element.outward(self._x.numbers[self.element.name])
+            return (self.element.sign if k == 2 else 1.0) * seen * value
+        inputs, force, _ = self._between()
+        if k < 2:
+            return inputs[k]
+        F, M, _ = self._frames
+        along = divide(-dot(force, sub(M[0], F[0])), inputs[0])
+        return unless_zero(inputs[0], along, norm(force))  # a damper between coinciding points: c times its rate
+
+    def channels(self) -> Curves:
+        """Its outputs; for others, the components of force and torque that are not zero all the time."""
+        out = super().channels()
+        return out if self.element.outputs else {k: v for k, v in out.items() if v[1].any()}
+
+
+class ContactPlaceView(PartView):
+    """A place of contact; nan where a motion was computed without."""
+
+    @cached_property
+    def _touched(self) -> ContactHistory:
+        return ContactHistory(self._result, self.element)
+
+    def acts(self) -> tuple[tuple[int, int], tuple, tuple, tuple]:
+        """Bodies of F and M, a point, force and torque there on M's body over time: of friction that slides."""
+        x = self._touched
+        S, t = self._x.system, self._x.structure.terms
+        one = next(k for k in t if k.element is self.element)
+        zero = self._result.records.zeros()
+        bodies = int(S.frame_body[one.F]), int(S.frame_body[one.M])
+        return bodies, tuple(x.point.T), tuple(x.sliding.T), (zero, zero, zero)
+
+    @property
+    def wrench(self) -> tuple[np.ndarray, np.ndarray]:
+        """Force [N] on the second body and torque [N m] about the origin of M, world axes."""
+        x = self._touched
+        if not x.known:
+            nothing = np.full((len(self._result.t), 3), np.nan)
+            return nothing, nothing
+        arm = -x.element.radius * x.normal
+        return x.force, np.stack(cross(tuple(arm.T), tuple(x.force.T)), axis=1)
+
+    @property
+    def energy(self) -> np.ndarray:
+        """It stores none [J]."""
+        return self._result.records.zeros()
+
+    @property
+    def power(self) -> np.ndarray:
+        """Of friction [W]."""
+        return self._touched.power if self._touched.known else self._result.records.zeros() * np.nan
+
+    @property
+    def work(self) -> np.ndarray:
+        """Of friction since the start [J], integrated with the motion."""
+        at = self._x.structure.state_at.get(f"{self.element.name}.work")
+        return self._result.records.zeros() if at is None else self._result.states[:, at]
+
+    def _found(self, name: str) -> np.ndarray:
+        """Gap, normal force, friction, speed of slip; force and torque."""
+        if name in ("force", "torque"):
+            force, torque = self.wrench
+            planar = self._result.planar
+            return (
+                force[:, :2]
+                if planar and name == "force"
+                else torque[:, 2]
+                if planar
+                else (force, torque)[name == "torque"]
+            )
+        x = self._touched
+        if not x.known:
+            return self._result.records.zeros() * np.nan
+        if name == "gap":
+            return x.gap
+        if name == "normal":
+            return x.pressure
+        if name == "slip":
+            return np.sqrt((x.slip**2).sum(axis=0))
+        return np.sqrt(((x.sliding + x.sticking) ** 2).sum(axis=1))

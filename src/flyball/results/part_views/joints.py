@@ -1,0 +1,141 @@
+"""Coordinates of joints, and their reactions in any axes and on either body."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import ModelError
+from ...math.scalar import atan2, rounded
+from ...math.vec import dot, mtv, sub
+from ...model.body import GROUND
+from ...model.messages import listing, suggest
+from ...tables.forest import coordinate_row
+from ..recorded_kinematics import FULL_TURN, Wrench, coordinate_frames, turned_record
+from .base import PartView, components_array
+
+if TYPE_CHECKING:
+    from ..result import Result
+
+DERIVATIVE_ENDINGS = ("", "_rate", "_acceleration")
+
+
+class JointView(PartView):
+    """Coordinates and reaction of a joint."""
+
+    def __init__(self, result: Result, element: Any) -> None:
+        super().__init__(result, element)
+        self._known: dict[tuple[str, bool], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+
+    def _measure(self, what: str, solved: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A coordinate, its rate and, where that is ``solved`` for, its acceleration, through the row that measures."""
+        r, x = self._result.records if solved else self._result.motions, self._x
+        (i, turn_i), (j, turn_j), c = coordinate_frames(x, self.element, what)
+        F, M = turned_record(r.frame(i), turn_i), turned_record(r.frame(j), turn_j)
+        par: tuple[float, ...] = (*c.row.par[:6], 0.0, 0.0)
+        hint: Any = 0.0
+        if c.row.of_kind.turns:
+            par, hint = (1.0, *par[1:]), self._turns(what, i, j)
+        value, f, tM, tF, second = c.row.of_kind.row(par, F, M, hint, x.system.const)
+        rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
+        offset = self.element.offset(x.numbers[self.element.name], what)
+        return c.sign * value + offset, c.sign * rate, c.sign * second
+
+    def _turns(self, what: str, i: int, j: int) -> Any:
+        """Something close to the measured angle that knows its whole turns."""
+        s, S = self._x.structure, self._x.system
+        row = coordinate_row(s, self.element.name, what)
+        if row is not None:
+            return self.element.coordinates[what].sign * self._result.q[:, S.tree.q[row]]
+        name = f"{self.element.name}.{what}"
+        if name in s.state_at:
+            return self._result.states[:, s.state_at[name]]
+        r = self._result.motions
+        (here, drawn_here), (there, drawn_there) = (
+            (
+                self._heading(k) + r.angle(int(S.frame_body[k])),
+                self._heading(k) + r.reference_angle(int(S.frame_body[k])),
+            )
+            for k in (i, j)
+        )
+        return there - here - FULL_TURN * rounded((drawn_there - drawn_here) / FULL_TURN)
+
+    def _heading(self, frame: int) -> Any:
+        """In the plane: the way that a frame's x axis points in its body."""
+        R = self._x.system.frames.rotation[frame]
+        return atan2(*R[[3, 0]].tolist())
+
+    def _found(self, name: str) -> np.ndarray:
+        """A coordinate by its name, with ``_rate`` and ``_acceleration`` behind it for its derivatives."""
+        if name == "place":
+            return self._result.states[:, self._x.structure.state_at[f"{self.element.name}.place"]]
+        k = next((k for k, ending in enumerate(DERIVATIVE_ENDINGS) if k and name.endswith(ending)), 0)
+        what = name.removesuffix(DERIVATIVE_ENDINGS[k])
+        if (key := (what, k == 2)) not in self._known:
+            self._known[key] = self._measure(*key)
+        return self._known[key][k]
+
+    def _wrench(self) -> Wrench:
+        """Force on body_j at M's origin and torque about it, world components."""
+        return self._result.reactions.of(self.element.name)
+
+    def reaction(self, *, axes: str = "world", on: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Reaction force and torque of the joint.
+
+        Parameters
+        ----------
+        axes : ``"world"``, ``"joint"`` or the name of one of the two bodies
+            Axes of the components; ``"joint"`` are those of the joint's frame on ``body_i``.
+        on : str
+            Name of the body it acts on; ``body_j`` if not given.
+
+        Returns
+        -------
+        force [N], torque [N m] : ndarray (n, 3)
+            The torque is about the joint's point on ``body_j`` (for a two-point link: its second end).
+        """
+        e, s = self.element, self._x.structure
+        force, torque = self._wrench()
+        names = [s.model.carrier(name, e) for name in (e.body_i, e.body_j)]
+        on = names[1] if on is None else on
+        if on not in names:
+            raise ModelError(f"{e.title} joins {names[0]!r} and {names[1]!r}, not {on!r}{suggest(str(on), names)}")
+        if axes != "world":
+            R = self._axes(axes, names)
+            force, torque = mtv(R, force), mtv(R, torque)
+        sign = 1.0 if on == names[1] else -1.0
+        return sign * np.stack(force, axis=1), sign * np.stack(torque, axis=1)
+
+    def rotation(self, axes: str) -> np.ndarray:
+        """Rotation matrices, world from the axes that `reaction` knows by this name, (n, 3, 3)."""
+        e = self.element
+        names = [self._x.structure.model.carrier(name, e) for name in (e.body_i, e.body_j)]
+        full = [np.broadcast_to(x, len(self._result.t)) for x in self._axes(axes, names)]
+        return np.stack(full, axis=1).reshape(-1, 3, 3)
+
+    def _axes(self, axes: str, names: list[str]) -> tuple:
+        records, x = self._result.records, self._x
+        if axes == "joint":
+            return records.frame(x.structure.frame_at[self.element.name, "F", ""])[1]
+        if axes not in names:
+            known = ["world", "joint", *names]
+            hint = suggest(str(axes), known)
+            raise ModelError(f"{self.element.title} knows no axes {axes!r}{hint}; {listing(known)}")
+        return records.named(axes)[1] if axes != GROUND else tuple(np.eye(3).ravel())
+
+    @property
+    def force(self) -> np.ndarray:
+        """Reaction force on ``body_j``, world axes [N], (n, 2) or (n, 3)."""
+        return components_array(self._wrench()[0], self._result.planar)
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Reaction torque on ``body_j`` about the joint's point, world axes [N m]; planar: one number a time."""
+        t = self._wrench()[1]
+        return t[2] if self._result.planar else np.stack(t, axis=1)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Reaction components that redundancy leaves undetermined; of those one choice is given."""
+        return self._result.health.undetermined.get(self.element.name, ())

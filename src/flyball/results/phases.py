@@ -1,0 +1,363 @@
+"""Phases of a motion between events: their modes and parameters, energy of events, states at an instant.
+
+Within a phase the modes of all switches and all parameters are constant. Quantities that are computed later ask
+the phases what held at their time: which way friction slid, which stop was closed, what a parameter was. `Moment`
+is the motion just before or after an event. Energies lost and given by events are counted from the start of the
+motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..errors import ModelError
+from ..tables.values import Values
+
+if TYPE_CHECKING:
+    from .result import Result
+
+
+class RecordedModes(NamedTuple):
+    """What is recorded of every switch, (ns,) each: see `tables.system.Modes`."""
+
+    mode: np.ndarray
+    hold: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    released: np.ndarray
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Output times in a row between which nothing switched.
+
+    Attributes
+    ----------
+    rows : int
+        How many output times; none is possible.
+    switch : ndarray (5, ns)
+        Mode, what is held, lower and upper bounds of every switch, whether it was released (`RecordedModes`).
+    sigma : ndarray (ns,) or (ns, rows)
+        The direction in which each acts.
+    values : Values
+        The tables, with parameters as they were then.
+    lost : float [J]
+        Lost in impacts and sudden locking since the start.
+    given : float [J]
+        Given by kicks since the start.
+    end : ndarray (ny,)
+        The state at its end, before the event.
+    """
+
+    rows: int
+    switch: np.ndarray
+    sigma: np.ndarray
+    values: Values
+    lost: float
+    given: float
+    end: np.ndarray
+
+    @property
+    def modes(self) -> RecordedModes:
+        """The rows of ``switch`` by name."""
+        return RecordedModes(*self.switch)
+
+    @property
+    def ways(self) -> np.ndarray:
+        """The directions as columns, (ns, 1) or (ns, rows)."""
+        return self.sigma if self.sigma.ndim == 2 else self.sigma[:, None]
+
+
+@dataclass(frozen=True)
+class Phases:
+    """All of a motion, in order."""
+
+    all: tuple[Phase, ...]
+
+    def over(self, what: str) -> np.ndarray:
+        """A field of the stretches at every output time, times last."""
+        every = [np.asarray(getattr(x, what), float) for x in self.all]
+        return np.concatenate([np.repeat(x[..., None], s.rows, -1) for x, s in zip(every, self.all, strict=True)], -1)
+
+    @cached_property
+    def mode(self) -> np.ndarray:
+        """Mode of every switch, (ns, n)."""
+        return self.over("switch")[0]
+
+    @cached_property
+    def sigma(self) -> np.ndarray:
+        """Direction of every switch, (ns, n)."""
+        every = [(x.ways, x.rows) for x in self.all]
+        return np.concatenate([np.broadcast_to(x, (len(x), rows)) for x, rows in every], axis=1)
+
+    def pieces(self) -> list[tuple[slice, Phases]]:
+        """Stretches with the same parameters, and the output times that they take up."""
+        out, first = [], 0
+        for _, group in groupby(self.all, key=lambda x: id(x.values)):
+            found = Phases(tuple(group))
+            last = first + sum(x.rows for x in found.all)
+            out.append((slice(first, last), found))
+            first = last
+        return out
+
+    def moment(self, k: int) -> Phases | None:
+        """Stretch k as that of one time; None where ways change within it and none is known."""
+        x = self.all[k]
+        ways = x.ways[:, -1] if x.ways.shape[1] else None
+        return None if ways is None else Phases((replace(x, rows=1, sigma=ways),))
+
+    def cut(self, rows: int) -> Phases:
+        """Those of the first so many output times."""
+        out, left = list[Phase](), rows
+        for x in self.all:
+            n = min(x.rows, left)
+            out.append(replace(x, rows=n, sigma=x.sigma[:, :n] if x.sigma.ndim == 2 else x.sigma))
+            left -= n
+        return Phases(tuple(out))
+
+
+def phases_or_none(phases: Sequence[Phase]) -> Phases | None:
+    """The stretches of a motion; None where there is none."""
+    return Phases(tuple(phases)) if phases else None
+
+
+def split_by_parameters(result: Any) -> tuple[Any, ...]:
+    """A result piece by piece, if parameters changed in it, each with its own; else none."""
+    cuts = result.phases.pieces() if result.phases is not None else []
+    if len(cuts) < 2:
+        return ()
+    names = "t", "q", "v", "states", "vdot", "multipliers"
+    out = []
+    for at, stretches in cuts:
+        parts = (getattr(result, name)[at] for name in names)
+        piece = type(result)(result.model, stretches.all[0].values, *parts, result.health)
+        piece.phases, piece.wound = stretches, result.wound
+        piece.exchanged = {k: x[at] for k, x in result.exchanged.items()}
+        piece.begun, piece.within = result.begun, (result, at)
+        if result.contacts is not None:
+            piece.contacts = result.contacts.taken(range(at.start, at.stop))
+        out.append(piece)
+    return tuple(out)
+
+
+EVENT_WORK = "event_work"
+"""Energy that events gave: by kicks, and by changes of parameters that energy depends on."""
+CUMULATIVE_ENERGIES = ("friction_loss", "impact_loss", "surface_work", "numerical_loss", EVENT_WORK)
+"""Energies in `Result.exchanged` that count on from one motion to the next."""
+ALL_PARTS = ""
+
+
+@dataclass
+class MotionStart:
+    """How a motion began.
+
+    Attributes
+    ----------
+    y : ndarray (ny,) or None
+        The state vector then; None where nobody said.
+    done : dict
+        What motions before it had exchanged [J], by the names of `CUMULATIVE_ENERGIES`, and the work of what each force stores.
+    """
+
+    y: np.ndarray | None = None
+    done: dict[str, float] = field(default_factory=dict)
+
+
+def event_energies(result: Any) -> dict[str, np.ndarray]:
+    """Energies [J] since the start, by their names in `Result.exchanged`: lost in impacts, given by events."""
+    if result.phases is None:
+        return {}
+    done, over = result.begun.done, result.phases.over
+    lost, given = over("lost") + done.get("impact_loss", 0.0), over("given") + done.get(EVENT_WORK, 0.0)
+    return {"impact_loss": lost, EVENT_WORK: given + _at_output_times(result, _stored_by_events(result, ALL_PARTS))}
+
+
+def stored_reference(result: Any, name: str) -> np.ndarray:
+    """What a force had stored at the start, and what events stored in it since [J] (n,).
+
+    Less what it stores now, that is what it gave the bodies since the start.
+    """
+    whole, at = result.within or (result, slice(None))
+    if isinstance(at, int):  # a moment of that stretch
+        return np.full(len(result.t), _stored_by_events(whole, name)[at] + _stored_at_start(whole, name))
+    known = whole.__dict__.setdefault("_basis", {})
+    if name not in known:
+        jumped = _at_output_times(whole, _stored_by_events(whole, name)) if whole.phases is not None else 0.0
+        known[name] = jumped + _stored_at_start(whole, name) + np.zeros(len(whole.t))
+    return known[name][at]
+
+
+def event_energies_in_phase(result: Any, k: int) -> dict[str, np.ndarray]:
+    """As `event_energies`, at a moment of stretch k of a result."""
+    done, x = result.begun.done, result.phases.all[k]
+    given = x.given + done.get(EVENT_WORK, 0.0) + _stored_by_events(result, ALL_PARTS)[k]
+    return {"impact_loss": np.array([x.lost + done.get("impact_loss", 0.0)]), EVENT_WORK: np.array([given])}
+
+
+def energies_at_end(before: Any) -> dict[str, float]:
+    """What a motion that goes on from an earlier one begins with, as `Begun.done` has it."""
+    done, last = before.begun.done, before.phases.all[-1] if before.phases is not None else None
+    out = {k: done[k] for k in CUMULATIVE_ENERGIES if k in done}
+    if last is not None:
+        totals = {"impact_loss": last.lost, EVENT_WORK: last.given + _stored_by_events(before, ALL_PARTS)[-1]}
+        out |= {k: x + done.get(k, 0.0) for k, x in totals.items()}
+    else:
+        out |= {k: float(x[-1]) for k, x in before.exchanged.items() if k in CUMULATIVE_ENERGIES and len(x)}
+    values = before.values if last is None else last.values
+    now = _stored_energies(before, (values, None if last is None else last.switch), before.final[1])
+    for f in values.structure.forces:
+        if f.energy is not None:
+            jumped = _stored_by_events(before, f.name)[-1] if last is not None else 0.0
+            out[f.name] = float(_stored_at_start(before, f.name) + jumped - now[f.name])
+    return {k: x for k, x in out.items() if x != 0.0}
+
+
+def cumulative_exchanges(result: Any) -> dict[str, np.ndarray]:
+    """Energies that contacts exchanged, with those of the motions before."""
+    return {
+        k: x + (result.begun.done.get(k, 0.0) if k in CUMULATIVE_ENERGIES else 0.0) for k, x in result.exchanged.items()
+    }
+
+
+def _stored_at_start(result: Any, name: str) -> Any:
+    """Stored in a force at the start, and the work of that before it [J]; at the first output if nobody said."""
+    if result.begun.y is None or _starts_at_first_output(result):
+        stored = result[name].energy[:1].sum()  # complex where derivatives are asked for
+        return stored + result.begun.done.get(name, 0.0)
+    known = result.__dict__.setdefault("_at_first", {})
+    if not known:
+        every = result.phases.all if result.phases is not None else ()
+        by = (every[0].values, every[0].switch) if every else (result.values, None)
+        known.update(_stored_energies(result, by, result.begun.y))
+    return known.get(name, 0.0) + result.begun.done.get(name, 0.0)
+
+
+def _starts_at_first_output(result: Any) -> bool:
+    """Whether the first output is the state that the motion began with, and no event changed anything since."""
+    if result.phases is not None or not len(result.t):
+        return False
+    first = np.concatenate([x[0] for x in (result.q, result.v, result.hints)])
+    return np.array_equal(first, result.begun.y)
+
+
+def _at_output_times(result: Any, each: list[float]) -> np.ndarray:
+    """Numbers of the stretches at every output time."""
+    return np.repeat(each, [x.rows for x in result.phases.all])
+
+
+def _stored_by_events(result: Any, name: str) -> list[float]:
+    """What events stored since the start [J], by stretches, in a force or by changes of parameters in all (`ALL_PARTS`).
+
+    That is what the same state has more afterwards. Of a force that is released all is gone.
+    """
+    known = result.__dict__.setdefault("_jumped", {})
+    if not known:
+        known.update(_find_stored_by_events(result))
+    return known.get(name) or [0.0] * len(result.phases.all)
+
+
+def _find_stored_by_events(result: Any) -> dict[str, list[float]]:
+    every = result.phases.all
+    names = [ALL_PARTS, *(f.name for f in every[0].values.structure.forces)]
+    total = dict.fromkeys(names, 0.0)
+    out: dict[str, list[float]] = {name: [] for name in names}
+    for k, x in enumerate(every):
+        old = every[k - 1] if k else x
+        other = x.values is not old.values
+        if other or (x.modes.released != old.modes.released).any():
+            now, then = (
+                _stored_energies(result, by, old.end) for by in ((x.values, x.switch), (old.values, old.switch))
+            )
+            total |= {name: total[name] + now[name] - then[name] for name in names if name != ALL_PARTS}
+            if other:
+                total[ALL_PARTS] += (
+                    _stored_energies(result, (x.values, old.switch), old.end)[ALL_PARTS] - then[ALL_PARTS]
+                )
+        for name in names:
+            out[name].append(total[name])
+    return out
+
+
+def _stored_energies(result: Any, by: tuple[Any, Any], y: np.ndarray) -> dict[str, float]:
+    """Energy [J] of a state by tables and switches (none: all is in force): of every force, and all of it."""
+    values, switch = by
+    s = values.structure
+    q, v, z = np.split(y[None, :], [s.nq, s.nq + s.nv], axis=1)
+    still, none = np.zeros((1, s.nv)), np.zeros((1, len(s.rows) + len(s.prescribed)))
+    one = type(result)(result.model, values, np.zeros(1), q, v, z, still, none, result.health)
+    released = np.zeros(len(s.switches)) if switch is None else RecordedModes(*switch).released
+    gone = {x.element.name for k, x in enumerate(s.switches) if released[k] != 0.0}
+    out = {f.name: 0.0 if f.energy is None or f.name in gone else float(one[f.name].energy[0]) for f in s.forces}
+    return out | {ALL_PARTS: float(one.energy.kinetic[0] + one.energy.gravity[0]) + sum(out.values())}
+
+
+class Moment:
+    """Positions and velocities at one instant: ``moment["block.vx"]``.
+
+    Accelerations and forces of constraints have no value there: they jump.
+
+    Attributes
+    ----------
+    t : float [s]
+    y : ndarray
+        State vector: coordinates, velocities, turns and works.
+    values : Values
+        The mechanism with the parameters of that time.
+    came : tuple of (ndarray, int)
+        The state that the motion came to the instant with, and whether this is before (0) or after (1) it.
+    """
+
+    def __init__(
+        self, result: Result, values: Values, t: float, y: np.ndarray, came: tuple[np.ndarray, int] | None = None
+    ) -> None:
+        self._of, self.values, self.t, self.y, self.came = result, values, float(t), y, came
+
+    @cached_property
+    def stretch(self) -> int:
+        """Which stretch of the motion it ends or begins; -1 where that is not known, as at the start."""
+        every = self._of.phases.all if self._of.phases is not None else ()
+        if self.came is None:
+            return -1
+        y, after = self.came
+        found = next((k for k, x in enumerate(every) if np.array_equal(x.end, y)), -1)
+        return found if found < 0 else min(found + after, len(every) - 1)
+
+    @cached_property
+    def alone(self) -> Result:
+        """A result of this one time; what nobody knows there is nan."""
+        r = self._of
+        s = self.values.structure
+        q, v, z = (p[None, :] for p in np.split(self.y, [s.nq, s.nq + s.nv]))
+        unknown = np.full((1, s.nv), np.nan), np.full((1, len(s.rows) + len(s.prescribed)), np.nan)
+        made = type(r)(r.model, self.values, np.array([self.t]), q, v, z, *unknown, r.health)
+        made.wound = r.wound
+        if self.stretch >= 0 and r.phases is not None:
+            made.begun, made.within = r.begun, (r, self.stretch)
+            made.exchanged |= event_energies_in_phase(r, self.stretch)
+            made.phases = r.phases.moment(self.stretch)
+        return made
+
+    def __getitem__(self, name: str) -> Any:
+        """A curve such as ``"block.vx"`` as a number, or a vector such as ``"block.velocity"``.
+
+        Raises
+        ------
+        ModelError
+            If there is no such curve, or it jumps there.
+        """
+        value = np.asarray(self.alone.channel(name if "." in name else f"{name}.value")[1])[0]
+        if not np.isfinite(value).all():
+            raise ModelError(
+                f"{name!r} has no value at the instant t = {self.t:.6g} s of an event: accelerations and forces of "
+                f"constraints jump there; read positions, velocities and energies, or what is at output times"
+            )
+        return float(value) if np.ndim(value) == 0 else value
+
+    def __repr__(self) -> str:
+        return f"<{self._of.model.name!r} at t = {self.t:.6g} s>"

@@ -1,0 +1,305 @@
+"""Kinematics at all output times: bodies and frames, terms of constraint rows, and measured quantities.
+
+Arrays over time by the formulas of the compiled engine: compiled for floats, in Python for complex numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..engine.kinematics import (
+    BodyKinematics,
+    BodyKinematicsOverTime,
+    BodyTables,
+    attached_record,
+    body_motion,
+    body_pose,
+    kinematics_over_time,
+    load_record,
+    stationary_record,
+    turned_angles,
+    twist_column,
+)
+from ..engine.rows import COEFFICIENT, row_parameters
+from ..math.vec import add, cross, dot, load3, load9, matrix_product, mm, neg, scale, store3, sub
+from ..model.body import Frame
+from ..model.joint import Coordinate, Joint
+from ..tables.law_inputs import force_reading_count
+from ..tables.values import Values
+
+if TYPE_CHECKING:
+    from .result import Result
+
+
+KinematicRecord = tuple
+FULL_TURN = 2.0 * np.pi
+
+
+class RecordedMotion:
+    """Records of bodies and frames at every output time, with true accelerations; arrays (n,) for each number.
+
+    ``wound``: body -> whole turns [rad] that its coordinates count and its angle does not (`Result.wound`). Without
+    ``vdot`` nobody will ask for accelerations.
+    """
+
+    def __init__(
+        self, x: Values, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None, wound: Mapping[str, float] | None = None
+    ) -> None:
+        self.x, self.q = x, q
+        self.n = len(q)
+        S = x.system
+        nb, nv = len(S.tree.parent), v.shape[1]
+        own = [] if vdot is None else [vdot]
+        self.dtype = np.result_type(q, v, *own, S.const)  # complex for derivatives
+        self.W = BodyKinematicsOverTime(self.zeros(nb, 24), self.zeros(nv, 6), self.zeros(nb, 3))
+        if self.dtype == float:
+            one = BodyKinematics(np.zeros((nb, 24)), np.zeros((nv, 6)), np.zeros((nb, 3)))
+            q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)
+            kinematics_over_time(BodyTables(S.tree, S.bodies), one, q, v, self.W)
+        else:
+            for b in range(nb):
+                body_pose(S, self.W, b, q.T)
+                body_motion(S, self.W, b, v.T)
+        if vdot is not None:
+            self._accelerate(vdot.T)
+        self._frames: dict[int, KinematicRecord] = {}
+        self._names = {b: name for name, b in x.structure.place.items() if b >= 0}
+        self._wound = wound or {}
+
+    def zeros(self, *shape: int) -> np.ndarray:
+        """Nothing yet, at every time."""
+        return np.zeros((*shape, self.n), self.dtype)
+
+    def _accelerate(self, vdot: np.ndarray) -> None:
+        """Make the bias accelerations in W.BK true ones.
+
+        What is missing passes from parent to child as if they were one body, and every twist column adds its vdot.
+        """
+        S, W = self.x.system, self.W
+        missing: list[tuple[tuple, tuple]] = []
+        for b in range(len(S.tree.parent)):
+            p, _, _, _, bias_alpha, bias_a = load_record(W.BK, b)
+            alpha = a = (0.0, 0.0, 0.0)
+            parent = int(S.tree.parent[b])
+            if parent >= 0:
+                alpha, a = missing[parent]
+                a = add(a, cross(alpha, sub(p, load3(W.BK, parent, 0))))
+            arm = sub(p, load3(W.O, b, 0))
+            for i in range(S.tree.nv[b]):
+                turn, shift = twist_column(S, W, b, i)
+                s = vdot[S.tree.v[b] + i]
+                alpha = add(alpha, scale(s, turn))
+                a = add(a, scale(s, add(shift, cross(turn, arm))))
+            missing.append((alpha, a))
+        for b, (alpha, a) in enumerate(missing):
+            _, _, _, _, bias_alpha, bias_a = load_record(W.BK, b)
+            store3(W.BK, b, 18, add(bias_alpha, alpha))
+            store3(W.BK, b, 21, add(bias_a, a))
+
+    def body(self, b: int) -> KinematicRecord:
+        """Record of body b's centre of mass."""
+        return load_record(self.W.BK, b)
+
+    def bodies(self, b: Sequence[int] | np.ndarray) -> KinematicRecord:
+        """Records of several bodies' centres of mass: arrays (bodies, n)."""
+        return load_record(self.W.BK[b].swapaxes(0, 1)[None], 0)
+
+    def frame(self, k: int) -> KinematicRecord:
+        """Record of frame k."""
+        if k not in self._frames:
+            S = self.x.system
+            offset, turn = load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
+            b = int(S.frame_body[k])
+            self._frames[k] = self.carried(b, offset, turn)
+        return self._frames[k]
+
+    def forget(self) -> None:
+        """Keep no frames; they are found again when they are asked for."""
+        self._frames.clear()
+
+    def carried(self, b: int, offset: tuple, turn: tuple) -> KinematicRecord:
+        """Record of a point and axes carried by body b (-1: ground)."""
+        if b >= 0:
+            return attached_record(self.body(b), offset, turn)
+        zero = self.zeros()
+        p, R, *rest = stationary_record(offset, turn, zero)
+        return (tuple(x + zero for x in p), tuple(x + zero for x in R), *rest)
+
+    def placed(self, name: str) -> tuple[int, tuple, tuple]:
+        """Body (-1: ground) that carries a named frame, or a body's own; its origin and axes on that body."""
+        p, R = self.x.poses.named(name)
+        e = self.x.structure.model[name]
+        body = e.body if isinstance(e, Frame) else name
+        b = self.x.bodies[body]
+        offset, turn = matrix_product(b.R.T, p - b.c), matrix_product(b.R.T, R)
+        return self.x.structure.place[body], tuple(offset.tolist()), tuple(turn.ravel().tolist())
+
+    def named(self, name: str) -> KinematicRecord:
+        """Record of a named frame, or of a body's own frame."""
+        return self.carried(*self.placed(name))
+
+    def angle(self, b: int) -> np.ndarray:
+        """Turned angle [rad] of body b (-1: ground) of a planar mechanism, whole turns counted; (n,).
+
+        It is the drawn angle in the drawn configuration and goes on from there, whichever coordinates are below.
+        """
+        if b < 0:
+            return self.zeros()
+        return self._angles[self._names[b]] - self._wound.get(self._names[b], 0.0)
+
+    @cached_property
+    def _angles(self) -> dict[str, np.ndarray]:
+        """What the coordinates make of every body's angle."""
+        return turned_angles(self.x, self.W, self.q.T)
+
+    def reference_angle(self, b: int) -> float:
+        """Angle [rad] of body b (-1: ground) of a planar mechanism as drawn, whole turns counted."""
+        return 0.0 if b < 0 else self.x.bodies[self._names[b]].angle
+
+
+def extra_turns(coordinate_angles: Mapping[str, float], angles: Mapping[str, float]) -> dict[str, float]:
+    """Whole turns that coordinates count and the angles of bodies do not.
+
+    A joint that is told to begin two turns on has them in its coordinate where that is one of the mechanism's; the
+    bodies are no further on for it.
+
+    Parameters
+    ----------
+    coordinate_angles : mapping
+        Body -> its turned angle [rad] at the start of a planar motion, as its coordinates have it.
+    angles : mapping
+        Body -> its turned angle there.
+
+    Returns
+    -------
+    dict
+        Body -> how far its coordinates are ahead [rad]; those that are not are left out.
+    """
+    ahead = {k: FULL_TURN * round((coordinate_angles[k] - a) / FULL_TURN) for k, a in angles.items()}
+    return {name: float(more) for name, more in ahead.items() if more != 0.0}
+
+
+def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, Any], tuple[int, Any], Coordinate]:
+    """(frame, extra turn or ()) twice: what a joint's coordinate is measured between, from its frames F and M."""
+    c = joint.coordinates[what]
+    ends = []
+    for role in c.frames:
+        turn = getattr(c, f"turn_{role}")
+        ends.append((x.structure.frame_at[joint.name, role, ""], turn))
+    return ends[0], ends[1], c
+
+
+def turned_record(record: KinematicRecord, turn: Any) -> KinematicRecord:
+    """The record with its axes turned by a constant rotation, if there is one."""
+    if not len(turn):
+        return record
+    return (record[0], mm(record[1], tuple(np.asarray(turn).ravel())), *record[2:])
+
+
+Wrench = tuple[tuple, tuple]
+
+
+def term_over_time(result: Result, k: int) -> tuple[KinematicRecord, KinematicRecord, tuple]:
+    """Records of frames F and M of term k, and what its formula says of them.
+
+    That is value, force on M at M's origin (the reverse acts at F's on F's body), torque on M's body, torque on F's
+    body, acceleration bias; without its coefficient. The records have no accelerations but those with every vdot zero.
+    """
+    x = result.values
+    t = x.structure.terms[k]
+    F, M = result.motions.frame(t.F), result.motions.frame(t.M)
+    hint: Any = result.states[:, t.hint] if t.hint >= 0 else 0.0
+    kind, par = t.formula.of_kind, row_parameters(x.system.term_parameters, k)
+    if kind.single:
+        return F, M, _time_by_time(kind.row, par, (F, M, hint + result.motions.zeros()), x.system.const)
+    return F, M, kind.row(par, F, M, hint, x.system.const)
+
+
+def _time_by_time(
+    row: Any, par: tuple, over: tuple[KinematicRecord, KinematicRecord, np.ndarray], const: np.ndarray
+) -> tuple:
+    """What a formula gives at one time after another, as arrays over time."""
+    F, M, hint = over
+    n = len(hint)
+    sides = [[tuple(np.broadcast_to(np.stack(np.broadcast_arrays(*x), -1), (n, len(x)))) for x in r] for r in (F, M)]
+    one = [row(par, *(tuple(tuple(x[i]) for x in r) for r in sides), hint[i], const) for i in range(n)]
+    parts = zip(*one, strict=True) if one else ((), (), (), (), ())
+    value, force, on_M, on_F, bias = (np.array(x, hint.dtype) for x in parts)
+    return value, *(tuple(x.reshape(n, 3).T) for x in (force, on_M, on_F)), bias
+
+
+def term_coefficient(result: Result, k: int) -> float:
+    """What term k counts in its row or measured quantity."""
+    return result.values.system.term_parameters[k, COEFFICIENT]
+
+
+def unit_effort_wrench(result: Result, joint: Joint, what: str) -> Wrench:
+    """Force and torque on ``body_j``, about M's origin, of a unit effort along a joint's coordinate."""
+    (i, turn_i), (j, turn_j), c = coordinate_frames(result.values, joint, what)
+    F, M = turned_record(result.motions.frame(i), turn_i), turned_record(result.motions.frame(j), turn_j)
+    par = (*c.row.par[:6], 0.0, 0.0)
+    _, f, tM, tF, _ = c.row.of_kind.row(par, F, M, 0.0, result.values.system.const)
+    force, torque = (f, tM) if c.frames[1] == "M" else (neg(f), tF)
+    return scale(c.sign, force), scale(c.sign, torque)
+
+
+def zero_wrench(records: RecordedMotion) -> Wrench:
+    """No wrench at all, at every time."""
+    zero = records.zeros()
+    return (zero,) * 3, (zero,) * 3
+
+
+class MeasuredQuantities:
+    """What forces act along and what laws name."""
+
+    def __init__(self, result: Result) -> None:
+        self._result = result
+        self._known: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def quantity(self, m: int) -> tuple[np.ndarray, np.ndarray]:
+        """Value and rate of quantity m over time."""
+        if m not in self._known:
+            self._known[m] = self._found(m)
+        return self._known[m]
+
+    @cached_property
+    def _terms(self) -> dict[int, list[int]]:
+        """Terms of every quantity."""
+        s = self._result.values.structure
+        out: dict[int, list[int]] = {m: [] for m in range(len(s.measured))}
+        for k, t in enumerate(s.terms):
+            if t.measured:
+                out[t.row - len(s.rows)].append(k)
+        return out
+
+    def _found(self, m: int) -> tuple[np.ndarray, np.ndarray]:
+        value, rate = self._result.motions.zeros(), self._result.motions.zeros()
+        for k in self._terms[m]:
+            F, M, (g, f, tM, tF, _) = term_over_time(self._result, k)
+            c = term_coefficient(self._result, k)
+            value = value + c * g
+            rate = rate + c * (dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2]))
+        return value, rate
+
+    @cached_property
+    def slots(self) -> np.ndarray:
+        """What laws read: (3, slots, n): values, rates as values of their own, loads and forces (not these),
+        states of controllers, ways of switches.
+        """
+        s = self._result.values.structure
+        n, switches = len(s.measured), len(s.switches)
+        first = 2 * n + len(s.loads) + force_reading_count(s)
+        out = self._result.motions.zeros(3, first + len(s.controls) + switches)
+        if s.controls:
+            out[0, first : first + len(s.controls)] = self._result.states[:, : len(s.controls)].T
+        if s.slots or switches:
+            for m in range(n):
+                out[0, m], out[1, m] = self.quantity(m)
+                out[0, n + m] = out[1, m]
+        if switches and self._result.phases is not None:
+            out[0, -switches:] = self._result.phases.sigma
+        return out

@@ -1,0 +1,193 @@
+"""Derivatives of eigenvalues by parameters, as described or at the equilibrium, with controllers, sampled too.
+
+The system matrix is exact, its derivatives are differences of sixth order of it; then dw = y^H dA x / y^H x
+(Lancaster 1964), groups of equal eigenvalues together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..derivatives.eigenvalues import EQUAL_TOLERANCE, MAX_SPLITTING, equal_groups, invariant_subspace
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
+from ..derivatives.nonsmooth_points import refuse_nonsmooth
+from ..errors import ModelError, SingularityError
+from ..linear.linearize import LinearizeOptions, controlled_linear_model, equations_without_inputs
+from ..linear.operating_point import operating_state
+from ..results.linear_model import sort_branches
+from ..results.sensitivity_and_optimum import Sensitivity
+from ..statics.equilibrium import LINEARIZE_DEFAULTS, equilibrium, rest_options
+from .parameter_derivatives import DerivativeRequest, ParameterFunction, difference_derivative, offset_sample
+
+
+def eigenvalue_sensitivity(a: DerivativeRequest) -> Sensitivity:
+    """Eigenvalues and their derivatives; of sampled controllers multipliers from one cycle to the next."""
+    matrix, unit = _closed_loop_matrix(a) if a.model.controllers else _mechanism_matrix(a)
+    base = matrix(a.parameters)
+    dA = np.array([difference_derivative(a.model, a.parameters, name, matrix) for name in a.to])
+    w, dw = eigenvalue_derivatives(
+        base, dA.reshape(len(a.to), *base.shape), lambda k: offset_sample(a.model, a.parameters, a.to[k], matrix)
+    )
+    of = tuple(f"eigenvalue {k}" for k in range(len(w)))
+    return Sensitivity("modes", of, a.to, (unit,) * len(of), {}, np.array([a.t]), w[None], dw[None])
+
+
+def eigenvalue_function(a: DerivativeRequest) -> ParameterFunction:
+    """The eigenvalues for any parameters, in the order of those that they were."""
+    matrix, _ = _closed_loop_matrix(a) if a.model.controllers else _mechanism_matrix(a)
+    A = matrix(a.parameters)
+    first, _ = eigenvalue_derivatives(A, np.zeros((0, *A.shape)))
+
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        return sort_branches(np.array([first, np.linalg.eigvals(matrix(parameters)).astype(complex)]))[1]
+
+    return found
+
+
+def _mechanism_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
+    """The matrix of a mechanism without controllers, in the free coordinates that it has at first; its unit."""
+    about = _equilibrium_by_parameters(a)
+
+    def state(parameters: Mapping[str, float]) -> MechanismState:
+        return operating_state(a.model, about(parameters), t=a.t, parameters=parameters, coordinates="absolute")[0]
+
+    begin = state(a.parameters)
+    f, _, _ = equations_without_inputs(begin)
+    refuse_nonsmooth(EquationDerivatives(begin), np.zeros((len(begin.v), 1)), np.zeros((len(begin.v), 1)), a.to)
+    return lambda parameters: equations_without_inputs(state(parameters), like=f)[2].A, "1/s"
+
+
+def _closed_loop_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
+    """The matrix of the closed loop, and its unit: none if it leads from one sample to another."""
+    about = _equilibrium_by_parameters(a)
+
+    def linear(parameters: Mapping[str, float]) -> Any:
+        place = about(parameters)
+        given = {"about": place, "t": None if place else a.t, "parameters": parameters, "coordinates": "absolute"}
+        return controlled_linear_model(a.model, LinearizeOptions(**(LINEARIZE_DEFAULTS | given)))[0]
+
+    first = linear(a.parameters)
+
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        now = linear(parameters)
+        if now.states != first.states:
+            raise ModelError(f"the states there are {', '.join(now.states)}, and were {', '.join(first.states)}")
+        return now.A
+
+    return found, "" if first.period else "1/s"
+
+
+def _equilibrium_by_parameters(a: DerivativeRequest) -> Callable[[Mapping[str, float]], Any]:
+    """The equilibrium for any parameters, near the first; None where eigenvalues are of the mechanism as drawn."""
+    begin: list[Any] = []
+
+    def about(parameters: Mapping[str, float]) -> Any:
+        if a.about != "equilibrium":
+            return None
+        begin.append(equilibrium(a.model, rest_options(a.t, parameters, begin[0] if begin else None)))
+        return begin.pop() if len(begin) > 1 else begin[0]
+
+    return about
+
+
+# How eigenvalues change with a matrix: dw = y^H dA x / y^H x (Lancaster 1964), groups of equal ones together.
+#
+# Where an eigenvalue is repeated with as many eigenvectors, its first changes are the eigenvalues of dA within them.
+# Where it has too few, it has no derivative, unless all stay zero: a mechanism that can move away as a whole has two
+# zeros and keeps them. Whether they stay is looked up a finite step aside.
+
+
+MATRIX_ROUNDING = 100.0 * np.finfo(float).eps  # of the matrix' size: what is uncertain of it
+IDENTITY_TOLERANCE = (
+    1e-6  # part of the matrix' size by which a group of equal eigenvalues differs from a multiple of the identity
+)
+STAYED_FRACTION = 1e-3  # of what dA would do to a group in a finite step: eigenvalues that moved less have stayed
+
+OffsetSample = Callable[[int], tuple[float, np.ndarray, str]]
+
+
+def eigenvalue_derivatives(
+    A: np.ndarray, dA: np.ndarray, aside: OffsetSample | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues and their derivatives.
+
+    Parameters
+    ----------
+    A : ndarray (n, n)
+    dA : ndarray (k, n, n)
+        Derivatives of A by k parameters.
+    aside : callable
+        Gives for the k-th parameter a finite step, A that far aside, and the parameter's name.
+
+    Returns
+    -------
+    w : ndarray (n,)
+        Sorted by absolute and imaginary value.
+    dw : ndarray (n, k)
+
+    Raises
+    ------
+    SingularityError
+        If an eigenvalue has no derivative.
+    """
+    from scipy.linalg import eig, matrix_balance
+
+    if not len(A):
+        return np.zeros(0, complex), np.zeros((0, len(dA)), complex)
+    B, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    dB = dA / scale[:, None] * scale
+    w, left, right = eig(B, left=True)
+    order = np.lexsort((w.imag, np.abs(w)))
+    w, left, right = w[order], left[:, order], right[:, order]
+    size = float(np.linalg.norm(B, 2)) or 1.0
+    out = np.zeros((len(w), len(dA)), complex)
+    angle = np.abs((left.conj() * right).sum(axis=0))
+    for group in equal_groups(
+        w, size * np.clip(MATRIX_ROUNDING / np.maximum(angle, 1e-300), EQUAL_TOLERANCE, MAX_SPLITTING)
+    ):
+        if len(group) == 1:
+            y, x = left[:, group[0]], right[:, group[0]]
+            out[group[0]] = np.array([y.conj() @ d @ x for d in dB]) / (y.conj() @ x)
+        else:
+            out[group] = _group_derivatives(B, dB, w, group, size, scale, aside)
+    return w.astype(complex), out
+
+
+def _group_derivatives(
+    B: np.ndarray,
+    dB: np.ndarray,
+    w: np.ndarray,
+    group: list[int],
+    size: float,
+    scale: np.ndarray,
+    aside: OffsetSample | None,
+) -> np.ndarray:
+    """Derivatives of equal eigenvalues, (group, k)."""
+    V, W = (invariant_subspace(X, v) for X, v in ((B, w[group]), (B.conj().T, w[group].conj())))
+    inner = np.linalg.inv(W.conj().T @ V)
+    own = inner @ (W.conj().T @ B @ V)
+    plain = np.abs(own - np.trace(own) / len(group) * np.eye(len(group))).max() <= IDENTITY_TOLERANCE * size
+    out = np.zeros((len(group), len(dB)), complex)
+    for k, d in enumerate(dB):
+        inside = inner @ (W.conj().T @ d @ V)
+        if plain:
+            found = np.linalg.eigvals(inside)
+            out[:, k] = found[np.lexsort((found.imag, found.real))]
+        elif aside is not None:
+            h, other, name = aside(k)
+            value, spread = complex(np.mean(w[group])), float(np.abs(w[group]).max())
+            then = np.abs(np.linalg.eigvals(other / scale[:, None] * scale))
+            moved = np.sort(then)[: len(group)].max()  # as many as are zero now, if they are
+            stayed = moved <= max(
+                STAYED_FRACTION * h * np.abs(inside).max(), 10.0 * spread, np.sqrt(MATRIX_ROUNDING) * size
+            )
+            if abs(value) <= np.sqrt(MATRIX_ROUNDING) * size and stayed:
+                continue
+            raise SingularityError(
+                f"the eigenvalue {value.real:.4g}{value.imag:+.4g}j 1/s is {len(group)}-fold and has fewer "
+                f"eigenvectors: it has no derivative by {name!r}. Ask a little to the side of this value"
+            )
+    return out

@@ -1,0 +1,467 @@
+"""Derivatives by parameters: of a state and the initial state, and of any quantity by differences.
+
+Central differences are of sixth order where a derivative is wanted, of second where one is checked. The step begins
+as a part of the parameter and is made smaller or larger until the differences of sixth and of fourth order agree
+best.
+
+Along a change (dq, dv, dp) of positions, velocities and a parameter one complex step through the residuals gives
+what the constraints and the equations of motion miss, exactly; accelerations and multipliers follow by
+
+    M dvdot + (F - G^T) dlam = -(r along (dq, dv, dp)),    G dvdot = -(a along (dq, dv, dp))
+
+F is the dependence of joint friction on reactions. The initial state changes by the constraints alone where drivers
+leave no freedom; elsewhere it is the described positions and velocities, put on the constraints by steps of least
+size, and so are its changes. Where assembly moved the mechanism farther, its result is differenced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..assembly.assemble import assemble
+from ..assembly.assembled_state import Assembly
+from ..assembly.compiled_mechanism import compile_mechanism, tangent_rate, tangent_step
+from ..assembly.positions_and_velocities import (
+    VelocityEquations,
+    described_velocities,
+    inverse_weights,
+    row_scales,
+    velocity_deviation,
+)
+from ..derivatives.equation_derivatives import (
+    COMPLEX_STEP,
+    EquationDerivatives,
+    MechanismState,
+    complex_step_derivative,
+    complex_system,
+    complex_tables,
+    friction_by_multipliers,
+    refuse_undetermined_friction,
+)
+from ..derivatives.equation_derivatives import COMPLEX_STEP as COMPLEX
+from ..engine.entry_point import allocate_work
+from ..engine.kinematics import BodyKinematicsOverTime, joint_velocities, retract
+from ..engine.residual import evaluate_residuals
+from ..errors import AnalysisError, ModelError
+from ..model.model import Model
+from ..numerics.rank import RANK_TOLERANCE
+from ..results.recorded_kinematics import RecordedMotion
+from ..simulation.initial_state import InitialState
+from ..simulation.prescribed_motion import leaves_no_freedom
+from ..tables.reference_configuration import BodyState, positions
+from ..tables.structure_definition import velocity_names
+from ..tables.table_definitions import named_arrays
+from ..tables.values import Values, values
+
+
+@dataclass
+class DerivativeRequest:
+    """What is asked: of which quantities, by which parameters, where."""
+
+    model: Model
+    of: tuple[str, ...]
+    to: tuple[str, ...]
+    t: float
+    parameters: dict[str, float]
+    times: np.ndarray
+    about: str | None
+    rtol: float
+    atol: float
+    coordinates: str
+
+
+DIFFERENCE_STEP, CHECK_STEP = 2e-3, 1e-5  # of the parameter
+SIXTH_ORDER = np.array([0.75, -0.15, 1.0 / 60.0])
+FOURTH_ORDER = np.array([2.0 / 3.0, -1.0 / 12.0, 0.0])
+AGREEMENT = 1e-9  # of the derivative
+DIFFERENCE_ROUNDING = 1e-11  # of what is differenced
+MAX_STEP_CHANGES = 7
+
+ParameterFunction = Callable[[Mapping[str, float]], np.ndarray]
+
+
+def difference_derivative(
+    model: Model, parameters: Mapping[str, float], name: str, found: ParameterFunction
+) -> np.ndarray:
+    """Derivative by a parameter of what a function makes of the parameters; sixth order.
+
+    Raises
+    ------
+    AnalysisError, ModelError
+        That of the function, if it fails however small the step is.
+    """
+    value = model.environment(parameters)[name]
+
+    def at(h: float) -> tuple[float, np.ndarray, bool]:
+        sides = [[found({**parameters, name: value + s * k * h}) for s in (1, -1)] for k in (1, 2, 3)]
+        D = np.array([a - b for a, b in sides])
+        best, other = (np.tensordot(weights, D, 1) / h for weights in (SIXTH_ORDER, FOURTH_ORDER))
+        error, size = (float(np.abs(X).max(initial=0.0)) for X in (best - other, best))
+        largest = max(float(np.abs(a).max(initial=0.0)) for pair in sides for a in pair)
+        if error <= AGREEMENT * size:
+            error = 0.0
+        return error, best, error * h <= DIFFERENCE_ROUNDING * largest
+
+    h = DIFFERENCE_STEP * parameter_scale(model, parameters, name)
+    best: tuple[float, np.ndarray] | None = None
+    way = 0.1
+    for _ in range(MAX_STEP_CHANGES):
+        try:
+            error, found_, rounded = at(h)
+        except (AnalysisError, ModelError) as error_:  # of a model: what a parameter so far off makes of it is none
+            if type(error_) is AnalysisError:  # what is asked for is not there aside: no smaller step makes it so
+                raise AnalysisError(f"a little to the side of {name!r} = {value:g}, {error_}") from None
+            if way > 1.0:
+                break
+            h *= way
+            continue
+        better = best is None or error < best[0]
+        if better:
+            way = 10.0 if best is None and rounded else way
+            best = error, found_
+        if error == 0.0 or (rounded and way < 1.0) or (not better and way > 1.0):
+            break
+        h *= way
+    return at(h)[1] if best is None else best[1]
+
+
+def offset_sample(
+    model: Model, parameters: Mapping[str, float], name: str, found: ParameterFunction
+) -> tuple[float, np.ndarray, str]:
+    """The step with which differences begin, what is found that far aside, and the parameter's name."""
+    h = DIFFERENCE_STEP * parameter_scale(model, parameters, name)
+    return h, found({**parameters, name: model.environment(parameters)[name] + h}), name
+
+
+def small_step_derivative(
+    model: Model, parameters: Mapping[str, float], name: str, found: ParameterFunction
+) -> np.ndarray:
+    """The same with one small step, second order."""
+    value = model.environment(parameters)[name]
+    h = CHECK_STEP * parameter_scale(model, parameters, name)
+    return (found({**parameters, name: value + h}) - found({**parameters, name: value - h})) / (2.0 * h)
+
+
+def parameter_scale(model: Model, parameters: Mapping[str, float], name: str) -> float:
+    """The parameter itself; if it is zero, the change of it that changes something of the mechanism by the whole.
+
+    Places count as parts of the mechanism's length, other numbers as parts of the largest of their kind.
+    """
+    value = float(np.real(model.environment(parameters)[name]))
+    if value:
+        return abs(value)
+    c = compile_mechanism(model, parameters=parameters)
+    v = values(c.structure, {**c.parameters, name: complex(value, COMPLEX)})
+    length = c.values.length
+    scales = [(v.system.frames.position, length)]
+    places = np.array([n.unit == "m" for n in velocity_names(c.structure)])
+    scales += [(v.v[places], length), (v.v[~places], 1.0), (v.q, length)]
+    for table in ("bodies", "term_parameters", "force_parameters", "gravity", "units"):
+        for _, x in named_arrays(getattr(v.system, table)):
+            columns = np.atleast_2d(x.T)
+            scales += [(x, np.abs(x.real).max()) for x in columns if len(x) and np.abs(x.real).max() > 0.0]
+    effect = max((float(np.abs(np.imag(x)).max(initial=0.0)) / COMPLEX / s for x, s in scales), default=0.0)
+    return 1.0 / effect if effect > 0.0 else 1.0
+
+
+REMAINING_GAP = 1e-7  # part of the gaps that a parameter opens which is left where no motion closes them
+GAP_ROUNDING = 1e-9  # part of the mechanism's length below which gaps that the whole of a parameter opens are none
+
+
+@dataclass
+class StateDerivative:
+    """Changes per unit of a parameter: of positions along the velocities, of velocities, accelerations, multipliers."""
+
+    q: np.ndarray
+    v: np.ndarray
+    vdot: np.ndarray
+    lam: np.ndarray
+
+    @property
+    def parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """As rows, for `output_derivatives.curve_derivatives`."""
+        return self.q[None], self.v[None], self.vdot[None], self.lam[None]
+
+
+class ParameterDirection:
+    """A parameter's complex step in the tables, and the residuals along it at any state."""
+
+    def __init__(self, e: EquationDerivatives, name: str) -> None:
+        self.name = name
+        self.values: Values = e.stepped(name)
+        self.system = complex_system(self.values.system)
+        self.work = allocate_work(e.state.c.structure, self.system, complex)
+        self.e = e
+
+    @staticmethod
+    def derivative(x: np.ndarray) -> np.ndarray:
+        """By the parameter, of numbers that carry its step."""
+        return complex_step_derivative(x)
+
+    def along(self, x: MechanismState, dq: np.ndarray, dv: np.ndarray) -> np.ndarray:
+        """Derivatives of all residuals at x along changes of positions and velocities and the parameter, (width,)."""
+        nv = len(x.v)
+        steps = np.zeros((1, 3 * nv + 1), complex)
+        steps[0, :nv], steps[0, nv : 2 * nv] = 1j * COMPLEX_STEP * dq, 1j * COMPLEX_STEP * dv
+        out = np.zeros((1, self.e.width), complex)
+        y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
+        evaluate_residuals(self.system, self.work, complex(x.t), y, vdot, lam, steps, out)
+        return complex_step_derivative(out[0])
+
+
+class ConstrainedSystem:
+    """Mass matrix and constraints at a state, ready to be solved with."""
+
+    def __init__(self, x: MechanismState, M: np.ndarray | None = None) -> None:
+        c = x.c
+        c.at(x.t, x.q, x.v)
+        self.x = x
+        self.G = c.jacobian()
+        self.M = c.mass().toarray() if M is None else M
+        self.which = np.array([r.holonomic for r in c.structure.rows], bool)
+        self.scale = np.array([1.0 / np.sqrt(m) if m > 0.0 else 1.0 for m in np.diag(self.M)])
+        n, m = len(self.M), len(self.G)
+        self.A = np.zeros((n + m, n + m))
+        S = self.scale
+        self.A[:n, :n] = S[:, None] * self.M * S
+        H = self.G * S
+        self.size = 1.0 / np.maximum(np.sqrt((H * H).sum(axis=1)), 1e-300)
+        self.H = self.size[:, None] * H
+        self.A[:n, n:], self.A[n:, :n] = -self.H.T, self.H
+        self._inverses: dict[bytes, np.ndarray] = {}
+
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """Pseudo-inverse of the equations of motion with the constraints: rows may be redundant."""
+        A = self.A
+        if self.x.c.structure.loads:
+            n, F = len(self.M), reaction_friction(self.x, self.G)
+            A = A.copy()
+            A[:n, n:] += self.scale[:, None] * F * self.size
+        return np.linalg.pinv(A, rcond=1e-12)
+
+    def motion(self, right: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
+        """The change x with G x = right that is smallest in kinetic energy."""
+        rows = np.ones(len(self.H), bool) if which is None else which
+        key = rows.tobytes()
+        if key not in self._inverses:
+            self._inverses[key] = np.linalg.pinv(self.H[rows], rcond=RANK_TOLERANCE) if rows.any() else self.H[rows].T
+        return self.scale * (self._inverses[key] @ (self.size * right)[rows])
+
+    def acceleration(self, r: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(dvdot, dlam) that take away what is missed of the equations of motion and of the constraints."""
+        n = len(self.M)
+        x = self.inverse @ -np.r_[self.scale * r, self.size * a]
+        return self.scale * x[:n], self.size * x[n:]
+
+
+def reaction_friction(x: MechanismState, G: np.ndarray) -> np.ndarray:
+    """What joint friction makes of the reactions, F (nv, rows); refused where redundancy leaves these open."""
+    s = x.c.structure
+    F = friction_by_multipliers(x, *complex_tables(x.c))
+    turns = np.array([1.0 if d.unit == "m" else 1.0 / x.c.values.length for d in velocity_names(s)])
+    refuse_undetermined_friction(s, G * turns, F)
+    return F
+
+
+def consistent_changes(
+    d: ParameterDirection, x: MechanismState, lin: ConstrainedSystem, dq: np.ndarray, dv: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The changes of positions and velocities nearest to the given ones that keep the constraints.
+
+    Raises
+    ------
+    ModelError
+        If none keep them: with another value of the parameter the mechanism cannot be assembled.
+    """
+    at = d.e.at
+    before = d.along(x, dq, dv)[at["g"]]
+    dq = dq + lin.motion(-before, lin.which)
+    left = d.along(x, dq, dv)
+    _refuse_inconsistent(d, x, np.abs(before), np.abs(left[at["g"]]))
+    return dq, dv + lin.motion(-left[at["n"]])
+
+
+def _refuse_inconsistent(d: ParameterDirection, x: MechanismState, before: np.ndarray, remaining: np.ndarray) -> None:
+    """Refuse a parameter whose change opens gaps (rows,) that no motion closes."""
+    c = x.c
+    rounding = GAP_ROUNDING * c.values.length / parameter_scale(c.structure.model, c.parameters, d.name)
+    if remaining.max(initial=0.0) > max(REMAINING_GAP * before.max(initial=0.0), rounding):
+        names = dict.fromkeys(
+            r.element.name for r, g in zip(c.structure.rows, remaining, strict=True) if g > 0.1 * remaining.max()
+        )
+        raise ModelError(
+            f"{c.structure.model.name!r} cannot be assembled with another {d.name!r}: {', '.join(names)} would "
+            f"contradict each other (redundant joints, or a singular position), so nothing has a derivative by it. Let "
+            f"what else has to fit follow the parameter, or take the redundancy out: m.mobility() names it"
+        )
+
+
+def consistent_derivative(
+    d: ParameterDirection, x: MechanismState, lin: ConstrainedSystem, dq: np.ndarray, dv: np.ndarray
+) -> StateDerivative:
+    """The tangent whose positions and velocities are nearest to the given ones and keep the constraints."""
+    at = d.e.at
+    dq, dv = consistent_changes(d, x, lin, dq, dv)
+    left = d.along(x, dq, dv)
+    return StateDerivative(dq, dv, *lin.acceleration(left[at["r"]], left[at["a"]]))
+
+
+DESCRIBED_TOLERANCE = (
+    1e-12  # difference of the start from what is described, of the mechanism's length or the largest velocity
+)
+
+
+def initial_state_derivatives(
+    model: Model,
+    parameters: Mapping[str, float],
+    base: Assembly,
+    x: MechanismState,
+    directions: Sequence[ParameterDirection],
+) -> list[StateDerivative]:
+    """Changes of the start with each parameter, with accelerations and multipliers; see `initial_changes`."""
+    lin = ConstrainedSystem(x)
+    pairs = initial_changes(model, parameters, base, x, directions, lin)
+    return [consistent_derivative(d, x, lin, *pair) for d, pair in zip(directions, pairs, strict=True)]
+
+
+def initial_changes(
+    model: Model,
+    parameters: Mapping[str, float],
+    base: Assembly,
+    x: MechanismState,
+    directions: Sequence[ParameterDirection],
+    lin: ConstrainedSystem,
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Changes of positions and velocities of the start with each parameter.
+
+    Parameters
+    ----------
+    model : Model
+    parameters : mapping
+        Values in place of the model's.
+    base : Assembly
+        The start.
+    x : State
+        The same with accelerations and multipliers.
+    directions : sequence of Direction
+        Parameters.
+    lin : Linear
+        The constraints there.
+    """
+    still = np.zeros(len(x.v))
+    if is_fully_driven(base):
+        return [consistent_changes(d, x, lin, still, still) for d in directions]
+    if is_as_described(model, base):
+        return [consistent_changes(d, x, lin, *_described_changes(d, base, x)) for d in directions]
+
+    def found(p: Mapping[str, float]) -> np.ndarray:
+        b = assemble(model, t=base.t, parameters=p)
+        return np.r_[tangent_step(base.compiled, base.q, b.q), b.v]
+
+    return [
+        consistent_changes(d, x, lin, *np.split(difference_derivative(model, parameters, d.name, found), 2))
+        for d in directions
+    ]
+
+
+def is_fully_driven(base: Assembly) -> bool:
+    """Whether drivers leave no freedom."""
+    return leaves_no_freedom(InitialState(base, base, base.y, "", {}))
+
+
+def is_as_described(model: Model, base: Assembly) -> bool:
+    """Whether the start is what the description says, to rounding, or all that it leaves open follows from it."""
+    drawn = base.compiled.values
+    apart = np.abs(tangent_step(base.compiled, drawn.q, base.q) / base.compiled.sizes).max(initial=0.0)
+    if apart > DESCRIBED_TOLERANCE or model.initial:
+        return False
+    return bool(_has_no_added_velocity(base)) or (
+        _velocity_targets(base).determined and not any(d.given for d in base.departures)
+    )
+
+
+def _has_no_added_velocity(base: Assembly) -> bool:
+    """Whether velocities that are not described are zero."""
+    sizes = base.compiled.sizes
+    faster = np.abs((base.v - described_velocities(base.compiled.values, base.q)) / sizes).max(initial=0.0)
+    return bool(faster <= DESCRIBED_TOLERANCE * np.abs(base.v / sizes).max(initial=0.0))
+
+
+def _velocity_targets(base: Assembly) -> VelocityEquations:
+    c = base.compiled
+    c.at(base.t, base.q, base.v)
+    return VelocityEquations.at(c, base.q, c.work.rows.nu.copy())
+
+
+def _described_changes(d: ParameterDirection, base: Assembly, x: MechanismState) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of the described positions and velocities, put on the constraints in the way of assembly."""
+    c, at = base.compiled, d.e.at
+    dq = tangent_rate(c, x.q, d.derivative(d.values.q))
+    c.at(x.t, x.q, x.v)
+    rows = row_scales(c)
+    G = rows[:, None] * c.jacobian()
+    which = np.array([r.holonomic for r in c.structure.rows], bool)
+    size = np.sqrt(inverse_weights(c))
+    left = (rows * d.along(x, dq, np.zeros(len(x.v)))[at["g"]])[which]
+    if which.any():
+        dq -= size * np.linalg.lstsq(G[which] * size, left, rcond=RANK_TOLERANCE)[0]
+    q = x.q.astype(complex)
+    retract(d.values.system, q, 1j * COMPLEX_STEP * dq)
+    dv = d.derivative(described_velocities(d.values, q)) if _has_no_added_velocity(base) else np.zeros(len(x.v))
+    w = _velocity_targets(base)
+    if w.G.shape[0]:
+        of_held = [d.derivative(velocity_deviation(d.values, g, q, x.v + 1j * COMPLEX_STEP * dv)) for g in w.held]
+        of_soft = [
+            w.weights[g.name] @ d.derivative(velocity_deviation(d.values, g, q, x.v + 1j * COMPLEX_STEP * dv))
+            for g in w.soft
+        ]
+        missed = np.concatenate([d.along(x, dq, dv)[at["n"]], *of_held])
+        dv += w.steps()(-missed, -np.concatenate([np.zeros(0), *of_soft]))
+    return dq, dv
+
+
+def changes_in_motion_coordinates(
+    start: InitialState, d: ParameterDirection, values: Values, changes: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Changes (nv,), (nv,) of positions, along the velocities, and of velocities.
+
+    Parameters
+    ----------
+    start : Start
+    d : Direction
+        The parameter, in absolute coordinates.
+    values : Values
+        The mechanism's numbers in the coordinates of the motion, a complex step along the parameter.
+    changes : two arrays (nv,), (nv,)
+        The changes in absolute coordinates.
+    """
+    base, c = start.base, start.assembly.compiled
+    if c is base.compiled:
+        return changes
+    bodies = _body_states(start, d.values, changes)
+    q = positions(values, bodies, base.compiled.hints | base.compiled.turned(base.q))
+    still = np.zeros((1, c.structure.nv))
+    W = RecordedMotion(values, q[None], still, still).W
+    v = joint_velocities(values, bodies, BodyKinematicsOverTime(*(part[..., 0] for part in W)))
+    return tangent_rate(c, q.real, complex_step_derivative(q)), complex_step_derivative(v)
+
+
+def _body_states(start: InitialState, values: Values, of: tuple[np.ndarray, np.ndarray]) -> dict[str, BodyState]:
+    """How every body moves at the start, with what the parameter changes as imaginary parts."""
+    base = start.base
+    q = base.q.astype(complex)
+    retract(values.system, q, 1j * COMPLEX_STEP * of[0])
+    v = base.v + 1j * COMPLEX_STEP * of[1]
+    r = RecordedMotion(values, q[None], v[None], np.zeros((1, len(v))))
+    out = {}
+    for name, b in values.structure.place.items():
+        if b >= 0:
+            p, R, w, u, *_ = (np.array(part)[..., 0] for part in r.body(b))
+            angle = q[values.system.tree.q[b] + 2] if values.structure.model.planar else 0.0
+            out[name] = BodyState(p, R.reshape(3, 3), u, w, angle)
+    return out

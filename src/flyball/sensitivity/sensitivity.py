@@ -1,0 +1,416 @@
+"""Sensitivities: exact derivatives of kinematics, reactions, equilibria, eigenvalues and motions by parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..analysis_options import Options, require_positive
+from ..assembly.assemble import assemble
+from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState, values_with_complex_step
+from ..derivatives.nonsmooth_points import refuse_nonsmooth
+from ..derivatives.output_derivatives import (
+    curve_derivatives,
+    curve_derivatives_over_time,
+    depend_on_reactions,
+    refuse_undetermined_outputs,
+    snapshot,
+)
+from ..errors import ModelError, SingularityError
+from ..model.controller_signals import controller_states
+from ..model.element_laws import refuse_jumping_laws, refuse_jumping_rates
+from ..model.expressions import number
+from ..model.model import Model, listing, suggest
+from ..model.quantities import single_quantity
+from ..model.unsupported_elements import refuse_controllers, refuse_unsupported
+from ..results.result import Result
+from ..results.sensitivity_and_optimum import Sensitivity
+from ..simulation.initial_state import find_initial_state, refuse_unknown_coordinates
+from ..simulation.integration_options import default_integration, output_times
+from ..simulation.law_faults import refuse_out_of_table
+from ..simulation.method_choice import SimulateOptions
+from ..simulation.simulate import clock_for, simulate
+from ..statics.controller_states import (
+    AuxiliaryModel,
+    StateScale,
+    auxiliary_model,
+    errors_in_user_terms,
+    initial_state_formulas,
+    refuse_sampled_controllers,
+)
+from ..statics.equilibrium import determined_auxiliary_rest, equilibrium, rest_options
+from ..statics.stability import RestState
+from .eigenvalue_derivatives import eigenvalue_function, eigenvalue_sensitivity
+from .parameter_derivatives import (
+    ConstrainedSystem,
+    DerivativeRequest,
+    ParameterDirection,
+    ParameterFunction,
+    StateDerivative,
+    changes_in_motion_coordinates,
+    initial_changes,
+    initial_state_derivatives,
+    is_fully_driven,
+    parameter_scale,
+    reaction_friction,
+    small_step_derivative,
+)
+from .variational_equations import MotionSensitivity, VariationalIntegration, prescribed_motion_sensitivity
+
+LEAST_STIFFNESS_RATIO = 1e-8  # stiffness, of what acts, below which an equilibrium's place is not determined
+
+
+MOTION_DEFAULTS = {"outputs": 51, "rtol": 1e-9, "atol": 1e-11}  # of a motion, where they are not given
+
+
+@dataclass(frozen=True, kw_only=True)
+class DerivativeOptions(Options):
+    """What derivatives are asked of: quantities, parameters, and the analysis that makes the ones of the others."""
+
+    analysis: str
+    t: float
+    t_end: float | None
+    outputs: int | Sequence[float] | None
+    parameters: Mapping[str, float] | None
+    about: str | None
+    rtol: float | None
+    atol: float | None
+    coordinates: str
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.analysis not in ANALYSES:
+            all_ = list(ANALYSES)
+            raise ModelError(f"unknown analysis {self.analysis!r}{suggest(self.analysis, all_)}; {listing(all_)}")
+        for name in ("t_end", "outputs", "rtol", "atol"):
+            if getattr(self, name) is not None and self.analysis != "motion":
+                raise ModelError(f"{name} is of a motion; with analysis={self.analysis!r} it does nothing")
+        if self.analysis == "motion" and self.t_end is None:
+            raise ModelError("sensitivity of a motion: give t_end")
+        refuse_unknown_coordinates(self.coordinates)
+        if self.coordinates != "auto" and self.analysis != "motion":
+            raise ModelError(f"coordinates are those of a motion; with analysis={self.analysis!r} they do nothing")
+        for name in ("rtol", "atol"):
+            if getattr(self, name) is not None:
+                require_positive(getattr(self, name), name)
+        if self.about is not None and self.analysis != "modes":
+            raise ModelError(f"about is for modes; with analysis={self.analysis!r} it does nothing")
+        if self.about not in (None, "equilibrium"):
+            raise ModelError(f"about must be 'equilibrium' or nothing, got {_value_text(self.about)}")
+
+    def of_motion(self, name: str) -> Any:
+        """An option of a motion, or what is usual."""
+        value = getattr(self, name)
+        return MOTION_DEFAULTS[name] if value is None else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensitivityOptions(DerivativeOptions):
+    """What `Mechanism.sensitivity` is asked."""
+
+    of: tuple[str, ...]
+    to: tuple[str, ...]
+    verify: bool
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.of and self.analysis != "modes":
+            raise ModelError("say which quantities: of=['slider.x'], for instance")
+
+
+def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
+    """Derivatives of quantities with respect to parameters: see `Mechanism.sensitivity`."""
+    if model.controllers:
+        return _with_controllers(model, o)
+    return _computed_sensitivity(model, o)
+
+
+def _computed_sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
+    a = _checked_question(model, o)
+    out = ANALYSES[o.analysis][0](a)
+    env = model.environment(o.parameters)
+    out.parameters = {name: env[name] for name in a.to}
+    return _with_verification(a, o.analysis, out) if o.verify else out
+
+
+def _checked_question(model: Model, o: SensitivityOptions) -> DerivativeRequest:
+    """What is asked, looked through: names there are, of quantities and parameters."""
+    refuse_unsupported(model, "sensitivity", controlled=True)
+    env = model.environment(o.parameters)
+    for name in o.to:
+        if name not in env:
+            raise ModelError(
+                f"{model.name!r} has no parameter {name!r}{suggest(name, list(env))}; {listing(list(env))}"
+            )
+    for name in o.of if o.analysis != "modes" else ():
+        single_quantity(model, name)
+    if not env:
+        raise ModelError(f"{model.name!r} has no parameters to take derivatives by; give it some: parameters={{...}}")
+    return DerivativeRequest(
+        model.snapshot(),
+        o.of,
+        o.to or tuple(env),
+        o.t,
+        dict(o.parameters or {}),
+        np.zeros(0) if o.t_end is None else output_times(o.t, o.t_end, o.of_motion("outputs")),
+        o.about,
+        o.of_motion("rtol"),
+        o.of_motion("atol"),
+        o.coordinates,
+    )
+
+
+def _with_controllers(model: Model, o: SensitivityOptions) -> Sensitivity:
+    """Of a mechanism with controllers: of one that has bodies in their place."""
+    if o.analysis not in ("motion", "equilibrium", "modes") or model.events:
+        refuse_controllers(
+            model, f"sensitivity with analysis={o.analysis!r}" + (", with events," if model.events else "")
+        )
+    if o.analysis != "motion":
+        return _computed_sensitivity(model, o)
+    refuse_sampled_controllers(model, "sensitivity")
+    a = _checked_question(model, o)
+    refuse_jumping_rates(model, a.to)
+    other = moving_copy(model, o.parameters, o.of)
+    named = tuple(other.outputs.get(name, name) for name in o.of)
+    with errors_in_user_terms(other):
+        found = _with_model_names(_computed_sensitivity(other.model, replace(o, of=named, verify=False)), o.of, other)
+    return _with_verification(a, o.analysis, found) if o.verify else found
+
+
+def _with_model_names(found: Sensitivity, of: tuple[str, ...], other: AuxiliaryModel) -> Sensitivity:
+    """What was found of a copy, by the names of the model."""
+    units = ("" if name in other.outputs else u for name, u in zip(of, found.units, strict=True))
+    return replace(found, of=of, units=tuple(units))
+
+
+def _with_verification(a: DerivativeRequest, analysis: str, out: Sensitivity) -> Sensitivity:
+    """With the column of central differences."""
+    again = ANALYSES[analysis][1](a)
+    parts = [small_step_derivative(a.model, a.parameters, name, again) for name in a.to]
+    out.verification = np.stack([x.reshape(out.values.shape) for x in parts], axis=-1)
+    return out
+
+
+def _value_text(value: Any) -> str:
+    """A value in a message: a text as it is, else what kind of thing it is."""
+    return repr(value) if isinstance(value, (str, float, int)) else f"a {type(value).__name__}"
+
+
+def _curve_values(x: MechanismState, names: Sequence[str]) -> np.ndarray:
+    """Values of curves at one state."""
+    shot = snapshot(x)
+    return np.array([float(shot.curve(name)[1][0]) for name in names])
+
+
+def _curve_units(x: MechanismState, names: Sequence[str]) -> tuple[str, ...]:
+    shot = snapshot(x)
+    return tuple(shot.curve(name)[0] for name in names)
+
+
+def _derivative_columns(
+    a: DerivativeRequest,
+    x: MechanismState,
+    directions: Sequence[ParameterDirection],
+    tangents: Sequence[StateDerivative],
+) -> np.ndarray:
+    """Derivatives of the quantities at a state, (of, to)."""
+    refuse_undetermined_outputs(x, a.of)
+    return np.array(
+        [curve_derivatives(x, a.of, d.parts, k.values)[0] for k, d in zip(directions, tangents, strict=True)]
+    ).T
+
+
+def _instant_sensitivity(a: DerivativeRequest) -> Sensitivity:
+    base = assemble(a.model, t=a.t, parameters=a.parameters)
+    x = MechanismState.moving(base.compiled, base.t, base.q, base.v)
+    e = EquationDerivatives(x)
+    directions = [ParameterDirection(e, name) for name in a.to]
+    tangents = initial_state_derivatives(a.model, a.parameters, base, x, directions)
+    _refuse_kinks(a, e, tangents)
+    found = _derivative_columns(a, x, directions, tangents)
+    return Sensitivity(
+        "instant", a.of, a.to, _curve_units(x, a.of), {}, np.array([a.t]), _curve_values(x, a.of)[None], found[None]
+    )
+
+
+def _refuse_kinks(a: DerivativeRequest, e: EquationDerivatives, tangents: Sequence[StateDerivative]) -> None:
+    """Refuse forces that have no slope along the changes with the parameters, or by one of these."""
+    none = np.zeros((len(e.state.v), 1))
+    dq, dv = (np.column_stack([none, *ways]) for ways in ([k.q for k in tangents], [k.v for k in tangents]))
+    refuse_nonsmooth(e, dq, dv, a.to)
+
+
+def _instant_function(a: DerivativeRequest) -> ParameterFunction:
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        b = assemble(a.model, t=a.t, parameters=parameters)
+        return _curve_values(MechanismState.moving(b.compiled, b.t, b.q, b.v), a.of)
+
+    return found
+
+
+def _motion_sensitivity(a: DerivativeRequest) -> Sensitivity:
+    begun = find_initial_state(a.model, a.t, a.parameters, None, a.coordinates)
+    base, layer = begun.base, begun.assembly.compiled
+    refuse_out_of_table(base, float(a.times[-1]))
+    x = MechanismState.moving(base.compiled, base.t, base.q, base.v)
+    e = EquationDerivatives(x)
+    directions = [ParameterDirection(e, name) for name in a.to]
+    values = [d.values if layer is base.compiled else values_with_complex_step(layer, d.name) for d in directions]
+    driven, lin = is_fully_driven(base), ConstrainedSystem(x)
+    if layer.structure.loads:
+        reaction_friction(x, lin.G)
+    if not driven:
+        refuse_jumping_laws(a.model, a.to)
+        _refuse_kinks(a, e, ())
+    pairs = initial_changes(a.model, a.parameters, base, x, directions, lin)
+    start = [changes_in_motion_coordinates(begun, *of) for of in zip(directions, values, pairs, strict=True)]
+    clock = clock_for(begun, a.t, float(a.times[-1]), a.times, default_integration(a.coordinates, a.rtol, a.atol))
+    loop = VariationalIntegration(begun, clock, values, [parameter_scale(a.model, a.parameters, name) for name in a.to])
+    varied = (
+        prescribed_motion_sensitivity(loop)
+        if driven
+        else loop.run(*(np.array(part) for part in zip(*start, strict=True)))
+    )
+    motion = varied.result(begun)
+    _refuse_undetermined(layer, varied, a.of)
+    found = [motion.curve(name) for name in a.of]
+    by = [curve_derivatives_over_time(motion, a.of, v, c.parts, c.z) for v, c in zip(values, varied.by, strict=True)]
+    units = tuple(unit for unit, _ in found)
+    return Sensitivity(
+        "motion", a.of, a.to, units, {}, a.times, np.array([x for _, x in found]).T, np.stack(by, axis=-1)
+    )
+
+
+def _refuse_undetermined(c: CompiledMechanism, varied: MotionSensitivity, of: Sequence[str]) -> None:
+    """Refuse quantities that redundancy leaves open at one of the times."""
+    m = varied.motion
+    for k, t in enumerate(varied.t.tolist()):
+        c.z[:] = m.z[k]
+        state = MechanismState.moving(c, t, m.q[k], m.v[k])
+        if k == 0 and not depend_on_reactions(state, of):
+            return
+        refuse_undetermined_outputs(state, of)
+
+
+def _simulated(
+    a: DerivativeRequest, times: np.ndarray, parameters: Mapping[str, float], coordinates: str, rtol: float, atol: float
+) -> Result:
+    """The motion at times."""
+    asked = SimulateOptions(
+        t_end=float(times[-1]),
+        t_start=a.t,
+        outputs=times.tolist(),
+        parameters=parameters,
+        start=None,
+        specialize=False,  # differences of motions: all by one engine
+        progress=False,
+        **default_integration(coordinates, rtol, atol).choices(),
+    )
+    return simulate(a.model, asked)
+
+
+def _motion_function(a: DerivativeRequest) -> ParameterFunction:
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        r = _simulated(a, a.times, parameters, "auto", 1e-12, 1e-13)
+        return np.stack([r.curve(name)[1] for name in a.of], axis=1)
+
+    return found
+
+
+def _equilibrium_sensitivity(a: DerivativeRequest) -> Sensitivity:
+    found = equilibrium(a.model, rest_options(a.t, a.parameters))
+    b = found.assembly
+    if a.model.controllers:  # their states are unknowns, too
+        other, rest = determined_auxiliary_rest(a.model, b, a.of)
+        named = tuple(other.outputs.get(name, name) for name in a.of)
+        with errors_in_user_terms(other):
+            return _with_model_names(_sensitivity_at_rest(replace(a, model=other.model, of=named), rest), a.of, other)
+    if abs(found.least) < LEAST_STIFFNESS_RATIO:
+        weak = ", ".join(found.weakest)
+        raise SingularityError(
+            f"the equilibrium of {a.model.name!r} has no stiffness along {weak}: its place is not determined, so it "
+            f"has no derivatives; hold it there by a spring or a driver",
+            a.t,
+            tuple(found.weakest),
+        )
+    return _sensitivity_at_rest(a, RestState.at(b.compiled, b.t, b.q))
+
+
+def _sensitivity_at_rest(a: DerivativeRequest, rest: RestState) -> Sensitivity:
+    """By the equations at rest: changes of positions and multipliers make up for those by the parameters."""
+    x = rest.equations.state
+    directions, tangents = [ParameterDirection(rest.equations, name) for name in a.to], []
+    still = np.zeros(len(x.v))
+    for d in directions:
+        left = d.along(x, still, still)
+        q, lam = rest.solved(left[d.e.at["r"]], left[d.e.at["g"]])
+        tangents.append(StateDerivative(q, still, still, lam))
+    _refuse_kinks(a, rest.equations, tangents)
+    column = _derivative_columns(a, x, directions, tangents)
+    return Sensitivity(
+        "equilibrium",
+        a.of,
+        a.to,
+        _curve_units(x, a.of),
+        {},
+        np.array([a.t]),
+        _curve_values(x, a.of)[None],
+        column[None],
+    )
+
+
+def _equilibrium_function(a: DerivativeRequest) -> ParameterFunction:
+    begin = equilibrium(a.model, rest_options(a.t, a.parameters))
+
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        b = equilibrium(a.model, rest_options(a.t, parameters, begin))
+        return _curve_values(
+            MechanismState.resting(b.assembly.compiled, a.t, b.assembly.q, b.result.multipliers[0]), a.of
+        )
+
+    return found
+
+
+# what finds the derivatives, and what makes a function of the parameters for differences
+ANALYSES: dict[
+    str, tuple[Callable[[DerivativeRequest], Sensitivity], Callable[[DerivativeRequest], ParameterFunction]]
+] = {
+    "instant": (_instant_sensitivity, _instant_function),
+    "motion": (_motion_sensitivity, _motion_function),
+    "equilibrium": (_equilibrium_sensitivity, _equilibrium_function),
+    "modes": (eigenvalue_sensitivity, eigenvalue_function),
+}
+
+
+# A mechanism with controllers whose motion is asked about, as one that has bodies in their place (`sliders`).
+
+
+STATE_MASS_RATIO = (
+    1e-3  # of the mechanism's mass, that of a body for a state: errors of works are judged by the mass of all
+)
+
+
+def moving_copy(model: Model, parameters: Mapping[str, float] | None, outputs: Sequence[str]) -> AuxiliaryModel:
+    """The copy in which velocities stand for states, which begins as the model does.
+
+    Parameters
+    ----------
+    model : Model
+        With continuous controllers.
+    parameters : mapping
+        Values in place of the model's.
+    outputs : sequence of str
+        Curves that are asked for.
+    """
+    c = compile_mechanism(model, parameters=parameters)
+    mass = STATE_MASS_RATIO * float(c.values.system.bodies.mass.sum()) or 1.0
+    scales = {x.name: StateScale(push=mass, mass=mass) for x in controller_states(model)}
+    begin, env = initial_state_formulas(model), model.environment(parameters)
+    other = auxiliary_model(model, begin, outputs, scales=scales, board=mass)
+    now = {name: number(text, env, None, f"what {name!r} begins with") for name, text in begin.items()}
+    return replace(other, at=now)

@@ -1,0 +1,301 @@
+"""Motions and their derivatives by parameters: the variational equations, integrated by the compiled loop.
+
+The compiled loop is ``engine/sensitivity_equations.py``. The initial state is assembled, and its derivatives found, in
+absolute coordinates (`parameter_derivatives`); in joint coordinates they are those that the bodies' are. Steps of a
+parameter are parts of it, so that the tolerances of derivatives are those of the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..derivatives.equation_derivatives import complex_system, friction_load_rows
+from ..engine import residual
+from ..engine.calls import OutputBuffer
+from ..engine.entry_point import FOLLOW, allocate_work, engine
+from ..engine.sensitivity_equations import POWERS, SensitivityPlan, variation_kernel
+from ..errors import SimulationError
+from ..laws.python_functions import clear_faults
+from ..numerics.integrators import time_loop as ex
+from ..numerics.integrators.butcher_tableaux import Tableau, tableau
+from ..results.health import Health
+from ..results.result import Result
+from ..simulation.diagnosis import failure_reason
+from ..simulation.initial_state import InitialState
+from ..simulation.prescribed_motion import cumulative_integrals, refined_nodes
+from ..simulation.simulate import run_clock
+from ..tables.structure_definition import Structure
+from ..tables.table_definitions import System, Work, named_arrays, with_numbers
+from ..tables.values import Values
+
+PARAMETER_TABLES = ("bodies", "frames", "term_parameters", "force_parameters", "const", "gravity", "scales", "units")
+SOLVER_FIELDS = (
+    "inverse_inertia", "excess_inertia", "inverse_mass", "inverse_reference_inertia", "excess_mass",
+    "inverse_reference_mass",
+)  # fmt: skip
+OUTPUT_NUMBERS = 10_000_000  # numbers of output that are held at a time
+
+
+@dataclass
+class MotionDerivatives:
+    """A motion at times, and how it changes with one parameter; each (n, ..), along the times first."""
+
+    q: np.ndarray
+    v: np.ndarray
+    vdot: np.ndarray
+    lam: np.ndarray
+    z: np.ndarray
+
+    @property
+    def parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Without the states."""
+        return self.q, self.v, self.vdot, self.lam
+
+
+@dataclass
+class MotionSensitivity:
+    """A motion and its changes.
+
+    Attributes
+    ----------
+    t : ndarray (n,) [s]
+    motion : Changes
+        Coordinates, velocities, accelerations, multipliers with efforts, states.
+    by : list of Changes
+        Of each parameter; positions along the velocities.
+    """
+
+    t: np.ndarray
+    motion: MotionDerivatives
+    by: list[MotionDerivatives]
+
+    def result(self, start: InitialState) -> Result:
+        """The motion, to be read by name."""
+        c, m = start.assembly.compiled, self.motion
+        health = Health(True, "a motion and its changes", 0.0, 0.0, 0, 0, 0, 0, 0.0)
+        q, v, z, vdot, lam = (np.ascontiguousarray(x) for x in (m.q, m.v, m.z, m.vdot, m.lam))
+        out = Result(c.structure.model, c.values, self.t, q, v, z, vdot, lam, health)
+        out.wound = start.wound
+        return out
+
+
+def _no_progress(fraction: float, note: str = "") -> None:
+    """Tell nobody."""
+
+
+def prescribed_motion_sensitivity(loop: VariationalIntegration) -> MotionSensitivity:
+    """A motion that drivers prescribe, and its changes: the constraints decide both, works are integrals of powers."""
+    start, clock = loop.start, loop.clock
+    at = 1 + clock.integrals
+    own = clock._replace(real=clock.real.copy(), count=clock.count.copy(), y=clock.y.copy(), K=clock.K.copy())
+    rows, _ = run_clock(start.assembly, own, loop.R, _no_progress, FOLLOW)
+    if own.count.status != ex.DONE:
+        raise loop.stopped(own, motion_only=True)
+    z, n = clock.integrals - loop.nq - loop.nv, len(clock.integrals)
+
+    def powers(some: np.ndarray) -> np.ndarray:
+        found = loop.at(some[:, 0], some[:, 1 : 1 + len(start.y)])
+        return np.hstack([some[:, at], *(size * by.z[:, z] for size, by in zip(loop.sizes, found.by, strict=True))])
+
+    if n:
+        known, P = refined_nodes(start.assembly, own, rows, powers)
+    else:
+        known = rows[np.isin(rows[:, 0], clock.times)]
+        P = known[:, at]
+    kept = np.isin(known[:, 0], clock.times)
+    out = loop.at(known[kept, 0], known[kept, 1 : 1 + len(start.y)])
+    works = cumulative_integrals(known[:, 0], P)[kept] if n else P
+    out.motion.z[:, z] = start.y[clock.integrals] + works[:, :n]
+    for k, by in enumerate(out.by):
+        by.z[:, z] = works[:, (k + 1) * n : (k + 2) * n] / loop.sizes[k]
+    return out
+
+
+class VariationalIntegration:
+    """The loop of a motion and its changes, ready to run.
+
+    Parameters
+    ----------
+    start : Start
+        Where the motion begins, in the coordinates that it is computed in.
+    clock : Clock
+        Of the motion alone.
+    values : sequence of Values
+        The mechanism's numbers with a complex step of each parameter.
+    sizes : sequence of float
+        What counts as a whole change of each parameter.
+    method : str
+        The integrator.
+    """
+
+    def __init__(
+        self,
+        start: InitialState,
+        clock: ex.StepState,
+        values: Sequence[Values],
+        sizes: Sequence[float],
+        method: str = "dop853",
+    ) -> None:
+        self.start, self.clock, self.sizes = start, clock, np.array(sizes, float)
+        c = start.assembly.compiled
+        self.c, s, S = c, c.structure, c.values.system
+        self.nq, self.nv, self.nz, self.nr, self.n = s.nq, s.nv, len(s.states), len(S.rows.law), len(values)
+        self.prescribed = [int(S.tree.v[b]) for b in s.prescribed.values()]
+        self.R: Tableau = tableau(method)
+        self.motion_width = 1 + len(start.y) + self.nv + self.nr + len(self.prescribed)
+        self.width = self.motion_width + self.n * (4 * self.nv + self.nr + self.nz)
+        self.own = clock._replace(
+            real=clock.real.copy(), count=clock.count.copy(), y=np.zeros((ex.STATE_ROWS, len(start.y))),
+            K=np.zeros((1, len(start.y))),
+        )  # fmt: skip
+        self.output = OutputBuffer(np.zeros((4, max(self.motion_width, 1))))
+        self.system, self.scratch, tables = _combined_tables(s, complex_system(S), values)
+        found = np.zeros((1, self.nv + 3 * self.nr + 3 * len(s.measured)), complex)
+        steps = np.zeros((1, 3 * self.nv + 1), complex)
+        t, y, vdot, lam = (np.zeros(n, complex) for n in (1, len(start.y), self.nv, self.nr))
+        self.bench = residual.ResidualBatch(t, y, vdot, lam, steps, found)
+        self.plan = self._step_plan(values, tables)
+        self.ended = clock  # as the last run has left it
+        clear_faults(c.work.stack)
+
+    def _step_plan(self, values: Sequence[Values], tables: np.ndarray) -> SensitivityPlan:
+        """Which numbers of the tables each parameter changes."""
+        s = self.c.structure
+        entry, step, first = [np.zeros(0, np.int64)], [np.zeros(0)], [0]
+        for x, size in zip(values, self.sizes, strict=True):
+            found = np.concatenate([part.imag.ravel() for part in _residual_tables(s, complex_system(x.system))])
+            at = np.flatnonzero(found)
+            entry.append(2 * at + 1)
+            step.append(found[at] * size)
+            first.append(first[-1] + len(at))
+        nv, nz, rows = self.nv, self.nz, friction_load_rows(s).astype(np.int64)
+        m, wide = len(rows), nv + self.nr + nv
+        return SensitivityPlan(
+            np.array([self.nq, nz, self.n, 0], np.int64), np.array(first, np.int64),
+            np.concatenate(entry).astype(np.int64), np.concatenate(step), tables.view(float), np.zeros((self.n, wide)),
+            np.zeros(nv), np.zeros(self._state_width), np.zeros(nv), rows, np.zeros((m, wide)), np.zeros((m, nz)),
+            np.zeros((m, m + 1)),
+        )  # fmt: skip
+
+    @property
+    def _state_width(self) -> int:
+        """Width of the state of motion and changes."""
+        return self.nq + self.nv + self.nz + self.n * (2 * self.nv + self.nz)
+
+    def run(self, dq: np.ndarray, dv: np.ndarray) -> MotionSensitivity:
+        """Integrate from changes (parameters, nv) of the start.
+
+        Raises
+        ------
+        SimulationError
+            If it cannot go on: a singular position, or something that is not smooth.
+        """
+        clock = self._clock(np.concatenate([dq, dv], axis=1) * self.sizes[:, None])
+        buffer = np.zeros((max(2, min(len(clock.times), OUTPUT_NUMBERS // self.width + 1)), self.width))
+        none = np.zeros((0, self._state_width))
+        rows = []
+        while clock.count.status == ex.RUNNING:
+            rows.append(buffer[: self._call(clock, none, buffer)].copy())
+        if clock.count.status != ex.DONE:
+            raise self.stopped(clock)
+        self.ended = clock
+        return self._unpacked(np.concatenate(rows))
+
+    def at(self, t: np.ndarray, y: np.ndarray) -> MotionSensitivity:
+        """Changes at states (n, width) of a motion that drivers prescribe, with powers in place of works."""
+        n = len(t)
+        states = np.zeros((n, self._state_width))
+        states[:, : self.nq + self.nv] = y[:, : self.nq + self.nv]
+        z = self.nq + self.nv + 2 * self.nv * self.n
+        states[:, z : z + self.nz] = y[:, self.nq + self.nv :]
+        self.plan.size[POWERS] = 1
+        clock = self._clock(np.zeros((self.n, 2 * self.nv)))._replace(times=np.ascontiguousarray(t))
+        out = np.zeros((n, self.width))
+        done = self._call(clock, states, out)
+        if done < n:
+            raise self.stopped(clock, float(t[done]))
+        return self._unpacked(out)
+
+    def _call(self, clock: ex.StepState, states: np.ndarray, out: np.ndarray) -> int:
+        S, W = self.c.values.system, self.c.work
+        given = (S, W, self.R, self.own, self.output)
+        return variation_kernel(
+            engine.address,
+            residual.residuals_kernel.address,
+            *given,
+            self.system,
+            self.scratch,
+            self.bench,
+            self.plan,
+            clock,
+            states,
+            out,
+        )
+
+    def _clock(self, changes: np.ndarray) -> ex.StepState:
+        """Of motion and changes."""
+        own, n = self.clock, self.n
+        Y = np.zeros((ex.STATE_ROWS, self._state_width))
+        at, more = self.nq + self.nv, 2 * self.nv * n
+        y = self.start.y
+        Y[0, :at], Y[0, at : at + more], Y[0, at + more : at + more + self.nz] = y[:at], changes.ravel(), y[at:]
+        accounts = [own.integrals + more + k * self.nz for k in range(n + 1)]
+        count = own.count.copy()
+        count.controlled = at + more
+        return own._replace(
+            real=own.real.copy(), count=count, y=Y, K=np.zeros((len(own.K), self._state_width)),
+            integrals=np.concatenate(accounts).astype(np.int64),
+        )  # fmt: skip
+
+    def _unpacked(self, rows: np.ndarray) -> MotionSensitivity:
+        cuts = np.cumsum([1, self.nq, self.nv, self.nz, self.nv])
+        t, q, v, z, vdot, lam = np.split(rows[:, : self.motion_width], cuts, axis=1)
+        nv, nr, nz = self.nv, self.nr, self.nz
+        by = []
+        for k in range(self.n):
+            first = self.motion_width + k * (4 * nv + nr + nz)
+            part = rows[:, first : first + 4 * nv + nr + nz] / self.sizes[k]
+            dq, dv, da, dlam, effort, dz = np.split(part, np.cumsum([nv, nv, nv, nr, nv]), axis=1)
+            by.append(MotionDerivatives(dq, dv, da, np.hstack([dlam, effort[:, self.prescribed]]), dz))
+        return MotionSensitivity(t[:, 0], MotionDerivatives(q, v, vdot, lam, z), by)
+
+    def stopped(self, clock: ex.StepState, t: float | None = None, motion_only: bool = False) -> SimulationError:
+        """Why it went no further; ``motion_only``: the clock is that of the motion, without the changes."""
+        t = float(clock.real.t) if t is None else t
+        real, own = clock.real.copy(), self.clock
+        real.t = t
+        y, at = own.y.copy(), self.nq + self.nv
+        changes = 0 if motion_only else 2 * self.nv * self.n
+        y[0, :at], y[0, at:] = clock.y[0, :at], clock.y[0, at + changes :][: self.nz]
+        stopped = own._replace(real=real, count=clock.count, y=y)
+        message, cause = failure_reason(self.start.assembly, self.start.base, stopped, with_result=False)
+        error = SimulationError(
+            f"the motion and its changes with the parameters stop at t = {t:.6g} s: {message}", None, t
+        )
+        error.__cause__ = cause
+        return error
+
+
+def _residual_tables(s: Structure, system: System) -> list[np.ndarray]:
+    """The tables that the residuals look at, and records of frames, of which those on ground hold numbers."""
+    bodies = system.bodies._replace(**{name: 0.0 * getattr(system.bodies, name) for name in SOLVER_FIELDS})
+    tables = [x for name in PARAMETER_TABLES for _, x in named_arrays(getattr(system._replace(bodies=bodies), name))]
+    return [*tables, allocate_work(s, system, complex).FK]
+
+
+def _combined_tables(s: Structure, system: System, values: Sequence[Values]) -> tuple[System, Work, np.ndarray]:
+    """Tables and scratch in complex numbers, with all that parameters can change in one array."""
+    for x in values:  # a rotation that is none as it stands, and that a parameter changes, must be looked at
+        for name in ("joint_turned", "body_turned"):
+            turned = getattr(system.bodies, name)
+            turned[:] = np.maximum(turned.real, getattr(x.system.bodies, name).real)
+    parts = _residual_tables(s, system)
+    tables = np.concatenate([x.ravel() for x in parts])
+    ends = np.cumsum([0, *(x.size for x in parts)])
+    views = [tables[i:j].reshape(x.shape) for i, j, x in zip(ends[:-1], ends[1:], parts, strict=True)]
+    own = iter(views)
+    system = with_numbers(system, lambda _, x: next(own), PARAMETER_TABLES)
+    return system, allocate_work(s, system, complex)._replace(FK=views[-1]), tables

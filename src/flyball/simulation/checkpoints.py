@@ -1,0 +1,343 @@
+"""Checkpoints: a motion that is saved to a file while it runs, segment by segment, and resumes from there.
+
+A segment begins where the one before it ended, from what a result holds and nothing else: factors and starting
+values of solvers are found anew in each. So a motion that was interrupted or killed, and resumes from its file,
+equals to the last digit the one that was not.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FlyballError, Interrupted, ModelError, SimulationError
+from ..model.model import Model
+from ..progress import ReportProgress, progress_bar
+from ..results import diagnostics
+from ..results.files import save
+from ..results.result import Result, concatenate_results
+from ..results.result_loading import read_result
+from ..results.study import study_fingerprint
+from .diagnosis import acceleration_violation
+from .impulse_stepping.impulse_motion import INTERRUPTED_MESSAGE
+from .initial_state import start_time
+from .integration_intervals import Segment
+from .integration_options import output_times
+from .method_choice import AUTO_METHOD as ANY
+from .method_choice import MethodChoice, SimulateOptions, choose_method, is_unresolved, reason_for_impulses
+from .simulate import Span, simulate, simulate_with_reason
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckpointOptions(SimulateOptions):
+    """What `Mechanism.simulate` is asked."""
+
+    checkpoint: str | os.PathLike | None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.checkpoint is not None and not isinstance(self.checkpoint, (str, os.PathLike)):
+            raise ModelError(f"checkpoint is the path of a file, not {self.checkpoint!r}")
+
+
+def simulate_with_checkpoints(model: Model, o: CheckpointOptions) -> Result:
+    """The motion; kept in a file on the way if that is asked for."""
+    return simulate(model, o) if o.checkpoint is None else _simulated_with_checkpoints(model, o)
+
+
+def _simulated_with_checkpoints(model: Model, o: CheckpointOptions) -> Result:
+    assert o.checkpoint is not None
+    cls, model = type(model), model.snapshot()
+    t_start = start_time(o.t_start, o.start)
+    span = (t_start, o.t_end, output_times(t_start, o.t_end, o.outputs))
+    way = choose_method(model, o)
+    kept = CheckpointFile(Path(o.checkpoint), _motion_fingerprint(model, o, span), span[2])
+    if not kept.path.absolute().parent.is_dir():
+        raise ModelError(f"checkpoint={os.fspath(o.checkpoint)!r}: there is no such folder")
+    if kept.read(cls):
+        return kept.parts[-1]
+    with progress_bar(o.progress, "simulating") as tell:
+        return _SegmentedMotion(model, way, span, kept, tell, o.method == ANY).all()
+
+
+def _motion_fingerprint(model: Model, o: CheckpointOptions, span: Span) -> str:
+    known = {f.name: getattr(o, f.name) for f in fields(SimulateOptions)}
+    try:
+        return study_fingerprint(model, np.array(span[:2]), known, (), span[2])
+    except ModelError as error:
+        raise ModelError(f"checkpoint: the motion cannot be kept in a file: {error}") from None
+
+
+class _SegmentedMotion:
+    """Part after part."""
+
+    def __init__(
+        self, model: Model, way: MethodChoice, span: Span, file: CheckpointFile, report: ReportProgress, auto: bool
+    ) -> None:
+        self.model, self.way, self.span, self.kept, self.tell = model, way, span, file, report
+        self.auto = auto
+
+    def all(self) -> Result:
+        """To the end."""
+        kept, way = self.kept, self.way
+        options, why = (way.instead, kept.by) if kept.by and way.instead is not None else (way.options, way.why)
+        try:
+            return self._through(options, why)
+        except (ModelError, SimulationError) as error:
+            if way.instead is None or options is way.instead or not is_unresolved(error):
+                raise
+            kept.restart(reason_for_impulses(error))
+            try:
+                return self._through(way.instead, kept.by)
+            except FlyballError:
+                raise error from None
+
+    def _through(self, o: SimulateOptions, why: str) -> Result:
+        """To the end, by a method that is chosen."""
+        kept = self.kept
+        while True:
+            try:
+                found, part = self._part(o, why)
+            except SimulationError as error:
+                kept.write()
+                if isinstance(error.result, Result):
+                    error.result = kept.whole(error.result)
+                raise
+            except Interrupted as error:
+                raise self._left(kept.whole(error.result)) from None
+            if not part.paused:
+                break
+            kept.add(found)
+            if part.asked:
+                result = kept.whole()
+                result.health.message = INTERRUPTED_MESSAGE.format(result.final[0])
+                raise self._left(result)
+        result = kept.whole(found)
+        kept.finish(result)
+        return result
+
+    def _left(self, result: Result) -> Interrupted:
+        """What is raised for the user's interrupt: what goes on does so from where the last part ended."""
+        kept = self.kept
+        kept.write()
+        result.health.message += (
+            f"; {kept.path} holds it to t = {kept.parts[-1].final[0]:.6g} s, from where the same call goes on"
+            if kept.parts
+            else f"; no part of it had ended yet, so nothing is in {kept.path}: the same call begins anew"
+        )
+        return Interrupted(result.health.message, result)
+
+    def _part(self, o: SimulateOptions, why: str) -> tuple[Result, Segment]:
+        """The next part: its motion, and how it ended."""
+        first, last, times = self.span
+        before = self.kept.parts[-1] if self.kept.parts else None
+        t = first if before is None else before.final[0]
+        part = Segment(first, resumes=before is not None)
+
+        def tell(fraction: float) -> None:
+            try:
+                self.tell((t + fraction * (last - t) - first) / (last - first))
+            except KeyboardInterrupt:
+                if not part.interrupted():
+                    raise
+
+        changed: Mapping[str, Any] = {"progress": tell}
+        if before is not None:
+            changed = {**changed, "start": before, "t_start": None}
+            times = times[times >= t] if before.carried.get("open") else times[times > t]
+        with deferred_interrupt(part):
+            return simulate_with_reason(self.model, o.known(**changed), (t, last, times), why, self.auto, part), part
+
+
+# The user's interrupt of a motion that is kept on the way.
+
+
+@contextmanager
+def deferred_interrupt(part: Segment) -> Iterator[None]:
+    """Have an interrupt end a part that was long computed where it is, in order; a second one, or before, at once.
+
+    Where something else handles interrupts, or in another thread than the first, nothing is changed.
+    """
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+
+    def asked(number: int, frame: Any) -> None:
+        if not part.interrupted():
+            signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, asked)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# Where a motion is kept on its way: one result file, and files beside it of what came since that was written.
+#
+# A file that is there is whole: each is written beside its place and then put there. The first file is written anew
+# once the others hold as much as it does, so that all that is ever written is some three times the result, and no write
+# is longer than what was computed since takes to write, or once in a while all.
+
+
+EVERY = 20.0  # seconds between two writes, at least
+MOST_FILES = 60  # files beside the first one
+CHECKPOINT_KEY = "checkpoint"  # in `Result.carried`
+REMEDY = "give another file, or remove that one"
+
+
+class CheckpointFile:
+    """Parts of a motion and the files that hold them.
+
+    Parameters
+    ----------
+    path : Path
+    mark : str
+        What tells the motion from others.
+    times : ndarray [s]
+        Output times of the whole motion.
+
+    Attributes
+    ----------
+    parts : list of Result
+        As far as it is computed; several that are written may be one.
+    by : str
+        Why it goes by steps of impulses after all, if it does.
+    """
+
+    def __init__(self, path: Path, mark: str, times: np.ndarray) -> None:
+        self.path, self.mark, self.times = path, mark, times
+        self.parts: list[Result] = []
+        self.by = ""
+        self._run, self._count, self._written = uuid.uuid4().hex, 0, 0  # parts in all, and those in files
+        self._first = self._rows_beside = 0  # times in the first file, and in those beside it
+        self._files: list[Path] = []
+        self._last = time.monotonic()
+
+    def read(self, cls: type[Model]) -> bool:
+        """Take what the files hold; whether it is the whole motion.
+
+        Raises
+        ------
+        ModelError
+            If the file is something else, damaged, or of another motion.
+        """
+        if not self.path.exists():
+            return False
+        found = read_result(self.path, cls)
+        told = found.carried.get(CHECKPOINT_KEY)
+        if told is None:
+            raise ModelError(f"{self.path} is a result, but not one that was kept with checkpoint=; {REMEDY}")
+        if told["mark"] != self.mark:
+            raise ModelError(
+                f"{self.path} is of another motion than this: model, values, options or the version of flyball are not "
+                f"the same. To go on from where it ended give start=fb.load_result(...); else {REMEDY}"
+            )
+        self._run, self._count, self.by = told["run"], told["parts"], told["by"]
+        self.parts, self._first = [found], len(found.t)
+        while (path := self._place(self._count + 1)).exists():
+            more = read_result(path, cls)
+            told = more.carried.get(CHECKPOINT_KEY, {})
+            if told.get("run") != self._run:
+                break
+            self.parts.append(more)
+            self._files.append(path)
+            self._count, self._rows_beside = told["parts"], self._rows_beside + len(more.t)
+        self._written = len(self.parts)
+        return bool(self.parts[-1].carried[CHECKPOINT_KEY]["done"])
+
+    def add(self, part: Result) -> None:
+        """One more part; it is written if that is due."""
+        self.parts.append(part)
+        self._count += 1
+        if time.monotonic() - self._last > EVERY:
+            self.write()
+
+    def restart(self, by: str) -> None:
+        """The motion begins once more, another way."""
+        self.parts, self.by, self._run = [], by, uuid.uuid4().hex
+        self._count = self._written = self._first = self._rows_beside = 0
+        self._remove_segment_files()
+
+    def write(self) -> None:
+        """Write what is not in files yet."""
+        new = self.parts[self._written :]
+        if not new:
+            return
+        rows = sum(len(p.t) for p in new)
+        if self._rows_beside + rows >= self._first or len(self._files) >= MOST_FILES:
+            self.parts = [self._joined(self.parts)]
+            self._save(self.path, self.parts[0])
+            self._remove_segment_files()
+            self._first, self._rows_beside = len(self.parts[0].t), 0
+        else:
+            self.parts[self._written :] = [self._joined(new)]
+            place = self._place(self._count - len(new) + 1)
+            self._save(place, self.parts[-1])
+            self._files.append(place)
+            self._rows_beside += rows
+        self._written, self._last = len(self.parts), time.monotonic()
+
+    def whole(self, *last: Result) -> Result:
+        """All with what was computed last."""
+        return self._joined([*self.parts, *last])
+
+    def finish(self, result: Result) -> None:
+        """Write the whole motion, as other programs read it too, and nothing beside it."""
+        self._save(self.path, result, done=True)
+        self._remove_segment_files()
+
+    def _joined(self, parts: Sequence[Result]) -> Result:
+        return with_joined_health(concatenate_results(parts, self.times), parts)
+
+    def _save(self, path: Path, result: Result, done: bool = False) -> None:
+        result.carried[CHECKPOINT_KEY] = {
+            "mark": self.mark, "run": self._run, "parts": self._count, "by": self.by, "done": done
+        }  # fmt: skip
+        save(result, path, with_labelled=done)
+
+    def _place(self, part: int) -> Path:
+        return self.path.with_name(f"{self.path.name}.{part}")
+
+    def _remove_segment_files(self) -> None:
+        """Remove the files beside the first one, those of an earlier motion too."""
+        for path in self.path.parent.glob(f"{self.path.name}.*"):
+            if path.name.removeprefix(f"{self.path.name}.").isdigit():
+                path.unlink(missing_ok=True)
+        self._files = []
+
+
+# What the health of a motion that was computed in parts tells late.
+
+
+def with_joined_health(result: Result, parts: Sequence[Result]) -> Result:
+    """The parts end to end, ``result``, with a health that knows what each of them does."""
+    if len(parts) == 1:
+        return result
+    health = result.health
+    health.late = {"mobility": parts[0].health.late["mobility"], "energy_drift": lambda: result.energy.drift}
+    if isinstance(health.options.get("method"), Mapping):  # accelerations of steps by impulses are means
+        health.late |= {
+            "doubtful": partial(diagnostics.impulse_stepping_doubts, result),
+            "warnings": partial(diagnostics.impulse_stepping_warnings, result),
+        }
+        return result
+    health.late |= {
+        "acceleration_violation": partial(acceleration_violation, result),
+        "creep": partial(diagnostics.friction_creep, result),
+        "warnings": partial(diagnostics.motion_warnings, result),
+        "doubtful": partial(diagnostics.doubt_messages, result),
+    }
+    return result

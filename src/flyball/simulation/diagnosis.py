@@ -1,0 +1,668 @@
+"""Diagnosis: why an integration could not go on; rounding limits; residual of the accelerations.
+
+`failure_reason` finds the cause of a failure: a law that jumps or is not finite, drivers that contradict each other, a
+lock-up, a jam by friction, an unbounded motion, too many steps. `acceleration_violation` checks G vdot = gamma
+independently of the solve.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..assembly.assembled_state import Assembly, undefined_row
+from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from ..constraints.switch_kinds import BRANCH
+from ..engine import motion
+from ..engine.entry_point import MOTION
+from ..engine.kinematics import load_record
+from ..engine.loads import force_row
+from ..errors import AnalysisError, ModelError, SimulationError
+from ..laws.bytecode import BY_TIME, evaluate, evaluate_jet
+from ..laws.python_functions import function_fault
+from ..mobility.contradictions import explain_contradiction
+from ..model.body import GROUND, Driver
+from ..model.contact_point import Touch
+from ..model.element import Element, LawOf, fields_with
+from ..model.expression_parser import tree_text
+from ..model.force import CoordinateForce
+from ..model.messages import abbreviated
+from ..numerics.integrators import time_loop as ex
+from ..tables.table_definitions import LOAD, OFF, REVOLUTE, VALUE
+from .law_faults import finite_time_escape, law_inputs, step_too_long, unbounded_motion, undefined_law_part
+from .sampling_instants import sampling_limits_steps
+
+if TYPE_CHECKING:
+    from ..results.result import Result
+
+
+class UnresolvedInstant(SimulationError):
+    """An instant at which rigid bodies have no answer, or no end of answers."""
+
+
+class InitialOverlap(ModelError):
+    """A motion that begins with bodies in each other."""
+
+
+def jam_message(e: Any, t: float, single: bool) -> str:
+    """What is said where no force of friction in a joint, or where bodies touch, was found that goes with its own load.
+
+    With one such load (``single``) the search finds it if it exists; with several it may end short of them.
+    """
+    if not single:
+        where = f"of {body_names(e)}" if isinstance(e, Touch) else f"in joint {e.joint!r}"
+        return (
+            f"{e.title} {where}: at t = {t:.6g} s no loads were found that go with the friction that they cause, here "
+            f"and elsewhere. Either friction grows with the load that it makes itself faster than that can hold it (a "
+            f"jam, or Painleve's paradox), or there are such loads and the search ended short of them. Less friction "
+            f"is easier (coefficients, radius, bending_length, twist_length); steps by impulses (method='impulse') "
+            f"need no such search"
+        )
+    if isinstance(e, Touch):
+        return (
+            f"{e.title} of {body_names(e)} jams at t = {t:.6g} s: friction there grows with the load that it makes itself "
+            f"faster than that can hold it (Painleve's paradox), so no finite force answers, or several do. With less "
+            f"friction, or contact that gives way (law=), there is a solution; steps by impulses go over it"
+        )
+    return (
+        f"{e.title} jams joint {e.joint!r} at t = {t:.6g} s: friction loads the joint by as much as the "
+        f"load that it comes from, so no finite force answers, or several do. Check its coefficients, and the lengths "
+        f"over which the joint carries moments (bending_length, twist_length)"
+    )
+
+
+def body_names(e: Touch) -> str:
+    """Both bodies of a place of contact."""
+    return " and ".join(repr(b) if b != GROUND else GROUND for b in (e.body_i, e.body_j))
+
+
+LIMIT_TOLERANCE = 1e-6  # of their sizes: limits closer than this cross where something has just ended
+
+
+def contradicting_limits(c: CompiledMechanism, t: float, near: float = LIMIT_TOLERANCE) -> str:
+    """The controller whose limits cross at the kinematics last evaluated, in words; else nothing."""
+    S, W = c.values.system, c.work
+    stack = np.zeros_like(W.stack)
+    with np.errstate(all="ignore"):
+        for e, names, laws in c.structure.ordered:
+            low, high = (float(evaluate(S.code, S.const, at, stack, (t, 0.0 * t, 0.0 * t), W.sensed)) for at in laws)
+            if low > high - near * (abs(low) + abs(high)):
+                first, last = names
+                return (
+                    f"{e.title} has no output: its limits cross, {first} is {low:.6g} and {last} {high:.6g}. Give "
+                    f"limits of which {first} stays below {last}"
+                )
+    return ""
+
+
+def refuse_contradicting_limits(c: CompiledMechanism, t: float) -> None:
+    """Refuse controllers whose limits cross at the kinematics last evaluated.
+
+    Raises
+    ------
+    AnalysisError
+        Naming one, its limits and the time.
+    """
+    if text := contradicting_limits(c, t, 0.0):
+        raise AnalysisError(f"{c.structure.model.name!r}: at t = {t:.6g} s, {text}")
+
+
+NOTABLE = 10.0  # times the tolerance: an error of a step from rounding that is told
+RECENT_SHARE = 1e-3  # part of the time span within which rounding found to decide is why a run stopped
+
+
+def rounding_is_notable(worst: np.ndarray, far: np.ndarray, atol: np.ndarray, relative: np.ndarray) -> np.ndarray:
+    """In which of several motions `rounding_error_remark` or `origin_distance_remark` have something to say.
+
+    Parameters
+    ----------
+    worst, far : (n,) ndarray
+        The clock's EXCESS; how far the farthest frame is from the origin [m].
+    atol, relative : (n,) ndarray
+        Tolerance of positions [m]: the absolute one, and rtol times the mechanism's length.
+    """
+    return (worst > NOTABLE) | (np.spacing(far) > atol + relative)
+
+
+def rounding_error_remark(clock: ex.StepState) -> str:
+    """The largest error of a step that rounding made and that was accepted; nothing where it is not notable."""
+    size = clock.real.largest_error
+    if not size > NOTABLE:
+        return ""
+    return (
+        f"rounding is the limit: near t = {clock.real.largest_error_at:.6g} s, where the mechanism is close to a singular "
+        f"position, the last digits of the state alone change a step by up to {size:.2g} times what "
+        f"rtol = {clock.real.rtol:g} allows. The step was accepted so; a larger rtol asks for what can be had"
+    )
+
+
+def origin_distance_remark(a: Assembly, clock: ex.StepState) -> str:
+    """How far from the origin it is, where positions are not known there to the tolerance."""
+    length = a.compiled.values.length
+    far = float(np.abs(a.compiled.array("FK")[:, :3]).max(initial=0.0))
+    digit = math.ulp(far)
+    if not digit > clock.real.atol + clock.real.rtol * length:
+        return ""
+    return (
+        f"rounding is the limit: positions {far:.3g} m from the origin are known to {digit:.1g} m, which is more than "
+        f"rtol = {clock.real.rtol:g} of the mechanism's length of {length:.3g} m; describe it near the origin"
+    )
+
+
+def rounding_suffix(clock: ex.StepState) -> str:
+    """What is to be said of a run that stopped, if rounding was found to decide shortly before."""
+    if clock.real.t - clock.real.rounding_found_at > RECENT_SHARE * clock.real.span:
+        return ""
+    return (
+        f". Rounding is the limit there: the last digits of the state change the error of a step by a tenth of it and "
+        f"more, as they do close to a singular position; rtol = {clock.real.rtol:g} asks for more than can be had"
+    )
+
+
+MOST_TIMES = 100  # output times that are looked at
+NEGLIGIBLE_ACCELERATION = (
+    1e-14  # of the mechanism's length (or a radian) by the square of the motion's time: what is less is rounding
+)
+
+
+def acceleration_violation(result: Result) -> float:
+    """Largest |G vdot - gamma| at up to `MOST_TIMES` output times, relative to the terms that make it up.
+
+    Looked at in absolute coordinates, whatever the motion was computed in: what two bodies add to a row cancels in
+    others. The terms are what would be there without the constraints, |G| M^-1 |f|, which reactions cancel;
+    |G| |vdot|; and what gamma is made of, rates of turn times rates of the rows: where nothing moves, or all moves
+    steadily, the accelerations themselves are only the rounding of these; where no force acts either, all of them are
+    (`NEGLIGIBLE_ACCELERATION`). With Baumgarte's stabilization gamma is what that makes of it.
+    """
+    n, old = len(result.t), result.values.structure
+    if not n or not (result.model.joints or result.model.drivers or old.switches):
+        return 0.0
+    if result.pieces:
+        return max(map(acceleration_violation, result.pieces))
+    told = result.values.told
+    own = compile_mechanism(result.model, parameters=told, tree=old.tree, switches=result.phases is not None)
+    c = own
+    if old.tree:
+        c = compile_mechanism(result.model, parameters=told, switches=result.phases is not None)
+    if not len(c.structure.rows):
+        return 0.0
+    picked = np.unique(np.linspace(0, n - 1, min(n, MOST_TIMES)).astype(int)).tolist()
+    accelerations, sizes = _accelerations(result, c), c.sizes
+    held = None if result.phases is None else result.phases.over("switch")
+    span, worst = float(np.ptp(result.t)), 0.0
+    least = NEGLIGIBLE_ACCELERATION / span**2 if span > 0.0 else 0.0
+    for k in picked:
+        q, v, own.z = result.q[k].copy(), result.v[k].copy(), result.states[k].copy()
+        if c is not own:
+            q, v = c.take(own, result.t[k], q, v)
+        if held is not None:
+            c.work.modes.mode[:], c.work.modes.hold[:] = held[:2, :, k]
+            c.work.sensed[VALUE, c.work.sensed.shape[1] - len(old.switches) :] = result.phases.sigma[:, k]  # type: ignore[union-attr]
+        c.at(result.t[k], q, v, MOTION)
+        gap, largest, _ = acceleration_residual(c, v, accelerations[k], sizes, result.health.options)
+        largest = max(largest, least)
+        worst = max(worst, float(gap.max()) / largest if largest > 0.0 else 0.0)
+    return worst
+
+
+def _accelerations(result: Result, c: CompiledMechanism) -> np.ndarray:
+    """Accelerations of all bodies at all output times, as c's velocities go, (n, nv)."""
+    out = np.zeros((len(result.t), c.structure.nv))
+    planar = c.structure.model.planar
+    for name, b in c.structure.place.items():
+        if b < 0:
+            continue
+        _, R, _, _, alpha, a = result.records.body(result.values.structure.place[name])
+        v0, n = int(c.values.system.tree.v[b]), int(c.values.system.tree.nv[b])
+        turns = [alpha[2]] if planar else [sum(R[3 * i + k] * alpha[i] for i in range(3)) for k in range(3)]
+        out[:, v0 : v0 + n] = np.stack([*(a[:2] if planar else a), *turns][:n], axis=1)
+    return out
+
+
+def acceleration_residual(
+    c: CompiledMechanism, v: np.ndarray, x: np.ndarray, sizes: np.ndarray, o: Mapping[str, Any] | None = None
+) -> tuple[np.ndarray, float, float]:
+    """How far the accelerations x are off each row, (nr,), the largest sum of a row's terms, and that without x's own.
+
+    Rows in metres count as parts of the mechanism's length. The state (velocities v) is the one in c's scratch,
+    evaluated with forces; ``sizes`` are c's, ``o`` the options of the motion.
+    """
+    S, n = c.values.system, len(c.structure.rows)
+    row_p = S.row_start[: n + 1]
+    row, column, G = np.repeat(np.arange(n), np.diff(row_p)), S.column[: row_p[-1]], c.work.G[: row_p[-1]]
+
+    def times(entries: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return np.bincount(row, entries * x[column], n)
+
+    gamma = c.work.rows.gamma.copy()
+    if o is not None and o.get("stabilization") == "baumgarte":
+        gamma -= 2 * o["alpha"] * (times(G, v) - c.work.rows.nu) + o["beta"] ** 2 * c.work.rows.value
+    turning = np.zeros(n)
+    np.maximum.at(turning, row, (np.abs(v) / sizes)[column])
+    asked = times(abs(G), np.abs(_unconstrained_accelerations(c))) + np.abs(gamma) + times(abs(G), np.abs(v)) * turning
+    metre = np.where(c.metric, c.values.length, 1.0)
+    size = asked + times(abs(G), np.abs(x))
+    return np.abs(times(G, x) - gamma) / metre, float((size / metre).max()), float((asked / metre).max())
+
+
+def _unconstrained_accelerations(c: CompiledMechanism) -> np.ndarray:
+    """Accelerations (nv,) that forces would give the bodies without constraints, at the state in c's scratch.
+
+    Every body is taken for a compact one: a slender one that its joints keep from spinning does not spin.
+    """
+    S = c.values.system
+    per = np.zeros(c.structure.nv)
+    for b, (v0, n) in enumerate(zip(S.tree.v, S.tree.nv, strict=True)):
+        k = min(n, 2 if c.structure.model.planar else 3)
+        per[v0 : v0 + k], per[v0 + k : v0 + n] = S.bodies.inverse_mass[b], S.bodies.inverse_reference_inertia[b]
+    return per * c.work.velocities.applied
+
+
+JUMP_WINDOW = 1e-10  # part of the time span within which a law that jumps is looked for
+LOOKAHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
+LOCKED_RESIDUAL = 1e-3  # part of the accelerations asked for that no solution of the rows leaves open
+DISAGREEMENT = 1e-6  # part of a rate or second derivative by which laws of one coordinate differ that disagree
+DERIVATIVE_NAMES = ("value", "rate", "second derivative")
+GROWTH_FACTOR = (
+    1.2  # times by which a derivative without bound grows where what separates from the instant is a hundredth
+)
+JUMP_FACTOR = 10.0  # a law that changes this many times more than its own slope says has jumped
+
+
+def failure_reason(
+    a: Assembly, base: Assembly, clock: ex.StepState, with_result: bool = True, method: str = ""
+) -> tuple[str, Exception | None]:
+    """What stopped the integration, and the exception that a user's function raised, if one did.
+
+    Parameters
+    ----------
+    a : Assembly
+        Its scratch is as the compiled loop has left it.
+    base : Assembly
+        The mechanism in absolute coordinates, where every joint and driver has rows.
+    clock : Clock
+        State of the integration.
+    with_result : bool
+        Whether there is a result up to then.
+    method : str
+        By which it was integrated.
+    """
+    name = a.compiled.structure.model.name
+    t = float(clock.real.t)
+    after = f". The motion up to t = {t:.6g} s is kept in the error's result" if with_result else ""
+    if clock.count.status == ex.TOO_MANY_STEPS:
+        return f"{name!r}: {_too_many_steps(a, clock)}{rounding_suffix(clock)}{after}", None
+    stack = a.compiled.work.stack
+    found = function_fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
+    if found is not None:
+        return f"{name!r}: just after t = {t:.6g} s, {found.message}{after}", found.exception
+    text = (
+        driver_fault(a.compiled, t, float(clock.real.largest))
+        or _end_of_curve(a, clock)
+        or _not_finite_motion(a, clock, method)
+    )
+    if not text and (text := _friction_jam(a, clock)):
+        return f"{name!r}: {text}{after}", UnresolvedInstant(text, t=t)
+    text = (
+        text
+        or unbounded_motion(a, clock, _component_name)
+        or _force_fault_at_end(a, clock)
+        or finite_time_escape(a, clock, _component_name)
+    )
+    text = text or _lock_up(a, base, clock) or _contradicting_drivers(a, clock) or _step_too_small(a, clock)
+    return f"{name!r}: {text}{after}", None
+
+
+def health_remarks(a: Assembly, clock: ex.StepState) -> tuple[str, ...]:
+    """What went wrong on the way and was overcome, and where rounding was the limit, for the health report."""
+    return tuple(
+        text for text in (_overcome_fault(a), rounding_error_remark(clock), origin_distance_remark(a, clock)) if text
+    )
+
+
+def _overcome_fault(a: Assembly) -> str:
+    functions = a.compiled.structure.functions
+    found = function_fault(a.compiled.array("stack"), functions, overcome=True) if functions else None
+    if found is None:
+        return ""
+    return (
+        f"in a step that was then taken again, shorter, {found.message}. The motion kept does without it; if the "
+        f"function is at fault, mend it"
+    )
+
+
+def driver_fault(c: CompiledMechanism, t: float, span: float) -> str:
+    """A driver whose law is not finite, jumps, or has a derivative without bound, about the time t; else nothing.
+
+    ``span`` is the largest time [s], by which times are told apart.
+    """
+    S, W = c.values.system, c.work
+    stack = np.zeros_like(W.stack)
+    for driver, law, wrapped in _driver_laws(c):
+        with np.errstate(all="ignore"):
+            ahead, behind = (
+                [evaluate_jet(S.code, S.const, law, stack, t + way * d * span, W.sensed, BY_TIME) for d in LOOKAHEAD]
+                for way in (1.0, -1.0)
+            )
+        problem = _not_finite_law(ahead) or _jump_of_law(behind[0], ahead[0], JUMP_WINDOW * span, wrapped)
+        problem = problem or _unbounded_derivative(ahead, "after") or _unbounded_derivative(behind, "before")
+        if problem:
+            return f"{driver.title} cannot be followed beyond t = {t:.6g} s: its law {problem}{_law_texts(driver)}"
+    return ""
+
+
+def reason_without_solution(c: CompiledMechanism, t: float, span: float) -> str:
+    """Why the equations of motion have no solution at the state evaluated last; ``span`` as above."""
+    stack = c.work.stack
+    found = function_fault(stack, c.structure.functions) or c.structure.missed(stack)
+    text = found.message if found else driver_fault(c, t, span) or force_fault(c, t) or _controller_fault(c, t)
+    if text:
+        return text
+    if c.work.counts.status == motion.JAMMED:
+        force = c.structure.forces[int(c.work.counts.guilty_row)]
+        return f"{force.title} jams there: it grows with the load that it makes"
+    return "the position is singular: constraints depend on one another, or a freedom moves no inertia"
+
+
+def _force_fault_at_end(a: Assembly, clock: ex.StepState) -> str:
+    """A force whose formula ends where the motion stopped; else nothing."""
+    t = float(clock.real.t)
+    force = force_fault(a.compiled, t)
+    return f"at t = {t:.6g} s, {force}" if force else ""
+
+
+def _driver_laws(c: CompiledMechanism) -> list[tuple[Any, int, bool]]:
+    """Drivers, where the law of each begins, and whether whole turns count for nothing."""
+    s, S = c.structure, c.values.system
+    laws: list[tuple[Any, int, bool]] = [
+        (row.element, int(S.rows.law[k]), bool(S.rows.wrapped[k]))
+        for k, row in enumerate(s.rows)
+        if isinstance(row.element, Driver)
+    ]
+    return laws + [
+        (s.model[name], int(S.tree.law[b]), bool(S.tree.joint[b] == REVOLUTE)) for name, b in s.prescribed.items()
+    ]
+
+
+def _contradicting_drivers(a: Assembly, clock: ex.StepState) -> str:
+    """Two drivers of one coordinate whose laws part where the motion stopped; else nothing."""
+    S, W, t = a.compiled.values.system, a.compiled.work, float(clock.real.t)
+    stack = np.zeros_like(W.stack)
+    first: dict[str, tuple[Any, tuple]] = {}
+    for driver, law, _ in _driver_laws(a.compiled):
+        jet = evaluate_jet(S.code, S.const, law, stack, t, W.sensed, BY_TIME)
+        other, before = first.setdefault(driver.coordinate, (driver, jet))
+        for what, x, y in zip(DERIVATIVE_NAMES[:0:-1], before[:0:-1], jet[:0:-1], strict=True):
+            if abs(x - y) > DISAGREEMENT * max(abs(x), abs(y)):
+                return (
+                    f"{other.title} and {driver.title} both move {driver.coordinate} and disagree from "
+                    f"t = {t:.6g} s on: the {what} of their laws there is {x:.6g} and {y:.6g}. Leave out one, or make "
+                    f"their laws agree"
+                )
+    return ""
+
+
+def _not_finite_law(after: list[tuple]) -> str:
+    """What is wrong with a law that has these values and derivatives soon after, if they are not finite."""
+    for jet in after:
+        for what, x in zip(DERIVATIVE_NAMES, jet, strict=True):
+            if not math.isfinite(x):
+                return f"has the {what} {x:g} just after. Give a law that is finite and smooth over the whole time"
+    return ""
+
+
+def _unbounded_derivative(near: list[tuple], when: str) -> str:
+    """What is wrong with a law that has these values and derivatives at times ever farther from one instant."""
+    for what, *sizes in zip(DERIVATIVE_NAMES[1:], *(np.abs(jet[1:]) for jet in near), strict=True):
+        if all(x > GROWTH_FACTOR * y for x, y in pairwise(sizes)):
+            return (
+                f"has a {what} that grows without bound just {when}, which asks for an infinite "
+                f"{'velocity' if what == DERIVATIVE_NAMES[1] else 'acceleration'}. Give a law with finite derivatives (a power "
+                f"of what becomes zero: an exponent of 2 or more), or step5, which goes over smoothly"
+            )
+    return ""
+
+
+def _jump_of_law(before: tuple, after: tuple, step: float, wrapped: bool) -> str:
+    """What is wrong with a law whose value and two derivatives are these just before and just after."""
+    if not all(map(math.isfinite, before)):
+        return ""
+    for k, remedy in ((0, "step5(t, t0, 0, t1, 1) goes over smoothly"), (1, "step5 or a cubic Table goes smoothly")):
+        change = after[k] - before[k]
+        if wrapped and k == 0:
+            change = math.atan2(math.sin(change), math.cos(change))
+        slope = max(abs(before[k + 1]), abs(after[k + 1]))
+        if abs(change) > JUMP_FACTOR * step * slope + 1e-7 * (abs(before[k]) + abs(after[k])) + 1e-12:
+            return (
+                f"jumps in its {DERIVATIVE_NAMES[k]}, from {before[k]:.6g} to {after[k]:.6g}, which asks for an infinite force; "
+                f"{remedy}"
+            )
+    return ""
+
+
+def _not_finite_motion(a: Assembly, clock: ex.StepState, method: str) -> str:
+    if clock.count.status != ex.NOT_FINITE and a.compiled.work.counts.status != motion.NOT_FINITE:
+        return ""
+    t = float(clock.real.t)
+    span = float(clock.real.largest)
+    if text := step_too_long(a, clock, method):
+        return f"at t = {t:.6g} s the motion is not finite any more: {text}"
+    if text := unbounded_motion(a, clock, _component_name):
+        return text
+    if text := undefined_row(a.compiled):
+        return f"the equations of motion are not finite just after t = {t:.6g} s: {text}"
+    times = [t + d * span for d in (0.0, *LOOKAHEAD)]
+    broken = (text for at in times for find in (force_fault, _controller_fault) if (text := find(a.compiled, at)))
+    if text := next(broken, "") or _extrapolated_fault(a, clock):
+        return f"the equations of motion are not finite just after t = {t:.6g} s: {text}"
+    wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)
+    if not wrong.any() and (corners := _active_corners(a)):
+        return (
+            f"just after t = {t:.6g} s nothing was found that holds the motion on the corner of the "
+            f"{' and the '.join(corners)}, or lets it go. Make that law smooth there: max(-1, min(1, x / width)) for "
+            f"sign(x)"
+        )
+    return (
+        f"the equations of motion are not finite just after t = {t:.6g} s, first at "
+        f"{_component_name(a, int(np.argmax(wrong)))}. Look for a law that divides by zero or leaves its range"
+    )
+
+
+def _end_of_curve(a: Assembly, clock: ex.StepState) -> str:
+    """A curve at whose end its follower has come; else nothing."""
+    s, numbers = a.compiled.structure, a.compiled.values.numbers
+    for joint in s.model.joints:
+        at = s.state_at.get(f"{joint.name}.place")
+        if at is None or not math.isfinite(place := float(clock.y[0][s.nq + s.nv + at])):
+            continue
+        if text := joint.end_message(numbers[joint.name], place):  # type: ignore[attr-defined]
+            return f"at t = {float(clock.real.t):.6g} s {text}"
+    return ""
+
+
+def _active_corners(a: Assembly) -> list[str]:
+    """Laws on whose corners the motion is held."""
+    mode = a.compiled.work.modes.mode
+    specs = enumerate(a.compiled.structure.switches)
+    return [x.switch.label for k, x in specs if x.switch.kind == BRANCH and mode[k] != OFF]
+
+
+def force_fault(c: CompiledMechanism, t: float) -> str:
+    """The force that is no number at the kinematics that the compiled loop has left, and why; else nothing.
+
+    Where limits of a controller cross it is that.
+    """
+    if text := contradicting_limits(c, t):
+        return text
+    s, S, W = c.structure, c.values.system, c.work
+    stack = np.zeros_like(W.stack)
+    forces: list[Any] = list(s.forces)
+    with np.errstate(all="ignore"):
+        for k, e in enumerate(forces):
+            if isinstance(e, Touch):
+                if not math.isfinite(W.sensed[LOAD, S.forces.load[k]]):
+                    return f"what {e.title} presses with is no number"
+                continue
+            F, M, par = (
+                load_record(W.FK, S.forces.F[k]),
+                load_record(W.FK, S.forces.M[k]),
+                force_row(S.force_parameters, k),
+            )
+            x, y = law_inputs(c, k)
+            if not math.isfinite(x) or not math.isfinite(y):
+                return f"what {e.title} measures is no number. {e.fails}"
+            laws = [
+                float(evaluate(S.code, S.const, at, stack, (t, x, y), W.sensed)) if at >= 0 else 0.0
+                for at in S.forces.laws[k].tolist()
+            ]
+            if not np.isfinite(laws).all():
+                given = (
+                    "".join(f", {n} = {v:.6g}" for n, v in zip(e.outputs, (x, y), strict=False)) if e.outputs else ""
+                )
+                part = undefined_law_part(c, e, t, (float(x), float(y)))
+                return (
+                    f"the law of {e.title} gives {laws} for t = {t:.6g}{given}"
+                    f"{f', as {part}' if part else ''}. Look for a division by zero or a range that it leaves"
+                    f"{_law_texts(e)}"
+                )
+            pressed = W.sensed[LOAD, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
+            out = (
+                e.effort(par, x, y, laws, pressed)
+                if isinstance(e, CoordinateForce)
+                else np.ravel(e.wrench(par, F, M, tuple(laws), (x, y)))
+            )
+            if not np.isfinite(out).all():
+                return f"the force of {e.title} is no number. {e.fails}"
+    return ""
+
+
+def _controller_fault(c: CompiledMechanism, t: float) -> str:
+    """The controller whose state has no finite rate for what is measured as the compiled loop has left it."""
+    for x in c.structure.controls:
+        if part := undefined_law_part(c, x.controller, t):
+            law = abbreviated(tree_text(x.law.tree))
+            return f"the rate of {x.name!r} of {x.controller.title}, {law}, has no finite value, as {part}"
+    return ""
+
+
+def _extrapolated_fault(a: Assembly, clock: ex.StepState) -> str:
+    """The force or controller without a finite value where the motion would be by its present rates."""
+    c, t, y, rates = a.compiled, float(clock.real.t), clock.y[ex.CURRENT], clock.K[0]
+    if not np.isfinite(y).all() or not np.isfinite(rates).all():
+        return ""
+    s, z = c.structure, c.z
+    for d in (clock.real.h, *(part * clock.real.largest for part in LOOKAHEAD)):
+        x = y + d * rates
+        c.z = x[s.nq + s.nv :].copy()
+        with np.errstate(all="ignore"):
+            c.at(t + d, x[: s.nq].copy(), x[s.nq : s.nq + s.nv].copy(), MOTION)
+        if text := force_fault(c, t + d) or _controller_fault(c, t + d):
+            break
+    c.z = z
+    return text
+
+
+def _law_texts(e: Element) -> str:
+    """What the laws of a force are as given, the beginning and end of long ones."""
+    given = {name: getattr(e, name) for name in ("law",) if isinstance(e, Driver)}
+    given |= {name: getattr(e, name) for name in fields_with(e.__class__, LawOf)}
+    texts = [f"{name} = {abbreviated(x)}" for name, x in given.items() if isinstance(x, str)]
+    return f", in {'; '.join(texts)}" if texts else ""
+
+
+def _lock_up(a: Assembly, base: Assembly, clock: ex.StepState) -> str:
+    """The elements for whose rows there are no accelerations where the motion stopped, if so."""
+    t, y, own, c = float(clock.real.t), clock.y[0], a.compiled, base.compiled
+    if not len(c.structure.rows) or not np.isfinite(y).all():
+        return ""
+    nq, nv = own.structure.nq, own.structure.nv
+    q, v, own.z = y[:nq].copy(), y[nq : nq + nv].copy(), y[nq + nv :].copy()
+    if c is not own:
+        q, v = c.take(own, t, q, v)
+    _, dy = c.at(t, q, v, MOTION)
+    x = dy[c.structure.nq : c.structure.nq + c.structure.nv]
+    if not np.isfinite(x).all():
+        return ""
+    gap, _, asked = acceleration_residual(c, v, x, c.sizes)
+    if not gap.max() > LOCKED_RESIDUAL * asked:
+        return ""
+    names = list(dict.fromkeys(c.structure.rows[k].element.name for k in np.argsort(-gap) if gap[k] > 1e-3 * gap.max()))
+    why = explain_contradiction(c, t, q, v, c.work.rows.gamma.copy(), "/s^2") or (
+        "in this position they leave no way on for these velocities. The mechanism locks (a driver may ask for more "
+        "than its links allow), or it is drawn in a singular position with velocities that it cannot have"
+    )
+    return f"at t = {t:.6g} s no accelerations fulfil the constraints of {', '.join(names[:8])} together: {why}"
+
+
+def _friction_jam(a: Assembly, clock: ex.StepState) -> str:
+    W = a.compiled.work
+    if W.counts.status != motion.JAMMED:
+        return ""
+    loads = int((a.compiled.system.forces.load >= 0).sum())
+    return jam_message(a.compiled.structure.forces[int(W.counts.guilty_row)], float(clock.real.t), loads == 1)
+
+
+def _step_too_small(a: Assembly, clock: ex.StepState) -> str:
+    rows, W = a.compiled.structure.rows, a.compiled.work
+    k = int(W.counts.guilty_row)
+    where = f" near {rows[k].element.title}" if rows else ""
+    if rows and isinstance(rows[k].element, Driver):
+        where += f" (whose law there has the rate {W.rows.nu[k]:.4g} and the second derivative {W.rows.nu_dot[k]:.4g})"
+    t = f"t = {clock.real.t:.6g} s"
+    begun = clock.count.started == 1
+    if clock.real.step > 0.0 and begun:
+        return (
+            f"at {t} a step of {clock.real.step:g} s has no solution{where}: give a shorter step, or leave step "
+            f"out, and its width is chosen"
+        )
+    what = f"{t}: the step width fell to {clock.real.h:.3g} s{where}" if begun else f"its start, {t}{where}"
+    if rounding := rounding_suffix(clock):
+        return f"the integration cannot go on at {what}{rounding}"
+    return (
+        f"the integration cannot go on at {what}. The mechanism may lock there (a driver asks for more than its links "
+        f"allow), pass a singular position that the tolerance asks to resolve (a looser rtol steps over it), or meet "
+        f"a force that changes abruptly"
+    )
+
+
+def _too_many_steps(a: Assembly, clock: ex.StepState) -> str:
+    if clock.real.step > 0.0:
+        return (
+            f"max_steps = {clock.count.limit} steps of {clock.real.step:g} s were taken by "
+            f"t = {clock.real.t:.6g} s; give more (max_steps=)"
+        )
+    if text := sampling_limits_steps(a.compiled, clock, a.t):
+        return text
+    slowest = _component_name(a, _fastest_component(clock))
+    return (
+        f"max_steps = {clock.count.limit} steps were taken by t = {clock.real.t:.6g} s; they are "
+        f"{clock.real.h:.3g} s wide by now, for the sake of {slowest}. Give more steps (max_steps=), a larger "
+        f"rtol, or less stiffness (friction too is stiff) there"
+    )
+
+
+def _fastest_component(clock: ex.StepState) -> int:
+    """The component of the state whose derivative changed most within the last step, by its tolerance."""
+    n = clock.count.controlled
+    with np.errstate(all="ignore"):
+        change = np.ptp(clock.K[:, :n], axis=0) / (clock.real.atol + clock.real.rtol * np.abs(clock.y[0, :n]))
+    return int(np.argmax(np.nan_to_num(change)))
+
+
+def _component_name(a: Assembly, i: int) -> str:
+    """Name of the body or tree joint that a component of the state belongs to."""
+    s, tree = a.compiled.structure, a.compiled.structure.tables["tree"]
+    if s.nq + s.nv <= i < s.nq + s.nv + len(s.controls):
+        return f"controller state {s.controls[i - s.nq - s.nv].name!r}"
+    for joint in s.tree_joints.values():
+        for b in joint.links:
+            if i in range(s.nq)[tree.coordinates(b)] or i - s.nq in range(s.nv)[tree.velocities(b)]:
+                return f"joint {joint.joint.name!r}"
+    for name, b in s.place.items():
+        if b >= 0 and (i in range(s.nq)[tree.coordinates(b)] or i - s.nq in range(s.nv)[tree.velocities(b)]):
+            return f"body {name!r}"
+    return "a measured quantity"

@@ -1,0 +1,329 @@
+"""Event context: the motion at an instant, the bounds of its switches, and locking and releasing.
+
+`EventContext` is what everything that happens at an instant reads and writes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...assembly.compiled_mechanism import CompiledMechanism
+from ...constraints.switch_kinds import ELASTIC, FROZEN, LOCK, RATCHET, STOP
+from ...engine.entry_point import MOTION, evaluate_state
+from ...engine.guards import ForceDistribution, empty_distribution
+from ...errors import SimulationError
+from ...model.contact_point import Touch
+from ...model.event import Event, Lock, Release
+from ...model.event_validation import lock_target
+from ...numerics.integrators.time_loop import CURRENT, StepState
+from ...results.result import Result
+from ...tables.constraint_rows import SwitchSpec
+from ...tables.structure_definition import Structure
+from ...tables.table_definitions import HELD, OFF, VALUE
+from ..initial_state import InitialState
+
+
+@dataclass
+class EventContext:
+    """A motion where it stands.
+
+    Modes are in ``c.work.modes``, the sides of switches behind what is sensed (see `equations.guards`).
+
+    Attributes
+    ----------
+    start : Start
+        Where and in which coordinates it began.
+    clock : Clock
+        Of the integration: its time and state are those of the instant.
+    records : list of Happening
+        What happened so far, in order.
+    lost : float
+        Mechanical energy [J] that impacts and sudden changes took so far.
+    given : float
+        Mechanical energy [J] that kicks and changed parameters gave so far.
+    stopped : str
+        Why the motion ends here, in words; empty: it goes on.
+    kick : ndarray, optional
+        Generalised impulse (nv,) that is given at this instant: taken up by the next jump.
+    blows : list
+        What it is made of; see `results.struck.Struck`.
+    doubts : list of str
+        What rigid bodies left open, in words, for the health.
+    bounces : dict
+        Switch -> `impacts.BounceSeries`: how often it closed lately.
+    swings : dict
+        Switch -> when the last ways through its corner were (`swings`).
+    counts : dict
+        Event -> how often it happened so far.
+    true : list of str
+        Events whose comparisons were true as the motion began.
+    acted : dict
+        What was settled by events at the instant ``acted_at``, and by which action of which.
+    nothing : mapping
+        Guard -> what is zero of it at the instant, where that is known.
+    zero : dict
+        Event -> what its guard was, in size, where it last fired: zero to rounding.
+    sides : dict
+        Event -> the side that its guard was last on, where the motion ends within rounding of zero.
+    fresh : bool
+        Whether forces or velocities jump at the instant: the next step is then no wider than those of late.
+    decider : Instant, optional
+        What decides at its instants (`events.instant`).
+    failed : Exception
+        Why the motion cannot go on here.
+    watched : str
+        How closely it was looked for events, in words.
+    method : str
+        By what it was computed from when on, in words, where that was not one method.
+    astray : frozenset of int
+        Switches found where they should not be (`events.astray`): stops left the wrong way with no speed, which close
+        without a bounce, and corners whose laws were on the wrong side.
+    sharing : Sharing, optional
+        What holds together and shares its forces (`equations.sharing`).
+    tied : frozenset of tuple
+        Guards (kind, switch) of what is at its end and is kept there by others (`events.idle`).
+    least : dict
+        Switch -> force that is rounding, of what takes part in the modes decided last.
+    still : tuple of int
+        Measured quantities whose rates what holds keeps at zero (`events.still`).
+    seen : Segments, optional
+        What held at the rows of output so far (`events.segments`).
+    """
+
+    start: InitialState
+    clock: StepState
+    records: list[Any] = field(default_factory=list)
+    lost: float = 0.0
+    stopped: str = ""
+    fresh: bool = False
+    instant_problem: Any = None
+    failed: Exception | None = None
+    watched: str = ""
+    method: str = ""
+    given: float = 0.0
+    external_impulse: np.ndarray | None = None
+    external_impulses: list[Any] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+    bounces: dict[int, Any] = field(default_factory=dict)
+    corner_passages: dict[int, list[float]] = field(default_factory=dict)
+    tied: frozenset[tuple[int, int]] = frozenset()
+    least: dict[int, float] = field(default_factory=dict)
+    still: tuple[int, ...] = ()
+    seen: Any = None
+    sharing: Any = None
+    counts: dict[str, int] = field(default_factory=dict)
+    settled_keys: dict[str, Any] = field(default_factory=dict)
+    settled_at: float = float("nan")
+    astray: frozenset[int] = frozenset()
+    true: list[str] = field(default_factory=list)
+    nothing: Mapping[int, float] = field(default_factory=dict)
+    zero: dict[str, float] = field(default_factory=dict)
+    sides: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def c(self) -> CompiledMechanism:
+        """Tables and scratch that the motion is computed with."""
+        return self.start.assembly.compiled
+
+    @property
+    def structure(self) -> Structure:
+        """Its integers."""
+        return self.c.structure
+
+    @property
+    def t(self) -> float:
+        """The instant [s]."""
+        return float(self.clock.real.t)
+
+    @property
+    def y(self) -> np.ndarray:
+        """The state there (q, v, z), to be written to in place, (ny,)."""
+        return self.clock.y[CURRENT]
+
+    @property
+    def group(self) -> ForceDistribution:
+        """What holds together and shares its forces: `empty_distribution`, made when it is first asked for."""
+        if self.sharing is None:
+            self.sharing = empty_distribution(len(self.c.system.switches.row), len(self.c.system.rows.law))
+        return self.sharing
+
+    @property
+    def q(self) -> np.ndarray:
+        """Its positions, in place, (nq,)."""
+        return self.y[: self.structure.nq]
+
+    @property
+    def v(self) -> np.ndarray:
+        """Its velocities, in place, (nv,)."""
+        return self.y[self.structure.nq : self.structure.nq + self.structure.nv]
+
+    def evaluate(self) -> None:
+        """Have kinematics, rows, forces and what is measured at the state of the instant in the scratch."""
+        evaluate_state(*self.c.buffers, self.t, self.y.copy(), MOTION)
+
+    def names(self) -> dict[str, float]:
+        """Values of all that expressions of events may name, at the state last evaluated."""
+        c, sensed = self.c, self.c.work.sensed
+        return {"t": self.t, **c.values.env, **{k: float(sensed[VALUE, m]) for k, m in self.structure.slots.items()}}
+
+
+PRINTED_ZERO = 1e-12  # m or rad: printed as 0
+
+
+def switch_units(s: Structure) -> list[str]:
+    """Of every switch the unit of its quantity: m or rad."""
+    rows = len(s.rows)
+    measures = {t.row - rows: t.formula.measure for t in s.terms if t.measured}
+    return ["m" if measures.get(x.measured) == "m" else "rad" for x in s.switches]
+
+
+def switch_scales(s: Structure, length: float) -> np.ndarray:
+    """Of every switch what its quantity is compared with: the mechanism's length, or a radian, (ns,)."""
+    return np.array([length if unit == "m" else 1.0 for unit in switch_units(s)])
+
+
+def bounded_quantity(spec: SwitchSpec) -> str:
+    """Name of the quantity of a switch, for messages."""
+    if spec.switch.path:
+        return "its gap" if isinstance(spec.element, Touch) else "its length"
+    return repr(spec.switch.along[0]) if len(spec.switch.along) == 1 else f"the play of {', '.join(spec.switch.along)}"
+
+
+def value_in_words(x: float, unit: str) -> str:
+    """A value with its unit; an angle in degrees too."""
+    if abs(x) < PRINTED_ZERO:
+        return f"0 {unit}"
+    return f"{x:.6g} m" if unit == "m" else f"{x:.6g} rad ({math.degrees(x):.4g} deg)"
+
+
+def violated_rule(spec: SwitchSpec, x: float, bounds: tuple[float, float], unit: str) -> str:
+    """What a quantity is, and what it must be."""
+    lower, upper = bounds
+    must = f"at least {value_in_words(lower, unit)}" if x < lower else f"at most {value_in_words(upper, unit)}"
+    return f"{bounded_quantity(spec)} is {value_in_words(x, unit)} and must be {must}"
+
+
+def violated_bounds(here: EventContext, near: np.ndarray) -> dict[int, float]:
+    """Switches that are beyond their bounds by more than ``near``, or off the tooth that holds them, and how far.
+
+    A stop that holds and is not at its bound any more, on its free side, lets go. Quantities of the state are in the
+    scratch.
+    """
+    S, W, out = here.c.system, here.c.work, dict[int, float]()
+    ways = W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] :]
+    for s, spec in enumerate(here.structure.switches):
+        x, kind = W.sensed[VALUE, spec.measured], S.switches.kind[s]
+        if kind == RATCHET and W.modes.mode[s] == HELD:
+            tooth, pitch = S.switch_numbers.tooth[s], S.switch_numbers.pitch[s]
+            off = (W.modes.hold[s] - tooth) / pitch
+            past = abs(off - round(off)) * pitch
+        elif kind == STOP:
+            past = max(W.modes.lower[s] - x, x - W.modes.upper[s])
+            if W.modes.mode[s] == HELD and past <= near[s]:
+                side = (W.modes.lower if ways[s] > 0.0 else W.modes.upper)[s]
+                W.modes.hold[s] = side
+                if abs(x - side) > near[s]:
+                    W.modes.mode[s], ways[s] = OFF, 0.0
+        else:
+            continue
+        if past > near[s]:
+            out[s] = float(past)
+    return out
+
+
+CLOSED_TOLERANCE = 1e-6  # of the mechanism's length, or a radian: a joint that is let go holds again where it is closed
+RELEASED = 1.0  # in `Modes.released`: an element that was released; whatever it does, it does not
+
+
+def lock(here: EventContext, e: Event, a: Lock) -> str:
+    """Hold coordinates where they are, a joint where it is closed, or have a limit or rope in force again.
+
+    Raises
+    ------
+    SimulationError
+        If the joint is open.
+    """
+    W, S = here.c.work, here.c.system
+    held = lock_target(here.structure.model, e, a)
+    for k in switch_numbers_of(here, held.coordinates, held.joint, held.element):
+        if held.element:
+            W.modes.released[k] = 0.0
+            W.modes.lower[k], W.modes.upper[k] = S.switch_numbers.lower[k], S.switch_numbers.upper[k]
+            here.given += elastic_energy(here, k)
+            continue
+        x = W.sensed[VALUE, S.switches.measured[k]]
+        if held.joint and abs(x) > CLOSED_TOLERANCE * here.c.values.length:
+            raise SimulationError(
+                f"at t = {here.t:.9g} s {a.title} in {e.title}: it is open by {abs(x):.3g}, and holds again only where "
+                f"its bodies meet; let the event be where they do",
+                t=here.t,
+            )
+        if W.modes.mode[k] == OFF:
+            W.modes.hold[k] = 0.0 if held.joint else x
+        W.modes.mode[k] = HELD
+    return f"{a.what} is in force" if held.element else f"locked {a.what}"
+
+
+def release(here: EventContext, e: Event, a: Release) -> str:
+    """Let coordinates, a joint, a limit or a rope go."""
+    W = here.c.work
+    ways = W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] :]
+    held, kinds = lock_target(here.structure.model, e, a), here.c.system.switches.kind
+    every = switch_numbers_of(here, held.coordinates, held.joint, held.element)
+    if not any(W.modes.released[k] == 0.0 if held.element else W.modes.mode[k] != OFF for k in every):
+        return f"{a.what} was {'released already' if held.element else 'not locked'}"
+    for k in every:
+        if held.element:
+            here.given -= elastic_energy(here, k)
+        W.modes.mode[k], ways[k] = OFF, FROZEN if kinds[k] == ELASTIC else 0.0
+        if held.element:
+            W.modes.released[k], W.modes.lower[k], W.modes.upper[k] = RELEASED, -np.inf, np.inf
+    return f"released {a.what}"
+
+
+def elastic_energy(here: EventContext, k: int) -> float:
+    """Energy [J] in an elastic switch at the state last evaluated; it goes when that is released."""
+    S, W = here.c.system, here.c.work
+    if S.switches.kind[k] != ELASTIC:
+        return 0.0
+    x = W.sensed[VALUE, S.switches.measured[k]]
+    depth = max(W.modes.lower[k] - x, x - W.modes.upper[k], 0.0)
+    return float(0.5 * S.switch_numbers.stiffness[k] * depth**2)
+
+
+def switch_numbers_of(here: EventContext, coordinates: tuple[str, ...], joint: str, element: str) -> list[int]:
+    """Numbers of the rows that hold these coordinates, or are those of a joint or element."""
+    kinds = here.c.system.switches.kind
+    out = []
+    for k, spec in enumerate(here.structure.switches):
+        own = isinstance(spec.element, Event)
+        if (own and spec.switch.label in coordinates) or (
+            not own and spec.element.name == (joint or element) and (kinds[k] == LOCK) == bool(joint)
+        ):
+            out.append(k)
+    return out
+
+
+def restore_locks(here: EventContext, before: Result) -> None:
+    """Lock and release as an earlier motion ended."""
+    phases = getattr(before, "phases", None)
+    if phases is None or not phases.all:
+        return
+    last, W = phases.all[-1], here.c.work
+    old = {(x.element.name, x.switch.label): k for k, x in enumerate(last.values.structure.switches)}
+    for k, spec in enumerate(here.structure.switches):
+        j = old.get((spec.element.name, spec.switch.label))
+        if j is None:
+            continue
+        if spec.switch.kind == LOCK:
+            W.modes.mode[k], W.modes.hold[k] = last.modes.mode[j], last.modes.hold[j]
+        elif last.modes.released[j] == RELEASED:
+            W.modes.released[k], W.modes.lower[k], W.modes.upper[k] = RELEASED, -np.inf, np.inf
+            W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] + k] = (
+                FROZEN if spec.switch.kind == ELASTIC else 0.0
+            )

@@ -1,0 +1,649 @@
+"""Actions of the model's events: set, lock, release, impulse, note, stop; data carried over to the next run."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import takewhile
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...constraints.switch_kinds import ELASTIC, RATCHET, STOP
+from ...engine.kinematics import store_ground_frames, twist_column
+from ...errors import FlyballError, SimulationError
+from ...model.body import Body, Frame
+from ...model.contact_point import Touch
+from ...model.element import LawOf, si_numbers
+from ...model.event import Action, Event, Impulse, Lock, Note, Release, Set, Stop, comparison_sides, component_list
+from ...model.event_validation import coordinate_of, lock_target
+from ...model.geometry import vector
+from ...results.events import EventRecord
+from ...results.reactions import AppliedImpulse, sum_impulses
+from ...tables.contact_places import contact_places
+from ...tables.element_numbers import names_in
+from ...tables.law_inputs import forces_in_events
+from ...tables.structure_definition import Structure
+from ...tables.table_definitions import HELD, VALUE, assign, map_arrays
+from ...tables.values import Values, values
+from .context import (
+    EventContext,
+    lock,
+    release,
+    restore_locks,
+    switch_scales,
+    switch_units,
+    violated_bounds,
+    violated_rule,
+)
+from .impacts import BounceSeries
+
+
+def continuation_data(here: EventContext) -> dict[str, Any]:
+    """How often events happened, what they were as they last did, bounces and swings of late; plain data, by names."""
+    names = _switch_names(here) if here.bounces or here.corner_passages else []
+    bounces = [[*names[s], b.count, b.last, b.before] for s, b in here.bounces.items()]
+    swings = [[*names[s], *past] for s, past in here.corner_passages.items()]
+    every = {"counts": dict(here.counts), "true": list(here.true), "bounces": bounces, "swings": swings}
+    every |= {"zero": dict(here.zero), "sides": dict(here.sides)}
+    return {k: x for k, x in every.items() if x}
+
+
+def restore_continuation_data(here: EventContext, before: Mapping[str, Any]) -> None:
+    """Go on with it. What the mechanism does not have any more is left out."""
+    names = {e.name for e in here.structure.model.events}
+    known = {name: s for s, name in enumerate(_switch_names(here))}
+    here.counts = {k: int(n) for k, n in before.get("counts", {}).items() if k in names}
+    here.zero = {k: float(x) for k, x in before.get("zero", {}).items() if k in names}
+    here.sides = {k: float(x) for k, x in before.get("sides", {}).items() if k in names}
+    here.true = [k for k in before.get("true", ()) if k in names]
+    for element, label, which, count, last, previous in before.get("bounces", ()):
+        if (s := known.get((element, label, which))) is not None:
+            here.bounces[s] = BounceSeries(int(count), float(last), float(previous))
+    for element, label, which, *past in before.get("swings", ()):
+        if (s := known.get((element, label, which))) is not None:
+            here.corner_passages[s] = [float(t) for t in past]
+
+
+def _switch_names(here: EventContext) -> list[tuple[str, str, int]]:
+    """What switches are called, in files too: element, label, which of these."""
+    seen: Counter[tuple[str, str]] = Counter()
+    out = []
+    for spec in here.structure.switches:
+        name = spec.element.name, spec.switch.label
+        out.append((*name, seen[name]))
+        seen[name] += 1
+    return out
+
+
+PLACE_TOLERANCE = 1e-9  # of the mechanism's length, or of a radian: what may be elsewhere by rounding
+
+
+def set_parameters(here: EventContext, new: Mapping[str, float], who: str) -> None:
+    """Go on with other values of parameters.
+
+    Parameters
+    ----------
+    here : Here
+    new : mapping
+        Parameter -> value in SI units.
+    who : str
+        What asks for it, for messages.
+
+    Raises
+    ------
+    SimulationError
+        If a number makes no sense with them, or something would be elsewhere in no time.
+    """
+    c = here.c
+    told = {**c.parameters, **new}
+    old = c.values
+    try:
+        env = here.structure.model.environment(told)
+        for e in here.structure.model.elements():
+            if not set(names_in(e)).isdisjoint(_changed_parameters(old.env, env)):
+                here.structure.model.validate(e, env)
+        found = values(here.structure, told)
+    except FlyballError as error:
+        raise SimulationError(f"at t = {here.t:.9g} s {who}: {error}", t=here.t) from None
+    _refuse_moved_contacts(here, found, who)
+    before, bounds, kept = _body_places(here, old), map_arrays(lambda _, x: x.copy(), c.work.modes), c.parameters
+    _use_values(here, found, told)
+    try:
+        _refuse_moved_bodies(here, who, before, _body_places(here, found))
+        _move_bounds(here, old)
+        _refuse_violated_bounds(here, who)
+    except SimulationError:
+        _use_values(here, old, kept)
+        assign(c.work.modes, bounds)
+        raise
+    here.fresh = True
+
+
+def _use_values(here: EventContext, x: Values, parameters: Mapping[str, float]) -> None:
+    """Go on by these numbers."""
+    c = here.c
+    c.values, c.system, c.parameters = x, x.system, dict(parameters)
+    store_ground_frames(c.system, c.work)
+
+
+def _move_bounds(here: EventContext, old: Values) -> None:
+    """Bounds of stops, and teeth, as the numbers now say."""
+    S, W = here.c.system, here.c.work
+    now, then = S.switch_numbers, old.system.switch_numbers
+    moved = (now.lower != then.lower) | (now.upper != then.upper)
+    for s in np.flatnonzero((W.modes.released == 0.0) & moved).tolist():
+        if S.switches.kind[s] in (STOP, ELASTIC, RATCHET):
+            W.modes.lower[s], W.modes.upper[s] = now.lower[s], now.upper[s]
+
+
+def _refuse_moved_contacts(here: EventContext, new: Values, who: str) -> None:
+    """Refuse that shapes that may touch are others: their places are laid out when a motion begins."""
+    model, had = here.structure.model, [e for e in here.structure.model.forces if isinstance(e, Touch)]
+    if not had:
+        return
+    has = contact_places(model, new.given).touches
+    moved = np.array(
+        [_contact_distance(a, b) for a, b in zip(had, has, strict=False)] if len(had) == len(has) else [np.inf]
+    )
+    if not moved.max() <= PLACE_TOLERANCE * here.c.values.length:
+        raise SimulationError(
+            f"at t = {here.t:.9g} s {who} would put what touches at {had[int(moved.argmax())].title} elsewhere in no "
+            f"time, by {moved.max():.3g} m: shapes of contacts keep their sizes and places while they move",
+            t=here.t,
+        )
+    for a, b in zip(had, has, strict=True):
+        if (a.friction, a.restitution) != (b.friction, b.restitution):
+            raise SimulationError(
+                f"at t = {here.t:.9g} s {who} would change friction or restitution of {a.title}, which a motion that "
+                f"is integrated takes as they are at its start; let one motion end there (fb.Stop), and go on from it "
+                f"with the other value: simulate(start=run, parameters=...)",
+                t=here.t,
+            )
+
+
+def _contact_distance(a: Touch, b: Touch) -> float:
+    """How far the numbers of two places are apart."""
+    pairs = [(a.gap, b.gap), *zip(a.slips, b.slips, strict=False), *zip(a.frames, b.frames, strict=True)]
+    return max((abs(x - y) for one, other in pairs for x, y in zip(one, other, strict=True)), default=0.0)
+
+
+def _refuse_violated_bounds(here: EventContext, who: str) -> None:
+    """Refuse that a stop, a rope or a tooth is where its quantity may not be."""
+    s, W = here.structure, here.c.work
+    past = violated_bounds(here, PLACE_TOLERANCE * switch_scales(s, here.c.values.length))
+    if past:
+        k = max(past, key=past.__getitem__)
+        spec, unit = s.switches[k], switch_units(s)[k]
+        bounds, x = (W.modes.lower[k], W.modes.upper[k]), W.sensed[VALUE, spec.measured]
+        said = (
+            "it is held where no tooth is"
+            if spec.switch.kind == RATCHET
+            else violated_rule(spec, float(x), bounds, unit)
+        )
+        raise SimulationError(
+            f"at t = {here.t:.9g} s {who} would put {spec.element.title} elsewhere in no time, by {past[k]:.3g} "
+            f"{unit}: {said}. Set it where nothing is beyond it, give it stiffness=..., or let a Driver move what it "
+            f"is fixed to",
+            t=here.t,
+        )
+
+
+def _changed_parameters(old: Mapping[str, float], new: Mapping[str, float]) -> set[str]:
+    return {k for k, x in new.items() if old[k] != x}
+
+
+class BodyPlaces(NamedTuple):
+    """Where every body's reference frame is at the state of the motion and how it moves; what rows and drivers say."""
+
+    at: dict[str, np.ndarray]
+    moving: dict[str, np.ndarray]
+    value: np.ndarray
+    rate: np.ndarray
+
+
+def _body_places(here: EventContext, x: Values) -> BodyPlaces:
+    """At the state of the motion, by these numbers."""
+    c, s = here.c, here.structure
+    here.evaluate()
+    K, out, moving = c.work.BK, {}, {}
+    for name, b in s.place.items():
+        if b >= 0:
+            R = K[b, 3:12].reshape(3, 3)
+            out[name] = np.r_[K[b, :3] - R @ x.bodies[name].com, R.ravel(), K[b, :3]]
+            moving[name] = K[b, 12:18].copy()
+    return BodyPlaces(out, moving, c.work.rows.value.copy(), c.work.rows.nu.copy())
+
+
+def _refuse_moved_bodies(here: EventContext, who: str, before: BodyPlaces, after: BodyPlaces) -> None:
+    """Refuse that a body, or what a row holds, is elsewhere all at once, or that drivers ask for other speeds."""
+    size = here.c.values.length
+    titles = [f"{r.element.title} ({r.label})" for r in here.structure.rows]
+    fast = {f"body {k!r}": np.abs(p - before.moving[k]).max() for k, p in after.moving.items()}
+    fast |= {title: abs(a - b) for title, a, b in zip(titles, after.rate, before.rate, strict=True)}
+    quick = max([1e-3 * size, *(np.abs(x).max() for x in before.moving.values())])
+    off = {f"body {k!r}": np.abs(p - before.at[k]).max() / size for k, p in after.at.items()}
+    off |= {title: abs(a - b) / size for title, a, b in zip(titles, after.value, before.value, strict=True)}
+    worst = max(off, key=lambda name: off[name] if np.isfinite(off[name]) else np.inf)
+    if not off[worst] <= PLACE_TOLERANCE:
+        raise SimulationError(
+            f"at t = {here.t:.9g} s {who} would put {worst} elsewhere in no time, by {off[worst] * size:.3g}: a "
+            f"parameter that is set may change forces, laws and masses, not where things are. Let a Driver move it",
+            t=here.t,
+        )
+    worst = max(fast, key=lambda name: fast[name] if np.isfinite(fast[name]) else np.inf)
+    if not fast[worst] <= PLACE_TOLERANCE * quick:
+        raise SimulationError(
+            f"at t = {here.t:.9g} s {who} would change the velocity of {worst} by {fast[worst]:.3g} in no time, since "
+            f"a driver's law jumps: let the law rise smoothly, as by step(t, ...)",
+            t=here.t,
+        )
+
+
+SIMULTANEOUS_ULPS = 64  # units of the last place of a time: the gap that a jump of laws leaves, and more
+SIMULTANEOUS_SHARE = 1e-11  # part of a motion within which events happen at once
+MOST_EXPRESSIONS = 1000  # expressions of events that are kept as they were read
+CLEAR_PASSAGE = 1e-9  # of what an expression was at most: beyond it, it has passed zero by a jump
+
+
+@dataclass
+class EventActions:
+    """What events do at one instant.
+
+    Attributes
+    ----------
+    here : Here
+    events : tuple of Event
+        Those that happen.
+    words : dict
+        Event -> what was done.
+    values : dict
+        Guard -> value of its event's expression before anything was done.
+    """
+
+    here: EventContext
+    events: tuple[Event, ...]
+    words: dict[str, list[str]] = field(default_factory=dict)
+    values: dict[int, float] = field(default_factory=dict)
+    before: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    first: int = 0
+    tables: Values | None = None  # before
+
+    def told(self, labels: Sequence[str] = ()) -> None:
+        """Record the events, each with what was done; what only it did (locking, a blow) is told with it.
+
+        ``labels``: names under which jumps that events ask for are recorded.
+        """
+        here = self.here
+        if not self.events:
+            return
+        since, here.records[self.first :] = here.records[self.first :], []
+        mine = [
+            h
+            for h in since
+            if h.kind in ("impact", "kick") and set(h.name.split(", ")) <= {*labels, *_lockable_names(here)}
+        ]
+        cause = next((e for e in self.events if any(isinstance(a, (Lock, Impulse)) for a in e.do)), self.events[0])
+        for e in self.events:
+            lost = sum(h.lost for h in mine) if e is cause else 0.0
+            impulses: Any = {} if e is not cause or not mine else mine[0].impulses
+            if e is cause and len(mine) > 1:
+                impulses = sum_impulses([h.impulses for h in mine])
+            done = tuple(self.words.get(e.name, ()))
+            both = None if self.tables is here.c.values else (self.tables, here.c.values)
+            here.records.append(
+                EventRecord(here.t, e.name, "event", done, lost, impulses, self.before, here.y.copy(), both)
+            )
+        here.records += [h for h in since if not any(h is x for x in mine)]
+
+    def passed(self) -> np.ndarray:
+        """Guards of events whose expressions went through zero by the jump itself, (n,)."""
+        return passed_by_jump(self.here, self.values)
+
+
+def _guards_of_forces(here: EventContext) -> frozenset[int]:
+    """Guards of events that name forces: whatever happens, these may jump past zero."""
+    s = here.structure
+    found: frozenset[int] = s.kept.get("events of forces", 0, 1, lambda: _find_guards_of_forces(s))
+    return found
+
+
+def _find_guards_of_forces(s: Structure) -> frozenset[int]:
+    named = set(forces_in_events(s.model))
+    laws = {g: s.model.law(e.law, e.of, f"when of {e.title}") for g, e in s.events.items()}
+    return frozenset(g for g, law in laws.items() if named & law.names)
+
+
+def _lockable_names(here: EventContext) -> set[str]:
+    """Names of all that events lock and let go."""
+    every = here.structure.switches
+    return {x.switch.label for x in every if isinstance(x.element, Event)} | {x.element.name for x in every if x.held}
+
+
+def perform_actions(here: EventContext, fired: Sequence[int]) -> EventActions:
+    """Do what the events of these guards say: parameters, what is released and locked, blows, an end.
+
+    Velocities do not change here: `EventContext.external_impulse` says what struck, the modes what is held.
+
+    Parameters
+    ----------
+    here : Here
+    fired : sequence of int
+        Rows of `System.guard_i`, those of events among them.
+
+    Raises
+    ------
+    SimulationError
+        If actions contradict one another, or cannot be done; it names the events and the time.
+    """
+    events = [here.structure.events[int(g)] for g in fired if int(g) in here.structure.events]
+    events = [e for e in events if e.times is None or here.counts.get(e.name, 0) < e.times]
+    return _perform(here, tuple(events))
+
+
+def perform_initial_actions(here: EventContext) -> EventActions:
+    """Do what events say at the start; joints that may let go hold.
+
+    Where a motion goes on nothing starts: what was locked or released stays so.
+    """
+    for k, spec in enumerate(here.structure.switches):
+        if spec.held:
+            here.c.work.modes.mode[k] = HELD
+    if here.start.before is not None:
+        restore_locks(here, here.start.before)
+        restore_continuation_data(here, here.start.before.carried)
+        return EventActions(here, (), before=here.y.copy(), tables=here.c.values)
+    # what parts carry is known only once it is decided what holds: nothing has jumped from what it is before that
+    return _perform(here, tuple(e for e in here.structure.model.events if e.at_start), _guards_of_forces(here))
+
+
+def _perform(here: EventContext, events: tuple[Event, ...], unknown: frozenset[int] = frozenset()) -> EventActions:
+    """``unknown``: guards of events whose expressions say nothing yet."""
+    acts = EventActions(here, events, before=here.y.copy(), first=len(here.records), tables=here.c.values)
+    for e in events:
+        here.counts[e.name] = here.counts.get(e.name, 0) + 1
+    every = [(e, a) for e in events for a in e.do]
+    watched = [g for g in here.structure.events if (every or g in _guards_of_forces(here)) and g not in unknown]
+    if every or watched:
+        here.evaluate()
+    for g in watched:
+        acts.values[g] = event_expression(here, g)
+    if not every:
+        return acts
+    refuse_contradictions(here, every)
+    reckoned = [(e, a, [_evaluated_argument(here, e, a, k, x) for k, x in a.laws()]) for e, a in every]
+    for kind, do in ACTION_FUNCTIONS.items():
+        if found := [(e, a, x) for e, a, x in reckoned if type(a) is kind]:
+            for e, words in do(here, found):
+                acts.words.setdefault(e.name, []).append(words)
+    return acts
+
+
+def event_expression(here: EventContext, g: int) -> float:
+    """Value of the expression of an event, by its guard, at the state last evaluated."""
+    model, e = here.structure.model, here.structure.events[g]
+    law = here.structure.kept.get(
+        "law of event", g, MOST_EXPRESSIONS, lambda: model.law(e.law, e.of, f"when of {e.title}")
+    )
+    return float(law.evaluate(here.names(), {x.name: x for x in model.tables}))
+
+
+def event_expressions(here: EventContext) -> dict[int, float]:
+    """Values of the expressions of all events, by their guards, at the state of the instant."""
+    if here.structure.events:
+        here.evaluate()
+    return {g: event_expression(here, g) for g in here.structure.events}
+
+
+def initially_true(here: EventContext) -> list[str]:
+    """Names of events whose comparisons are true now: they become true only after they were false.
+
+    Where a motion goes on, those of its begin: what is true now may have become true in what went before.
+    """
+    if here.start.before is not None:
+        return here.true
+    every = here.structure.events
+    texts = {g: e.when for g, e in every.items() if isinstance(e.when, str) and e.direction != "falling"}
+    values = event_expressions(here) if texts else {}
+    return [
+        every[g].name for g, text in texts.items() if values[g] > 0.0 and comparison_sides(text, every[g]) is not None
+    ]
+
+
+def events_at_start(here: EventContext) -> set[str]:
+    """Names of events that happened at the very end of the motion that this one goes on from."""
+    before = here.start.before
+    if before is None or not len(before.t):
+        return set()
+    end, first = before.final[0], float(before.t[0])
+    since = end - max(
+        SIMULTANEOUS_ULPS * float(np.spacing(max(abs(end), abs(first)))), SIMULTANEOUS_SHARE * (end - first)
+    )
+    return {h.name for h in takewhile(lambda h: h.t >= since, reversed(before.events)) if h.kind == "event"}
+
+
+def report_missed_events(here: EventContext) -> None:
+    """Say which events, true as the motion began, did not happen in it."""
+    for e in here.structure.model.events:
+        if e.name in here.true and not here.counts.get(e.name):
+            here.doubts.append(
+                f"{e.title} never happened: {e.when!r} was true from the start, and an event is where it becomes true"
+            )
+
+
+def passed_by_jump(here: EventContext, before: Mapping[int, float]) -> np.ndarray:
+    """Guards of events whose expressions went through zero without being followed there, (n,).
+
+    What was zero to rounding, as of what has just fired, has not: velocities that are solved for anew differ by that.
+    """
+    out = []
+    if before:
+        here.evaluate()
+    for g, was in before.items():
+        now, way = event_expression(here, g), here.c.system.guards.direction[g]
+        most = max(CLEAR_PASSAGE * max(abs(was), abs(now)), here.nothing.get(g, 0.0))
+        rises, falls = was <= -most and now > most, was >= most and now < -most
+        if (rises and way >= 0) or (falls and way <= 0):
+            out.append(g)
+    return np.array(out, np.int64)
+
+
+def passed_at_jump_time(here: EventContext, before: Mapping[int, float]) -> list[int]:
+    """Guards of events whose expressions passed zero at a time at which laws jump; not of what has just happened."""
+    since = here.t - SIMULTANEOUS_ULPS * float(np.spacing(abs(here.t)))
+    told = {h.name for h in takewhile(lambda h: h.t >= since, reversed(here.records))}
+    return [int(g) for g in passed_by_jump(here, before) if here.structure.events[int(g)].name not in told]
+
+
+def _evaluated_argument(here: EventContext, e: Event, a: Action, what: str, law: Any) -> float:
+    """Value of an expression of an action at the instant, as everything is before it."""
+    model = here.structure.model
+    of = LawOf(_unit_of_argument(here, e, a, what), curves=True)
+    tables = {x.name: x for x in model.tables}
+    value = model.law(law, of, f"{what} of {a.title} in {e.title}").evaluate(here.names(), tables)
+    if not np.isfinite(value):
+        raise SimulationError(
+            f"at t = {here.t:.9g} s {what} of {a.title} in {e.title} is {value}: '{law}' has no value there", t=here.t
+        )
+    return float(value)
+
+
+def _unit_of_argument(here: EventContext, e: Event, a: Action, what: str) -> str | None:
+    """Unit of a number of an action, where there is one that it must have."""
+    if not isinstance(a, Impulse):
+        return None
+    model = here.structure.model
+    if not isinstance(model.find(a.on), (Body, Frame)):
+        return "N*m*s" if model.unit(coordinate_of(model, e, a), e) == "rad" else "N*s"
+    return {"impulse": "N*s", "torque": "N*m*s"}[what]
+
+
+def refuse_contradictions(here: EventContext, every: Sequence[tuple[Event, Action]]) -> None:
+    """Refuse that events of one instant lock and release the same, or set a parameter twice."""
+    if here.settled_at != here.t:
+        here.settled_at, here.settled_keys = here.t, {}
+    for e, a in every:
+        for key in settled_by(here, e, a):
+            first, other = here.settled_keys.setdefault(key, (e, a))
+            if first is not e and a != other:
+                raise SimulationError(
+                    f"at t = {here.t:.9g} s actions contradict each other: {other.title} of {first.title} and "
+                    f"{a.title} of {e.title}; let one of the events come later, or once (times=1)",
+                    t=here.t,
+                )
+
+
+def settled_by(here: EventContext, e: Event, a: Action) -> tuple[str, ...]:
+    """What an action settles, for this instant."""
+    if isinstance(a, (Lock, Release)):
+        return lock_target(here.structure.model, e, a).keys()
+    return (f"parameter {a.parameter}",) if isinstance(a, Set) else ()
+
+
+ActionReports = list[tuple[Event, str]]
+EventActionList = Sequence[tuple[Event, Any, list[float]]]
+
+
+def _do_set(here: EventContext, found: EventActionList) -> ActionReports:
+    old = dict(here.c.values.env)
+    first = here.structure.nq + here.structure.nv
+    place = {x.name: first + k for k, x in enumerate(here.structure.controls)}
+    old |= {a.parameter: float(here.y[place[a.parameter]]) for _, a, _ in found if a.parameter in place}
+    for _, a, x in found:
+        if a.parameter in place:
+            here.y[place[a.parameter]] = x[0]
+    new = {a.parameter: x[0] for _, a, x in found if a.parameter not in place}
+    if new:
+        who = " and ".join(f"{a.title} in {e.title}" for e, a, _ in found if a.parameter in new)
+        set_parameters(here, new, who)
+    return [(e, f"{a.parameter} = {x[0]:g}, was {old[a.parameter]:g}") for e, a, x in found]
+
+
+def _do_release(here: EventContext, found: EventActionList) -> ActionReports:
+    return [(e, release(here, e, a)) for e, a, _ in found]
+
+
+def _do_lock(here: EventContext, found: EventActionList) -> ActionReports:
+    return [(e, lock(here, e, a)) for e, a, _ in found]
+
+
+def _do_impulse(here: EventContext, found: EventActionList) -> ActionReports:
+    out = []
+    for e, a, x in found:
+        n = len(component_list(a.impulse))
+        kick, blow = generalised_impulse(here, e, a, x[:n], x[n:])
+        here.external_impulse = kick if here.external_impulse is None else here.external_impulse + kick
+        here.external_impulses.append(blow)
+        along = (_unit_of_argument(here, e, a, "impulse") or "N*s").replace("*", " ")
+        told = [f"{_vector_text(x[:n])} {along}"] if n else []
+        told += [f"{_vector_text(x[n:])} N m s"] if x[n:] else []
+        out.append((e, f"struck {a.on}: {', '.join(told)}"))
+    return out
+
+
+def _vector_text(x: Sequence[float]) -> str:
+    return f"{x[0]:g}" if len(x) == 1 else f"({', '.join(f'{c:g}' for c in x)})"
+
+
+def _do_note(here: EventContext, found: EventActionList) -> ActionReports:
+    return [(e, a.text) for e, a, _ in found]
+
+
+def _do_stop(here: EventContext, found: EventActionList) -> ActionReports:
+    names = " and ".join(repr(e.name) for e, _, _ in found)
+    asked = here.start.base.t + here.clock.real.span
+    here.stopped = f"ended at {here.t:.6g} s by event {names} (asked: {asked:.6g} s)"
+    return [(e, "ended the motion") for e, _, _ in found]
+
+
+ACTION_FUNCTIONS: Mapping[type[Action], Callable[[EventContext, EventActionList], ActionReports]] = {
+    Set: _do_set,
+    Release: _do_release,
+    Lock: _do_lock,
+    Impulse: _do_impulse,
+    Note: _do_note,
+    Stop: _do_stop,
+}
+"""How each kind of action is done, in this order: another kind needs a function here."""
+
+
+# Blows as generalised impulses: what an impulse at a point of a body, or along a coordinate, does to each velocity.
+
+
+Vector3 = np.ndarray
+
+
+def generalised_impulse(
+    here: EventContext, e: Event, a: Impulse, force: Sequence[float], torque: Sequence[float]
+) -> tuple[np.ndarray, AppliedImpulse]:
+    """Its power at each unit velocity, (nv,), and what it is made of; kinematics of the state are in the scratch.
+
+    Parameters
+    ----------
+    here : Here
+    e, a : Event, Impulse
+    force, torque : sequence of float
+        Its components [N s], [N m s], as many as were written: none is no force; one number along a coordinate.
+    """
+    model = here.structure.model
+    if not isinstance(model.find(a.on), (Body, Frame)):
+        text = coordinate_of(model, e, a)
+        return force[0] * _coordinate_gradient(here, text), ("along", here.structure.measured[text], force[0], e.name)
+    plane = model.planar
+    F = np.array([*force, 0.0, 0.0, 0.0])[:3] if len(force) < 3 else np.array(force)
+    T = np.array([0.0, 0.0, *torque]) if plane and len(torque) == 1 else np.array(list(torque) or [0.0] * 3)
+    body, point, axes = _point_of_impulse(here, a)
+    if a.axes == "body":
+        F, T = axes @ F, axes @ T
+    about = T + np.cross(point - here.c.work.BK[body, :3], F)
+    return _impulse_along_velocities(here, body, point, F, T), (
+        "body",
+        body,
+        tuple(F.tolist()),
+        tuple(about.tolist()),
+        e.name,
+    )
+
+
+def _coordinate_gradient(here: EventContext, text: str) -> np.ndarray:
+    """Gradient of a measured coordinate, (nv,)."""
+    s, S = here.structure, here.c.system
+    out = np.zeros(s.nv)
+    row = len(S.rows.law) + s.measured[text]
+    at = slice(S.row_start[row], S.row_start[row + 1])
+    np.add.at(out, S.column[at], here.c.work.G[at])
+    return out
+
+
+def _point_of_impulse(here: EventContext, a: Impulse) -> tuple[int, Vector3, np.ndarray]:
+    """Row of the body, where it is struck, and the axes of the part that is named, in world axes now."""
+    x, model = here.c.values, here.structure.model
+    part = model[a.on]
+    name = part.body if isinstance(part, Frame) else a.on
+    b, drawn = here.structure.place[name], x.bodies[name]
+    record = here.c.work.BK[b]
+    R = record[3:12].reshape(3, 3)
+    at, axes = drawn.c, R
+    if isinstance(part, Frame):
+        at, turned = x.poses.named(a.on)
+        axes = R @ drawn.R.T @ turned
+    if a.at is not None:
+        given = si_numbers(a.at, x.env, "m", f"at of {a.title}")
+        at = vector(given, model.planar, f"at of {a.title}") if len(given) < 3 else np.array(given)
+    return b, record[:3] + R @ drawn.R.T @ (at - drawn.c), axes
+
+
+def _impulse_along_velocities(
+    here: EventContext, b: int, point: Vector3, force: Vector3, torque: Vector3
+) -> np.ndarray:
+    """What a wrench on body b, force at ``point``, does along the velocities of it and of all that carry it."""
+    S, W = here.c.system, here.c.work
+    out = np.zeros(here.structure.nv)
+    while b >= 0:
+        arm = point - W.O[b]
+        for k in range(S.tree.nv[b]):
+            turn, shift = (np.array(part) for part in twist_column(S, W, b, k))
+            out[S.tree.v[b] + k] = force @ (shift + np.cross(turn, arm)) + torque @ turn
+        b = int(S.tree.parent[b])
+    return out

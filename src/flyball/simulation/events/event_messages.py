@@ -1,0 +1,279 @@
+"""Messages of an instant: records of impacts and mode changes, and errors where no consistent solution exists."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from ...constraints.switch_kinds import BY_RATE, ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, SLIP, STOP
+from ...errors import ModelError
+from ...model.contact_point import Touch
+from ...model.joint import Joint
+from ...numerics.complementarity.dense_problem import FRICTION_LINE, HOLD_IMPOSSIBLE, SLIDING
+from ...results.events import EventRecord
+from ...results.reactions import EventImpulses
+from ...tables.table_definitions import G_LAW, G_SHARED, OFF
+from ..diagnosis import InitialOverlap, UnresolvedInstant, body_names, jam_message
+from .context import value_in_words
+from .impacts import Jump
+from .instant_problem import InstantProblem, ProblemRow
+from .mode_selection import ModeDecision, element_titles
+
+ROLE_WORDS = {
+    STOP: "is closed",
+    RATCHET: "is latched",
+    FRICTION: "has friction",
+    ONE_WAY: "goes one way only",
+    SLIP: "has friction",
+    LOCK: "is locked",
+}
+
+
+def rows_in_words(n: InstantProblem, parts: list[ProblemRow]) -> str:
+    """Elements of rows, with the part that they take."""
+    seen = dict.fromkeys(
+        (n.here.structure.switches[p.switch].element.title, ROLE_WORDS[n.kind[p.switch]]) for p in parts
+    )
+    return " and ".join(f"{title}, which {role}" for title, role in seen)
+
+
+def guard_titles(n: InstantProblem, fired: Iterable[int]) -> list[str]:
+    """Whose guards these are: events, elements that hold, those whose laws have corners; each once."""
+    out = []
+    for g in fired:
+        kind, s = int(n.S.guards.kind[g]), int(n.S.guards.of[g])
+        if kind == G_LAW:
+            out.append(n.here.structure.events[int(g)].title)
+            continue
+        for k in np.flatnonzero(n.W.modes.shared).tolist() if kind == G_SHARED else [s]:
+            e = n.here.structure.switches[k].element
+            out.append(n.name(k) if e.category == "events" else e.title)
+    return list(dict.fromkeys(out))
+
+
+def switch_quantity(n: InstantProblem, s: int) -> str:
+    """What a switch acts along, as an expression of coordinates; the length of a rope."""
+    x = n.here.structure.switches[s]
+    if not x.switch.along:
+        return "its length"
+    if not x.switch.summed:
+        return x.switch.along[0]
+    weights = x.element.switch_weights(n.here.c.values.numbers[x.element.name], x.switch.label)
+    terms = [f"{w:+.6g}*{c}".replace("1*", "", abs(w) == 1.0) for w, c in zip(weights, x.switch.along, strict=True)]
+    return " ".join(f"{y[0]} {y[1:]}" for y in terms).removeprefix("+ ")
+
+
+def start_beyond_bound(n: InstantProblem, s: int) -> ModelError:
+    """A motion that begins past a stop, or against a freewheel."""
+    x = n.here.structure.switches[s]
+    e, model = x.element, n.here.structure.model
+    metric = not x.switch.along or model.unit(x.switch.along[0], e) == "m"
+    unit, what = "m" if metric else "rad", switch_quantity(n, s)
+    if isinstance(e, Touch):
+        return InitialOverlap(
+            f"{e.title}: {body_names(e)} overlap at the start by {n.W.modes.lower[s] - n.x[s]:.3g} m; move one of them, "
+            f"or give method='impulse', which puts them side by side"
+        )
+    if n.kind[s] == STOP:
+        lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
+        if not np.isfinite(upper):
+            rule = f"at least {value_in_words(lower, unit)}"
+        elif not np.isfinite(lower):
+            rule = f"at most {value_in_words(upper, unit)}"
+        else:
+            rule = f"within {value_in_words(lower, unit)} and {value_in_words(upper, unit)}"
+        said = f"{what} is {value_in_words(n.x[s], unit)} and must be {rule}"
+    else:
+        said = f"the rate of {what} is {n.rate[s]:.6g} {unit}/s and must not be negative"
+    return ModelError(f"{e.title}: the motion begins beyond it: {said}; change the start or the limit")
+
+
+def passed_bound(n: InstantProblem, s: int, past: float) -> UnresolvedInstant:
+    """What is open is past its bound: no motion of rigid bodies leads there."""
+    e = n.here.structure.switches[s].element
+    what = f"{body_names(e)} are in each other" if isinstance(e, Touch) else f"{switch_quantity(n, s)} is beyond it"
+    return UnresolvedInstant(
+        f"at t = {n.here.t:.9g} s {e.title}: {what} by {past:.3g} {n.units[s]}: where they met was not seen. Follow "
+        f"it more closely (max_step=, a smaller rtol)",
+        t=n.here.t,
+    )
+
+
+def endless_events(n: InstantProblem, recent: Iterable[Sequence[int]], many: int, within: float) -> UnresolvedInstant:
+    """Events that come ever closer; ``recent``: the guards that fired at the last of them."""
+    names = guard_titles(n, (g for fired in recent for g in fired))
+    return UnresolvedInstant(
+        f"at t = {n.here.t:.9g} s events follow each other without end ({many} within {within:.2g} s): "
+        f"{', '.join(names)}",
+        t=n.here.t,
+    )
+
+
+def accumulating_events(n: InstantProblem, guard: int, many: int, end: float) -> UnresolvedInstant:
+    """Events of one guard, ``many`` so far, that come ever closer towards the time ``end``."""
+    return UnresolvedInstant(
+        f"at t = {n.here.t:.9g} s {guard_titles(n, [guard])[0]} has happened {many} times, ever sooner after the last, "
+        f"without end before t = {end:.6g} s",
+        t=n.here.t,
+    )
+
+
+def no_admissible_impulses(n: InstantProblem, parts: list[ProblemRow]) -> UnresolvedInstant:
+    """Velocities cannot change as all ask."""
+    return UnresolvedInstant(
+        f"at t = {n.here.t:.9g} s no impulses let the velocities fulfil all that is asked of them at once; it is asked "
+        f"by {rows_in_words(n, parts)}. Where a driver moves what a stop or a lock holds, one of them must give way",
+        t=n.here.t,
+    )
+
+
+def no_admissible_forces(n: InstantProblem, found: ModeDecision) -> UnresolvedInstant:
+    """Accelerations cannot be as all ask."""
+    sliding = [p for p in found.parts if p.rule in (SLIDING, FRICTION_LINE)]
+    jammed = [n.here.structure.switches[p.switch].element for p in sliding]
+    if found.ended != HOLD_IMPOSSIBLE and len(jammed) == 1 and hasattr(jammed[0], "joint"):
+        return UnresolvedInstant(jam_message(jammed[0], n.here.t, True), t=n.here.t)
+    if found.ended == HOLD_IMPOSSIBLE or not sliding:
+        why = "what they hold cannot be held together: one of them must give way"
+    else:
+        why = (
+            f"no loads were found that go with the friction of {' and '.join(element_titles(n, sliding))}. Either it grows "
+            "with the load that it makes itself faster than that can hold it (a jam, or Painleve's paradox): with less "
+            "friction, or an elastic stop or joint, there is a solution. Or there is one, and the search ended short "
+            "of it"
+        )
+    return UnresolvedInstant(
+        f"at t = {n.here.t:.9g} s no forces fulfil all that is asked of them at once; it is asked by "
+        f"{rows_in_words(n, found.parts)}; {why}",
+        t=n.here.t,
+    )
+
+
+def endless_instant(t: float, names: list[str], rounds: int) -> UnresolvedInstant:
+    """What happens at an instant has no end."""
+    return UnresolvedInstant(
+        f"at t = {t:.9g} s events follow each other without end ({rounds} times at one instant): "
+        f"{', '.join(dict.fromkeys(names))}; each undoes what the other did",
+        t=t,
+    )
+
+
+ENERGY_ROUNDING = 1e-14  # of the energy that a motion is about, or that passes in an impact: as good as nothing lost
+CLOSING_WORDS = {
+    STOP: ("close", "closes"),
+    FRICTION: ("stick", "sticks"),
+    SLIP: ("stick", "sticks"),
+    ONE_WAY: ("lock", "locks"),
+    LOCK: ("lock", ""),
+    RATCHET: ("latch", "latches"),
+    ELASTIC: ("close", "is pressed"),
+}
+OPENING_WORDS = {
+    STOP: ("open", "opens"),
+    FRICTION: ("slip", "slides"),
+    SLIP: ("slip", "slides"),
+    ONE_WAY: ("overrun", "overruns"),
+    LOCK: ("", ""),
+    RATCHET: ("unlatch", "lets go"),
+    ELASTIC: ("open", "lets go"),
+}
+ROPE_WORDS = {"close": ("taut", "goes taut"), "open": ("slack", "goes slack")}
+CONTACT_WORDS = {"close": ("touch", "touches"), "open": ("part", "parts")}
+
+
+def transition_words(n: InstantProblem, s: int, held: bool) -> tuple[str, str]:
+    """Kind and words of what switch s did."""
+    kind, said = (CLOSING_WORDS if held else OPENING_WORDS).get(int(n.kind[s]), ("", ""))
+    if n.here.structure.switches[s].switch.path and kind in ROPE_WORDS:
+        return (CONTACT_WORDS if isinstance(n.here.structure.switches[s].element, Touch) else ROPE_WORDS)[kind]
+    return kind, said
+
+
+def record_jump(n: InstantProblem, jumped: Jump, before: np.ndarray) -> None:
+    """Record a jump of velocities."""
+    if not (jumped.closing or jumped.external_impulses or jumped.given or jumped.jammed):
+        return
+    done: list[str] = []
+    impulses: dict[str, float] = {}
+    for s, (u, after) in jumped.closing.items():
+        unit = n.units[s]
+        goes = "stays" if s in jumped.at_rest else f"leaves at {abs(after):.6g} {unit}/s"
+        done.append(
+            f"{n.name(s)} closes at {abs(u):.6g} {unit}/s, {goes}" if n.kind[s] != LOCK else f"{n.name(s)} locks"
+        )
+    for s, x in jumped.impulse.items():  # joints and places of contact have components, by their rows
+        if x != 0.0 and not isinstance(n.here.structure.switches[s].element, (Joint, Touch)):
+            impulses[n.name(s)] = impulses.get(n.name(s), 0.0) + x
+    if jumped.jammed:
+        done.append("stops without a collision: no accelerations go with its friction (Painleve's paradox)")
+    names = ", ".join(dict.fromkeys(n.name(s) for s in jumped.closing or jumped.jammed)) or "start"
+    kind = "jam" if jumped.jammed else "impact" if jumped.closing else "kick"
+    append_record(n, names, kind, tuple(done), jumped, impulses, before)
+
+
+def record_mode_changes(
+    n: InstantProblem, old: tuple[np.ndarray, np.ndarray], before: np.ndarray, hits: dict[int, bool]
+) -> None:
+    """Record what holds, slides or let go now and did not before, one record a kind.
+
+    Parameters
+    ----------
+    n : Instant
+    old : tuple of ndarray
+        Modes and ways before.
+    before : ndarray
+        The state before.
+    hits : dict
+        Switches whose impact is recorded already, and whether they stay.
+    """
+    modes, ways = old
+    told: dict[str, list[tuple[int, str]]] = {}
+    for s in range(len(n.kind)):
+        was, now = modes[s] != OFF, n.W.modes.mode[s] != OFF
+        over = n.here.bounces[s].over if s in n.here.bounces else np.nan
+        if now and not np.isnan(over):
+            count = n.here.bounces.pop(s).count
+            told.setdefault("rest", []).append((s, f"came to rest after {count} bounces"))
+            n.over = float(np.fmax(n.over, over))
+        elif n.kind[s] == ELASTIC and ways[s] != n.ways()[s] != 0.0 and not ways[s] == 0.0 < n.ways()[s] == FROZEN:
+            kind, said = transition_words(n, s, n.ways()[s] != FROZEN)
+            told.setdefault(kind, []).append((s, said))
+        elif was != now and s not in hits and not (n.kind[s] == SLIP and _gap_is_open(n, s)):
+            kind, said = transition_words(n, s, now)
+            if kind:
+                told.setdefault(kind, []).append((s, said))
+        elif (
+            not was and not now and _slides_either_way(n, s) and ways[s] * n.ways()[s] < 0.0 and n.ways()[s] != BY_RATE
+        ):
+            told.setdefault("turn", []).append((s, "slides the other way"))
+    for kind, all_of in told.items():
+        names = ", ".join(dict.fromkeys(n.name(s) for s, _ in all_of))
+        append_record(n, names, kind, tuple(dict.fromkeys(said for _, said in all_of)), None, {}, before)
+
+
+def _gap_is_open(n: InstantProblem, s: int) -> bool:
+    """Whether the place of a slip parted: it does not slide either."""
+    return bool(n.W.modes.mode[n.S.switches.other[s]] == OFF)
+
+
+def _slides_either_way(n: InstantProblem, s: int) -> bool:
+    """Whether a switch slides one way or the other: not a tangent of a place in space."""
+    return bool(n.kind[s] == FRICTION or (n.kind[s] == SLIP and n.S.switches.partner[s] < 0))
+
+
+def append_record(
+    n: InstantProblem,
+    names: str,
+    kind: str,
+    done: tuple[str, ...],
+    jumped: Jump | None,
+    impulses: dict,
+    before: np.ndarray,
+) -> None:
+    """Append a record."""
+    t = n.over if kind == "rest" and not np.isnan(n.over) else n.here.t
+    size = max(jumped.passed, min(n.energy, n.here.clock.real.energy_size)) if jumped else 0.0
+    lost = jumped.lost if jumped and abs(jumped.lost) > ENERGY_ROUNDING * size else 0.0
+    known = EventImpulses(impulses, jumped.rows, jumped.external_impulses) if jumped else impulses
+    n.here.records.append(EventRecord(t, names, kind, done, lost, known, before.copy(), n.here.y.copy()))

@@ -1,0 +1,397 @@
+"""Indeterminate contact forces: how redundant rows share a load, and what slides if they cannot.
+
+The forces of rows that hold are those of least squares plus any z with A z = 0, by which nothing moves. If one
+distribution is within all bounds, all is at rest (the lower bound theorem of plastic limit analysis);
+`numerics/complementarity` finds the best one. If none is, accelerations are unique all the same: they minimise
+
+    |w - w_d|^2 / 2 + sum reach_i |u_i|,    u = b + B w,   A = B B^T
+
+(Gauss's principle with friction, Moreau 1963), w being the change of the accelerations in the metric of the
+masses.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...constraints.switch_kinds import FRICTION, SLIP
+from ...engine.guards import GROUP_ROUNDING
+from ...engine.mode_complementarity import FORCES, IMPULSE_STEP
+from ...numerics.complementarity.dense_problem import (
+    AT_REST,
+    BILATERAL,
+    FRICTION_DISC,
+    FRICTION_DISC_2,
+    FRICTION_LINE,
+    INACTIVE,
+    SLIDING,
+    SOLUTION_FOUND,
+    UNILATERAL,
+    DenseProblem,
+)
+from ...numerics.complementarity.interior_point import (
+    CONE_COUNT,
+    UNKNOWN_COUNT,
+    allocate_cone_program,
+    largest_margin_kernel,
+)
+from ...tables.table_definitions import G_SHARED, OFF
+from .instant_problem import InstantProblem, ProblemRow
+
+SINGULAR_ROOT = 1e-9  # of the largest eigenvalue
+SMOOTHING = 1e-11  # of the largest acceleration: how far |u| is rounded off at the end
+SMOOTHING_FACTOR = 0.1
+NEWTON_STEPS = 60
+LOAD_ITERATIONS = 60  # times that loads and what slides are found in turns
+LOAD_TOLERANCE = 1e-10
+
+
+def least_accelerations(P: DenseProblem) -> tuple[np.ndarray, np.ndarray] | None:
+    """Accelerations u and forces x of all rows where what pushes stays closed; None if it cannot or is not found."""
+    d = np.sqrt(np.maximum(P.A.diagonal(), 1e-300))
+    size, V = np.linalg.eigh(P.A / np.outer(d, d))
+    kept = size > SINGULAR_ROOT * size[-1]
+    B = d[:, None] * V[:, kept] * np.sqrt(size[kept])
+    held = np.flatnonzero((P.rule == BILATERAL) | (P.rule == UNILATERAL))
+    C = B[held] / d[held, None]
+    first, _, rank, _ = np.linalg.lstsq(C, -P.b[held] / d[held], rcond=SINGULAR_ROOT) if len(held) else (0.0, 0, 0, 0)
+    free = np.linalg.svd(C)[2][rank:].T if len(held) else np.eye(B.shape[1])
+    first = np.zeros(B.shape[1]) + first
+    scale = np.abs(P.b / d).max()
+    if len(held) and np.abs(C @ first + P.b[held] / d[held]).max() > 1e-7 * scale:
+        return None
+    pairs = [
+        [i, i + 1] if P.rule[i] == FRICTION_DISC else [i]
+        for i in np.flatnonzero(np.isin(P.rule, (FRICTION_LINE, FRICTION_DISC)))
+    ]
+    driven = np.flatnonzero(P.rule == SLIDING)
+    x, z, soft = np.zeros(len(P.b)), np.zeros(free.shape[1]), scale
+    for turn in range(LOAD_ITERATIONS):
+        reach = np.maximum(P.const + P.gain @ x, 0.0)
+        x[driven] = -P.lean[driven] * reach[driven]
+        w_d = B[driven].T @ x[driven]
+        soft = max(SMOOTHING_FACTOR * soft, SMOOTHING * scale)
+        old = x.copy()
+        for soft_now in (soft,) if turn else _smoothing_sequence(scale):
+            soft = soft_now
+            z = _minimise(P.b, B, (first, free, w_d), (pairs, reach, soft * d.mean()), z)
+        w = first + free @ z
+        u = P.b + B @ w
+        for own in pairs:
+            x[own] = -reach[own[0]] * u[own] / np.sqrt(u[own] @ u[own] + (soft * d.mean()) ** 2)
+        rest = w - w_d - sum((B[own].T @ x[own] for own in pairs), np.zeros(len(w)))
+        x[held] = np.linalg.lstsq(C.T, rest, rcond=SINGULAR_ROOT)[0] / d[held] if len(held) else 0.0
+        if np.abs((x - old) * d).max() <= LOAD_TOLERANCE * np.abs(x * d).max():
+            return u, x
+    return None
+
+
+def _smoothing_sequence(scale: float) -> list[float]:
+    """Roundings from coarse to fine."""
+    out = [scale]
+    while out[-1] > SMOOTHING * scale:
+        out.append(max(SMOOTHING_FACTOR * out[-1], SMOOTHING * scale))
+    return out
+
+
+def _minimise(b: np.ndarray, B: np.ndarray, of: tuple, friction: tuple, z: np.ndarray) -> np.ndarray:
+    """The z where it is least, by Newton's method."""
+    (first, free, w_d), (pairs, reach, soft) = of, friction
+
+    def value(z: np.ndarray) -> float:
+        w = first + free @ z
+        u = b + B @ w
+        rubs = sum(reach[own[0]] * np.sqrt(u[own] @ u[own] + soft * soft) for own in pairs)
+        return float(0.5 * (w - w_d) @ (w - w_d) + rubs)
+
+    now = value(z)
+    for _ in range(NEWTON_STEPS):
+        w = first + free @ z
+        u, g, H = b + B @ w, w - w_d, np.eye(len(w))
+        for own in pairs:
+            rho = np.sqrt(u[own] @ u[own] + soft * soft)
+            e = u[own] / rho
+            g = g + reach[own[0]] * (B[own].T @ e)
+            H += reach[own[0]] / rho * (B[own].T @ (np.eye(len(own)) - np.outer(e, e)) @ B[own])
+        step = -np.linalg.solve(free.T @ H @ free, free.T @ g)
+        part = 1.0
+        while part > 1e-6 and value(z + part * step) > now:
+            part *= 0.5
+        if part <= 1e-6:
+            break
+        z = z + part * step
+        less, now = now, value(z)
+        if less - now <= 1e-15 * abs(now):
+            break
+    return z
+
+
+SINGULAR = 1e-9  # of the largest eigenvalue: nothing tells rows apart
+LOAD_ROUNDING = (
+    1e-13 / IMPULSE_STEP
+)  # of what friction holds: rounding of the differences that tell how it follows forces
+NULL_TOLERANCE = 1e-9  # of its largest row: what a null vector does to another is rounding
+FRICTION_REDUCTION = 1e-6  # part of what friction holds that is taken from it to see what gives way
+CLEAR_ACCELERATION = 1e-3  # of the accelerations that this makes: none
+ZERO_FORCE = 1e-6  # of the largest force: what is zero where a group gives way
+ZERO_ACCELERATION = 1e-7  # of the accelerations that one is the difference of: as good as none
+
+
+class Distribution(NamedTuple):
+    """Rows that hold together: forces, and by how much these are within their bounds at best, and of which size."""
+
+    x: np.ndarray
+    margin: float
+    size: float
+
+
+def force_scales(A: np.ndarray) -> np.ndarray:
+    """By which forces of rows of different units compare."""
+    d = np.sqrt(A.diagonal())
+    return np.where(d > 0.0, d, 1.0)
+
+
+def null_forces(A: np.ndarray) -> np.ndarray:
+    """Forces that move nothing, (n, k)."""
+    n, d = len(A), force_scales(A)
+    if n < 2:
+        return np.zeros((n, 0))
+    N = A / np.outer(d, d)
+    try:
+        np.linalg.cholesky(N - SINGULAR * np.eye(n))
+        return np.zeros((n, 0))
+    except np.linalg.LinAlgError:
+        size, V = np.linalg.eigh(N)
+        return np.asarray(V[:, size < SINGULAR * size[-1]] / d[:, None])
+
+
+def load_rounding(A: np.ndarray, x: np.ndarray, reach: np.ndarray) -> float:
+    """How far, by rounding, it is known how friction that holds ``reach`` follows forces x; of rows as they compare."""
+    size = float(np.abs(x * force_scales(A)).max(initial=0.0))
+    return LOAD_ROUNDING * float(np.abs(reach).max(initial=0.0)) / size if size > 0.0 else 0.0
+
+
+def unloading_null_forces(Z: np.ndarray, loads: np.ndarray, d: np.ndarray, least: float) -> np.ndarray:
+    """Of forces that move nothing those that do not press on what slides.
+
+    ``loads``: how its friction follows them; of that ``least`` is nothing (`load_rounding`).
+    """
+    if not loads.any() or not Z.shape[1]:
+        return Z
+    M = loads @ Z
+    _, size, V = np.linalg.svd(M)
+    nothing = max(SINGULAR * np.abs(loads / d).max(), least) * np.abs(Z * d[:, None]).max()
+    rank = int((size > nothing).sum())
+    return np.asarray(Z @ V[rank:].T)
+
+
+def indeterminate_forces(P: DenseProblem, rows: np.ndarray) -> np.ndarray:
+    """How the forces of these rows, which hold, are left open, (rows, k)."""
+    Z = null_forces(P.A[np.ix_(rows, rows)])
+    driven = np.flatnonzero(P.rule == SLIDING)
+    return unloading_null_forces(
+        Z, P.gain[np.ix_(driven, rows)], force_scales(P.A)[rows], load_rounding(P.A, P.x, P.reach[driven])
+    )
+
+
+def without_acceleration(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem) -> np.ndarray:
+    """Of which rows the acceleration is none; of pairs of both or of neither."""
+    terms = np.abs(P.b) + np.abs(P.A) @ np.abs(P.x)
+    out = np.abs(P.u) <= ZERO_ACCELERATION * terms + n.negligible_acceleration[[p.switch for p in parts]]
+    for i in np.flatnonzero(P.rule == FRICTION_DISC):
+        out[i] = out[i + 1] = out[i] and out[i + 1]
+    return out
+
+
+def held_at_rest(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem, ended: int | None) -> np.ndarray:
+    """Rows of friction that hold though they carry all they can: others, which hold, keep them at rest.
+
+    All that can hold are tried first; where that is one of the solutions, what stuck goes on to stick. Forces that go
+    with it are put into P then. ``ended``: how P was solved; None: all are tried whatever it is, and only where they
+    hold clearly.
+    """
+    none = np.zeros(len(parts), bool)
+    if not n.shares:
+        return none
+    friction = np.isin(P.rule, (FRICTION_LINE, FRICTION_DISC, FRICTION_DISC_2))
+    if ended is not None and not (friction & (P.state != AT_REST)).any():
+        return none
+    together = np.flatnonzero(np.isin(P.rule, (BILATERAL, UNILATERAL, FRICTION_LINE, FRICTION_DISC, FRICTION_DISC_2)))
+    Z = indeterminate_forces(P, together)
+    if not Z.shape[1]:
+        return none
+    found = admissible_distribution(P, together, Z)
+    least = ZERO_FORCE if ended is None else -GROUP_ROUNDING
+    if found is not None and found.margin >= least * found.size:
+        P.x[:], P.u[:] = found.x, P.A @ found.x + P.b
+        P.u[together], P.state[together] = 0.0, AT_REST
+        P.reach[:] = P.const + P.gain @ found.x
+        return friction
+    if ended != SOLUTION_FOUND:  # also where it was not asked
+        return none
+    still = friction & without_acceleration(n, parts, P)
+    rows = np.flatnonzero(still | (P.state == AT_REST))
+    Z = indeterminate_forces(P, rows)
+    if not Z.shape[1]:
+        return none
+    Z = Z * force_scales(P.A)[rows, None]
+    none[rows] = (np.abs(Z) > NULL_TOLERANCE * np.abs(Z).max()).any(axis=1)
+    return none & still
+
+
+def admissible_distribution(P: DenseProblem, rows: np.ndarray, Z: np.ndarray) -> Distribution | None:
+    """These rows held, by the best shares; None if they cannot be at rest together."""
+    n, d = len(P.b), force_scales(P.A)
+    driven = np.flatnonzero(P.rule == SLIDING)
+    M, r, s = np.zeros((n, n)), np.zeros(n), 1.0 / d
+    M[rows], r[rows] = P.A[rows], -P.b[rows]
+    other = np.setdiff1d(np.arange(n), rows)
+    M[other, other] = d[other] ** 2
+    M[driven] = P.lean[driven, None] * P.gain[driven] * d[driven, None] ** 2
+    M[driven, driven] += d[driven] ** 2
+    r[driven] = -P.lean[driven] * P.const[driven] * d[driven] ** 2
+    x = s * np.linalg.lstsq(M * np.outer(s, s), s * r, rcond=SINGULAR)[0]
+    terms = np.abs(P.b) + np.abs(P.A) @ np.abs(x) + P.grain
+    if (np.abs(P.A @ x + P.b)[rows] > ZERO_ACCELERATION * terms[rows]).any():
+        return None
+    every = np.zeros((n, Z.shape[1]))
+    every[rows] = Z / np.abs(Z * d[rows, None]).max(axis=0)
+    Q = allocate_cone_program(n, Z.shape[1])
+    write_bounds(P, rows, x, every, Q)
+    size = float(np.abs(Q.D[:, :, 0]).max())
+    margin = float(largest_margin_kernel(Q))
+    return Distribution(x + every @ Q.y[: Z.shape[1]], margin, size)
+
+
+def write_bounds(P: DenseProblem, rows: np.ndarray, x: np.ndarray, Z: np.ndarray, Q) -> None:
+    """Cells of `cone.shares`: bounds of these rows at the forces x, and how they follow more of Z."""
+    c, Q.count[UNKNOWN_COUNT], d, all_ = 0, Z.shape[1], force_scales(P.A), np.column_stack([x, Z])
+    for i in rows.tolist():
+        rule = P.rule[i]
+        if rule == UNILATERAL:
+            Q.D[c, 0] = d[i] * all_[i]
+        elif rule in (FRICTION_LINE, FRICTION_DISC):
+            Q.D[c, 0] = d[i] * (P.gain[i] @ all_)
+            Q.D[c, 0, 0] += d[i] * P.const[i]
+            Q.D[c, 1] = d[i] * all_[i]
+            if rule == FRICTION_DISC:
+                Q.D[c, 2] = d[i] * all_[i + 1]
+        else:
+            continue
+        c += 1
+    Q.count[CONE_COUNT] = c
+
+
+def released_by_group(n: InstantProblem, parts: list[ProblemRow], fired: np.ndarray) -> dict[int, ProblemRow]:
+    """What slides or lets go where a group has come to the end of all shares, as it is then.
+
+    A little is taken from what friction holds: what moves then slides, the way that it moves with what friction is
+    left. If nothing does, what carries nothing by any shares lets go.
+    """
+    if not n.fired(fired, G_SHARED):
+        return {}
+    B, P, _ = n.problem(parts)
+    n.balance(B, P, FORCES)
+    together = np.flatnonzero(np.isin(P.rule, (BILATERAL, UNILATERAL, FRICTION_LINE, FRICTION_DISC, FRICTION_DISC_2)))
+    Z = indeterminate_forces(P, together)
+    found = admissible_distribution(P, together, Z) if Z.shape[1] else None
+    if found is None or found.margin > ZERO_FORCE * found.size:
+        return {}
+    out = sliding_rows(n, parts, P)
+    if out:
+        return out
+    gone = [
+        i
+        for i in together.tolist()
+        if P.rule[i] == UNILATERAL and force_scales(P.A)[i] * found.x[i] <= ZERO_FORCE * found.size
+    ]
+    return {i: parts[i]._replace(rule=INACTIVE) for i in gone}
+
+
+def sliding_without_solution(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem) -> dict[int, ProblemRow]:
+    """What slides where redundancy leaves the small problem without an answer, as `released_by_group` says."""
+    together = np.flatnonzero(np.isin(P.rule, (BILATERAL, UNILATERAL, FRICTION_LINE, FRICTION_DISC, FRICTION_DISC_2)))
+    if not n.shares or not indeterminate_forces(P, together).shape[1]:
+        return {}
+    return sliding_rows(n, parts, P)
+
+
+def sliding_rows(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem) -> dict[int, ProblemRow]:
+    """What slides if a little less is held than P says, by its friction in motion."""
+    d, friction = force_scales(P.A), np.isin(P.rule, (FRICTION_LINE, FRICTION_DISC, FRICTION_DISC_2))
+    P.const[friction] *= 1.0 - FRICTION_REDUCTION
+    P.gain[friction] *= 1.0 - FRICTION_REDUCTION
+    for _ in range(2):  # with friction at rest: who; with friction in motion: which way
+        P.state[:] = AT_REST
+        if n.again(P) != SOLUTION_FOUND:
+            found = least_accelerations(P)
+            if found is None:
+                return {}
+            P.u[:], P.x[:] = found
+        least = CLEAR_ACCELERATION * FRICTION_REDUCTION * np.abs(P.b / d).max()
+        out: dict[int, ProblemRow] = {}
+        for i, p in enumerate(parts):
+            if P.rule[i] not in (FRICTION_LINE, FRICTION_DISC):
+                continue
+            own = [i, i + 1] if P.rule[i] == FRICTION_DISC else [i]
+            speed = float(np.linalg.norm(P.u[own]))
+            if speed / d[i] <= least:
+                continue
+            for k in own:
+                lean = float(P.u[k]) / speed
+                if n.kind[p.switch] == SLIP:
+                    mu = float(n.S.switch_numbers.kinetic_friction[parts[own[0]].switch])
+                    out[k] = parts[k]._replace(rule=SLIDING, lean=lean, gain=mu)
+                    P.gain[k, p.of] = (1.0 - FRICTION_REDUCTION) * mu
+                else:
+                    out[k] = parts[k]._replace(rule=SLIDING, way=lean, lean=lean)
+        if not out:
+            break
+    return out
+
+
+def write_sharing_group(n: InstantProblem, parts: list[ProblemRow], found: tuple[np.ndarray, ...]) -> None:
+    """What holds together and shares, into the motion: its guard is that of the group.
+
+    ``found`` are states, the matrix, how what friction holds follows forces, these, and what it holds.
+    """
+    if not n.shares:
+        return
+    (state, A, gain, x, reach), G, B = found, n.here.group, n.workspaces[len(parts)].B
+    n.W.modes.shared[:], G.Q.count[UNKNOWN_COUNT] = 0.0, 0
+    on = n.W.modes.mode[[p.switch for p in parts]] != OFF  # slips of a gap that is let go are no rows
+    rows = np.flatnonzero((state == AT_REST) & on)
+    rules = np.array([p.rule for p in parts])
+    if not np.isin(rules[rows], (FRICTION_LINE, FRICTION_DISC)).any():
+        return
+    d = force_scales(A)
+    driven = np.flatnonzero(
+        (rules == SLIDING) | ((state != AT_REST) & np.isin(rules, (FRICTION_LINE, FRICTION_DISC, FRICTION_DISC_2)))
+    )
+    Z = unloading_null_forces(
+        null_forces(A[np.ix_(rows, rows)]), gain[np.ix_(driven, rows)], d[rows], load_rounding(A, x, reach[driven])
+    )
+    if not Z.shape[1]:
+        return
+    every = np.zeros((len(parts), Z.shape[1]))
+    every[rows] = Z / np.abs(Z * d[rows, None]).max(axis=0)
+    part_of = (np.abs(every) * d[:, None] > NULL_TOLERANCE).any(axis=1)
+    for i in rows.tolist():
+        p, follows = parts[i], gain[i] @ every
+        if rules[i] in (FRICTION_LINE, FRICTION_DISC):
+            own = [i, i + 1] if rules[i] == FRICTION_DISC else [i]
+            moved = np.abs(follows).max() * d[i] > NULL_TOLERANCE
+            if moved or part_of[own].any():
+                part_of[[*own, *([p.of] if p.of >= 0 else [])]] = True
+    for i in np.flatnonzero(part_of).tolist():
+        n.W.modes.shared[parts[i].switch] = d[i]
+    for j, z in enumerate(every.T):
+        G.null[j] = z @ B.L
+        for i in rows.tolist():
+            s = parts[i].switch
+            G.null[j, n.S.switches.row[s]] += B.sign[i] * z[i]
+            if n.kind[s] == FRICTION:
+                G.bend[j, s] = gain[i] @ z
+    G.Q.count[UNKNOWN_COUNT] = Z.shape[1]

@@ -1,0 +1,257 @@
+"""Impacts: velocities that jump, and series of bounces that end.
+
+Impulses x along the rows that take part, u+ = A x + u-, each by its rule: a unilateral row only pushes, a locked
+row holds, friction is bounded by the impulse of its load. Restitution by Poisson's law: an inelastic impact, then
+impulses of at least e times those (Pfeiffer and Glocker 1996, section 8.3). Energy never grows: what goes beyond
+the inelastic impact is done only as far as there is energy for it.
+
+A flight that begins with the rate u and is brought back by the acceleration -a is u^2 / 2 a high and lasts 2 u /
+a. Each is shorter than the one before by a ratio r, so all that are left last T / (1 - r). A series shorter than
+rounding is over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...engine.calls import MOTION
+from ...engine.mode_complementarity import SUDDEN_IMPULSES, ModeProblem
+from ...numerics.complementarity.dense_problem import BILATERAL, SOLUTION_FOUND, UNILATERAL, DenseProblem
+from ...tables.table_definitions import BIAS
+from .instant_problem import STOP_KINDS, InstantProblem, ProblemRow
+
+REST_RATE = 1e-12  # of the terms of a rate after the jump: none
+
+
+@dataclass
+class Jump:
+    """What a jump did.
+
+    Attributes
+    ----------
+    impulse : dict
+        Switch -> impulse along its quantity.
+    closing : dict
+        Switch -> rate at which it closed, and that at which it goes on.
+    lost, given : float
+        Energy [J] that the impacts took, and that kicks gave.
+    passed : float
+        Energy [J] that the impulses took and gave back, in sum: ``lost`` is a difference of it.
+    jammed : tuple of int
+        Switches that stopped without a collision.
+    rows, along : ndarray
+        Impulses of all rows, then of drivers that prescribe coordinates; and change of the velocities, (nv,).
+    """
+
+    impulse: dict[int, float] = field(default_factory=dict)
+    closing: dict[int, tuple[float, float]] = field(default_factory=dict)
+    lost: float = 0.0
+    given: float = 0.0
+    passed: float = 0.0
+    rows: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    along: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    external_impulses: tuple[Any, ...] = ()
+    at_rest: frozenset[int] = frozenset()  # switches whose quantities are at rest afterwards
+    ended: int = SOLUTION_FOUND
+    jammed: tuple[int, ...] = ()
+
+
+def violates_rule(n: InstantProblem, parts: list[ProblemRow], rate: np.ndarray) -> bool:
+    """Whether a rate is against a rule."""
+    for p in parts:
+        u, still = p.sign * rate[p.switch], n.still[p.switch]
+        if (p.rule == UNILATERAL and u < -still) or (p.rule == BILATERAL and abs(u) > still):
+            return True
+    return False
+
+
+def apply_impulses(n: InstantProblem, parts: list[ProblemRow], kick: np.ndarray | None) -> Jump:
+    """Change the velocities of the motion as the rules of these rows ask; see the module."""
+    B, P, _ = n.problem(parts)
+    out = no_jump(n)
+    before = B.sign * n.rate[B.which]
+    drive = np.zeros_like(out.along)
+    if kick is not None:
+        before = before + external_impulse_response(n, kick, out, B, drive)
+    P.grain[:] = n.still[B.which]
+    B.loaded[:] = out.rows[: len(B.loaded)]  # what the kick alone asks of joints
+    unmoved = (P.A.diagonal() == 0.0) & (np.abs(before) <= P.grain)  # by impulses: its rate is rounding
+    P.b[:] = np.where(unmoved, 0.0, before)
+    out.ended = n.balance(B, P, SUDDEN_IMPULSES)
+    x, u = P.x.copy(), P.u.copy()
+    if out.ended != SOLUTION_FOUND:
+        return out
+    if len(parts):
+        x, u = with_restitution(n, B, P, parts, before, (x, u))
+    return apply_velocities(n, (B, P), parts, (before, x, u), out, drive)
+
+
+def apply_velocities(
+    n: InstantProblem,
+    solved: tuple[ModeProblem, DenseProblem],
+    parts: list[ProblemRow],
+    found: tuple[np.ndarray, np.ndarray, np.ndarray],
+    out: Jump,
+    drive: np.ndarray,
+) -> Jump:
+    """Velocities of the motion after impulses x, which take the rows' rates from ``before`` to u."""
+    B, P = solved
+    before, x, u = found
+    out.lost = -float(x @ (before + u)) / 2.0
+    out.passed = float(np.abs(x) @ (np.abs(before) + np.abs(u))) / 2.0
+    out.rows += x @ B.L
+    out.along += x @ B.Y
+    drive += x @ B.E
+    for p, xi, b, a in zip(parts, x.tolist(), before.tolist(), u.tolist(), strict=True):
+        out.impulse[p.switch] = out.impulse.get(p.switch, 0.0) + p.sign * xi
+        if (p.rule == UNILATERAL and b < -n.still[p.switch]) or (p.rule == BILATERAL and abs(b) > n.still[p.switch]):
+            out.closing[p.switch] = (b, a)
+    size = np.abs(P.A) @ np.abs(x) + np.abs(before)
+    out.at_rest = frozenset(B.which[np.abs(u) <= REST_RATE * size + n.still[B.which]].tolist())
+    account_for_drivers(n, out, drive)
+    n.here.v[:] += out.along
+    return out
+
+
+def add_impulses(n: InstantProblem, out: Jump, B: ModeProblem, x: np.ndarray) -> None:
+    """Count further impulses along the rows of a problem to those of a jump; velocities have them already."""
+    S, nr = n.S, len(n.S.rows.law)
+    out.rows[:nr] += x @ B.L
+    out.rows[nr:] += (x @ B.E)[S.tree.v[S.tree.law >= 0]]
+    for s, more in zip(B.which.tolist(), x.tolist(), strict=True):
+        out.rows[S.switches.row[s]] += more
+        out.impulse[s] = out.impulse.get(s, 0.0) + more
+
+
+def no_jump(n: InstantProblem) -> Jump:
+    """No jump."""
+    return Jump(rows=np.zeros(len(n.S.rows.law)), along=np.zeros(n.here.structure.nv))
+
+
+def external_impulse_response(
+    n: InstantProblem, kick: np.ndarray, out: Jump, B: ModeProblem, drive: np.ndarray
+) -> np.ndarray:
+    """Change of the rows' rates by a generalised impulse alone; what it does goes to ``out``."""
+    dv, rows, effort = n.response(kick)
+    v = n.here.v
+    out.given = float(kick @ (v + 0.5 * dv))
+    out.along += dv
+    out.rows += rows
+    drive += effort
+    return B.sign * (n.gradients(B.which) @ dv) if len(B.which) else np.zeros(0)
+
+
+def with_restitution(
+    n: InstantProblem,
+    B: ModeProblem,
+    P: DenseProblem,
+    parts: list[ProblemRow],
+    before: np.ndarray,
+    hit: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Impulses and velocities with what restitution gives back."""
+    x, u = hit
+    bounces = [n.kind[p.switch] in STOP_KINDS and p.switch not in n.here.astray for p in parts]
+    bounce = np.where(bounces, n.S.switch_numbers.restitution[[p.switch for p in parts]], 0.0)
+    least = np.where((P.rule == UNILATERAL) & (x > 0.0), bounce * x, 0.0)
+    if not least.any():
+        return x, u
+    more, speed = poisson_expansion(n, B, P, least, u)
+    # energy on the way s from the inelastic impact: E + a s + b s^2
+    E, a, b = 0.5 * float(x @ (before + u)), float(more @ (before + u) + x @ speed) / 2.0, float(more @ speed) / 2.0
+    s = 1.0
+    if E + a + b > 0.0 and b > 0.0:
+        s = min(1.0, max(0.0, (-a + np.sqrt(max(a * a - 4.0 * b * E, 0.0))) / (2.0 * b)))
+    return x + s * more, u + s * speed
+
+
+def poisson_expansion(
+    n: InstantProblem, B: ModeProblem, P: DenseProblem, least: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Poisson: further impulses of at least so much."""
+    gain = P.gain.copy()
+    fixed = np.where(B.way == 0.0, gain @ least, 0.0)
+    P.const[:] = np.where(B.way == 0.0, fixed, 0.0)
+    P.b[:] = u + P.A @ least
+    B.loaded[:] = least @ B.L
+    n.balance(B, P, SUDDEN_IMPULSES)
+    return P.x + least, P.u - u
+
+
+def account_for_drivers(n: InstantProblem, out: Jump, drive: np.ndarray) -> None:
+    """What drivers do: their impulses, which go behind those of the rows, times the rates that they prescribe."""
+    S, W, y, rows = n.S, n.W, n.here.y, out.rows
+    for s, x in out.impulse.items():
+        rows[S.switches.row[s]] = x
+    z = y[n.here.structure.nq + n.here.structure.nv :]
+    for k in np.flatnonzero(S.rows.work >= 0).tolist():
+        z[S.rows.work[k]] += rows[k] * W.rows.nu[k]
+    efforts: list[float] = []
+    for b in np.flatnonzero(S.tree.law >= 0).tolist():
+        d = S.tree.v[b]
+        z[S.tree.work[b]] += drive[d] * n.here.v[d]
+        efforts.append(drive[d])
+    out.rows = np.r_[rows, efforts]
+
+
+LOW_FLIGHT = 1e-13  # of the mechanism's length or a radian: a flight that is none
+ORIGIN_ROUNDING = 2e-14  # of how far the mechanism is from the origin: the same, since places there are known no better
+
+
+@dataclass
+class BounceSeries:
+    """Those of one stop: how many there were, when the last one and the one before it were, when they are over."""
+
+    count: int = 0
+    last: float = -np.inf
+    before: float = -np.inf
+    over: float = np.nan
+
+
+def note_bounces(n: InstantProblem, jumped: Jump) -> None:
+    """Count what closed and goes on apart, or lets something else go."""
+    t = n.here.t
+    for s in jumped.closing.keys() - n.here.astray:
+        b = n.here.bounces.setdefault(s, BounceSeries())
+        if t - b.last > 1.5 * (b.last - b.before):
+            b.count = 0  # another series
+        b.count, b.before, b.last, b.over = b.count + 1, b.last, t, np.nan
+
+
+def coming_to_rest(n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray) -> np.ndarray:
+    """Switches whose flights are none, (ns,); the modes are written, and their rates are those that they start with."""
+    over = np.zeros(len(n.kind), bool)
+    leaving = [s for s, side in at.items() if not still[s] and len(side) == 1]
+    if not leaving:
+        return over
+    n.ask(MOTION)
+    nq = n.S.sizes.coordinates
+    a = n.gradients(np.array(leaving)) @ n.desk.K[0, nq : nq + n.here.structure.nv] + n.W.sensed[BIAS, n.m[leaving]]
+    far = ORIGIN_ROUNDING * np.abs(n.W.FK[:, :3]).max(initial=0.0)
+    for s, acceleration in zip(leaving, a.tolist(), strict=True):
+        u, back = at[s][0] * n.rate[s], -at[s][0] * acceleration
+        if u > 0.0 and back > 0.0 and u * u <= 2.0 * back * max(LOW_FLIGHT * n.unit[s], far * (n.units[s] == "m")):
+            over[s] = True
+            if s not in n.here.bounces:  # it did not close before: let go by rounding only
+                continue
+            b, flight = n.here.bounces[s], 2.0 * u / back
+            past = n.here.t - (b.before if b.last == n.here.t else b.last)
+            b.over = n.here.t + (flight / (1.0 - flight / past) if flight < past < np.inf else flight)
+    return over
+
+
+def settle_down(n: InstantProblem, over: list[int], still: np.ndarray, jumped: Jump | None) -> None:
+    """Take their rates from what bounces no more; friction that moved by these alone is at rest, into ``still``.
+
+    ``jumped`` is the impact of the instant, if there was one: it was the last.
+    """
+    B, P, _ = n.problem([ProblemRow(s, BILATERAL) for s in over])
+    x = -np.linalg.lstsq(P.A, n.rate[over], rcond=1e-12)[0]
+    n.here.v[:] += x @ B.Y
+    if jumped is not None:
+        add_impulses(n, jumped, B, x)
+    n.reevaluate_switches()
+    still |= np.abs(n.rate) <= n.still

@@ -1,0 +1,580 @@
+"""The complementarity problem at an instant: its workspace, and the stops, locks and friction rows in it.
+
+`InstantProblem` evaluates the engine there: quantities and rates of all switches, the problem of the rows that
+take part, responses to generalised forces. `rows_of_velocities` and `rows_of_accelerations` say which rows take
+part.
+
+In the plane a slip is one row that GRIPS, in space two that are TURNS and WITH; they carry at most mu times the
+force of the gap. What slides with a speed slides in a known direction: DRIVEN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiler.kernels import BoundKernel, StructBuffer
+from ...constraints.switch_kinds import EDGE, FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STATIC, STOP
+from ...engine.calls import ARRIVE, GUARD_VALUES, MOTION, SOLVE, OutputBuffer
+from ...engine.entry_point import engine
+from ...engine.guards import margin_kernel
+from ...engine.loads import ONSET_END, ONSET_LENGTH, ONSET_SPEED
+from ...engine.mode_complementarity import (
+    FREE_MOTION,
+    IMPULSES,
+    RESUME_SOLVE,
+    SOLVE_MODES,
+    STORE_RATES,
+    EngineCall,
+    ModeProblem,
+    empty_mode_problem,
+    mode_kernel,
+)
+from ...numerics.complementarity.dense_problem import (
+    AT_REST,
+    BILATERAL,
+    DISC_SLIPS,
+    FRICTION_DISC,
+    FRICTION_DISC_2,
+    FRICTION_LINE,
+    NO_IMPULSE,
+    SLIDING,
+    UNILATERAL,
+    DenseProblem,
+    allocate_dense,
+)
+from ...numerics.integrators.butcher_tableaux import tableau
+from ...numerics.integrators.time_loop import STATE_ROWS, StepCounts, StepReals, StepState
+from ...tables.table_definitions import (
+    BIAS,
+    G_BACK,
+    G_CONE,
+    G_LOWER,
+    G_SHARED,
+    G_SLIDES,
+    G_TURNS,
+    G_UPPER,
+    HELD,
+    OFF,
+    VALUE,
+)
+from .context import RELEASED, EventContext, switch_scales, switch_units
+
+POSITION_TOLERANCE = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
+RATE_TOLERANCE = (
+    1e-12  # of the length of the mechanism (or a radian) at the rate `reference_rate`: the same where all is at rest
+)
+RELEASED_KIND = -1  # of what was released: it takes no part
+IMMOVABLE_MOBILITY = (
+    1e-10  # of all mass: what moves less by a force is moved by drivers only; redundant rows leave 1e-11 of it
+)
+STOP_KINDS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
+REST_ACCELERATION = 1e-9  # of how gravity accelerates: what nothing moves and has no more than that stands still
+FAINT_ACCELERATION = 1e-5  # of that: an acceleration that is none, whatever it is the difference of
+POSITION_ROUNDING = 2e-15  # of the mechanism's length, or of a radian: last digits of positions
+DECIDED_KINDS = (*STOP_KINDS, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes follow from the small problem
+
+
+class ProblemRow(NamedTuple):
+    """A row of the small problem."""
+
+    switch: int
+    rule: int
+    sign: float = 1.0
+    way: float = 0.0  # what its friction is asked for; 0: reach is const + gain on row ``of``
+    rate: float = 0.0
+    lean: float = 0.0
+    const: float = 0.0
+    gain: float = 0.0
+    of: int = -1
+    state: int = NO_IMPULSE
+
+
+class ProblemWorkspace(NamedTuple):
+    """Arrays of a small problem, and what works on them."""
+
+    B: ModeProblem
+    P: DenseProblem
+    do: BoundKernel
+
+
+class InstantProblem:
+    """A motion at an instant, with all that is decided on its own.
+
+    Attributes
+    ----------
+    x, rate : ndarray (ns,)
+        Value and rate of every switch's quantity.
+    near, still : ndarray (ns,)
+        What of these is nothing.
+    mode, hold, way : ndarray (ns,)
+        Modes, places and ways as they were when it was looked at.
+    shares : bool
+        Whether what holds may share it with others: the last guard is that of the group.
+    over : float
+        When a series of bounces is over that has become shorter than rounding here.
+    pace : float [1/s]
+        See `reference_rate`.
+    energy : float [J]
+        That of all mass at the mechanism's own speed.
+    """
+
+    def __init__(self, here: EventContext) -> None:
+        c, self.here = here.c, here
+        self.S, self.W = c.system, c.work
+        S, s = self.S, c.structure
+        self.m = S.switches.measured
+        self.force = S.switches.force
+        self.first = self.W.sensed.shape[1] - len(self.m)
+        ny, width = len(here.y), max(s.nv, len(S.rows.law), len(S.guards.kind), 1)
+        none, y = np.zeros(0, np.int64), np.zeros((STATE_ROWS, ny))
+        seen = np.zeros((here.clock.seen.shape[0], 0))
+        self.desk = StepState(StepReals.blank(), StepCounts.blank(), np.zeros(0), y, np.zeros((1, ny)), none, seen)
+        R, self.output = tableau("rk45"), OutputBuffer(np.zeros((4, width)))
+        self.tables = c.buffers
+        self.engine = BoundKernel(
+            engine, *self.tables, StructBuffer(R), StructBuffer(self.desk), StructBuffer(self.output)
+        )
+        self.asked = StructBuffer(EngineCall(np.array([self.engine.address]), R, self.desk, self.output))
+        self.units = switch_units(s)
+        self.characteristic_rate = float(S.scales.rate.real)
+        self.unit, metric = switch_scales(s, c.values.length), [unit == "m" for unit in self.units]
+        mass, spin = S.bodies.mass.sum(), np.trace(S.bodies.inertia.reshape(-1, 3, 3).sum(axis=0))
+        turning = mass * c.values.length**2 + spin
+        self.inertia = np.array([mass if m else turning for m in metric])
+        self.pace = reference_rate(here)
+        fall = np.linalg.norm(S.gravity) / c.values.length + self.pace**2
+        self.energy = mass * c.values.length**2 * fall
+        self.negligible_acceleration = REST_ACCELERATION * self.unit * fall
+        self.near, self.least = POSITION_TOLERANCE * self.unit, RATE_TOLERANCE * self.unit * self.pace
+        self.workspaces: dict[int, ProblemWorkspace] = {}
+        self.guarded = list(zip(*(x.tolist() for x in S.guards), strict=True))
+        self.shares = bool(self.guarded) and self.guarded[-1][0] == G_SHARED
+        self.all = self.room(len(self.m))
+        self.all.B.which[:] = np.arange(len(self.m))
+        self.workspaces.clear()
+        self.begin()
+        self.acceleration_rounding = self._acceleration_rounding()
+
+    def begin(self) -> None:
+        """At another instant, where other elements may have been released."""
+        self.over = np.nan
+        self.kind = np.where(self.W.modes.released == RELEASED, RELEASED_KIND, self.S.switches.kind)
+        self.kinds = self.kind.tolist()
+        self.decided = [s for s in self.of(*DECIDED_KINDS) if self.m[s] >= 0]
+
+    def _acceleration_rounding(self) -> np.ndarray:
+        """How the last digits of positions change the accelerations of switches' quantities, (ns,).
+
+        That is rounding of forces, as of stiff springs near their free lengths. Everything that is decided is off.
+        """
+        c, nq, nv = self.here.c, len(self.here.q), self.here.structure.nv
+        which, modes = np.flatnonzero(self.m >= 0), self.W.modes.mode.copy()
+        self.switch_off_decided()
+        self.put()
+        self.desk.y[0, nq : nq + nv] = c.sizes * (1.5 + np.cos(np.arange(nv)))  # a way that no symmetry has
+        self.engine(MOTION)
+        q_dot, out, before = self.desk.K[0, :nq].copy(), np.zeros(len(self.m)), np.zeros(0)
+        for step in (0.0, POSITION_ROUNDING, -POSITION_ROUNDING):
+            self.put()
+            self.desk.y[0, :nq] += step * q_dot
+            if self.engine(MOTION) != 0:
+                break
+            a = self.gradients(which) @ self.W.velocities.solved[:nv] + self.W.sensed[BIAS, self.m[which]]
+            before = a if step == 0.0 else before
+            out[which] = np.fmax(out[which], np.abs(a - before))
+        self.W.modes.mode[:] = modes
+        self.ask(MOTION)
+        return out
+
+    def of(self, *kinds: int) -> list[int]:
+        """Switches of these kinds."""
+        return [s for s, kind in enumerate(self.kinds) if kind in kinds]
+
+    def fired(self, guards: Iterable[int], *kinds: int) -> set[int]:
+        """Switches of those of some guards that are of these kinds."""
+        rows = (self.guarded[g] for g in guards)
+        return {s for kind, s, _ in rows if kind in kinds}
+
+    def room(self, n: int) -> ProblemWorkspace:
+        """Room for a small problem of n rows."""
+        if n not in self.workspaces:
+            B, P = empty_mode_problem(n, self.here.structure.nv, len(self.S.rows.law)), allocate_dense(n)
+            self.workspaces[n] = ProblemWorkspace(
+                B, P, BoundKernel(mode_kernel, *self.tables, self.asked, StructBuffer(B), StructBuffer(P))
+            )
+        return self.workspaces[n]
+
+    def ways(self) -> np.ndarray:
+        """Ways of all switches, in place."""
+        return self.W.sensed[VALUE, self.first :]
+
+    def put(self) -> None:
+        """Lay time and state of the motion on the desk."""
+        self.desk.real.t = self.here.t
+        self.desk.y[0] = self.here.y
+
+    def ask(self, task: int) -> int:
+        """Have the engine do a task at the state of the motion; the desk has a copy of it."""
+        self.put()
+        return self.engine(task)
+
+    def evaluate_switches(self) -> None:
+        """Quantities and rates of all switches, where none of those that are decided acts."""
+        self.mode, self.hold, self.way = self.W.modes.mode.copy(), self.W.modes.hold.copy(), self.ways().copy()
+        self.reevaluate_switches()
+
+    def reevaluate_switches(self) -> None:
+        """The same after a jump."""
+        self.switch_off_decided()
+        self.put()
+        self.all.do(STORE_RATES)
+        B = self.all.B
+        self.x, self.rate, self.still = B.now.copy(), B.rate.copy(), B.seen + self.least
+
+    def switch_off_decided(self) -> None:
+        """Switch off what is decided."""
+        self.W.modes.mode[self.decided] = OFF
+
+    def slide(self, parts: list[ProblemRow]) -> None:
+        """Let friction that is no row of the problem slide as it does; that of its rows acts by them alone."""
+        ways, own = self.ways(), {p.switch for p in parts}
+        for s in self.of(FRICTION):
+            loaded = self.S.forces.load[self.force[s]] >= 0
+            ways[s] = 0.0 if s in own or loaded else np.sign(self.rate[s])
+
+    def response(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What a generalised force does at the state last looked at: accelerations, multipliers, efforts of drivers."""
+        out, nv, nr = self.output.rows, len(force), len(self.S.rows.law)
+        out[:2] = 0.0
+        out[0, :nv] = force
+        self.ask(SOLVE)
+        return out[2, :nv].copy(), out[3, :nr].copy(), self.W.velocities.effort.copy()
+
+    def gradients(self, which: np.ndarray) -> np.ndarray:
+        """Gradients of the quantities of these switches, (n, nv)."""
+        S, nr = self.S, len(self.S.rows.law)
+        out = np.zeros((len(which), self.here.structure.nv))
+        for i, s in enumerate(which.tolist()):
+            at = slice(S.row_start[nr + self.m[s]], S.row_start[nr + self.m[s] + 1])
+            out[i, S.column[at]] += self.W.G[at]
+        return out
+
+    def restore_modes(self) -> None:
+        """Modes and ways as they were when it was looked at."""
+        self.W.modes.mode[:] = self.mode
+        self.ways()[:] = self.way
+
+    def problem(self, parts: list[ProblemRow]) -> tuple[ModeProblem, DenseProblem, int]:
+        """The small problem of these rows at the state of the motion; and how its evaluation ended."""
+        room = self.room(len(parts))
+        B, P = room.B, room.P
+        for x in (B.asks, P.const, P.gain, P.lean, P.grain):
+            x[...] = 0
+        for i, part in enumerate(parts):
+            B.which[i], B.sign[i], B.way[i], B.rate[i] = part.switch, part.sign, part.way, part.rate
+            P.rule[i], P.lean[i], P.const[i], P.state[i] = part.rule, part.lean, part.const, part.state
+            if part.of >= 0:
+                P.gain[i, part.of] = part.gain
+        self.slide(parts)
+        self.put()
+        status = room.do(FREE_MOTION)
+        P.grain[:] += FAINT_ACCELERATION * self.negligible_acceleration[B.which] + self.acceleration_rounding[B.which]
+        for i in np.flatnonzero(P.A.diagonal() * self.inertia[B.which] < IMMOVABLE_MOBILITY).tolist():
+            P.A[i] = P.A[:, i] = 0.0
+            if abs(P.b[i]) <= self.negligible_acceleration[B.which[i]]:
+                P.b[i] = 0.0
+        return B, P, status
+
+    def balance(self, B: ModeProblem, P: DenseProblem, impulses: int) -> int:
+        """Solve it for forces or impulses, as `equations.instant` names them. Returns how it ended."""
+        B.asks[IMPULSES] = impulses
+        self.desk.real.t = self.here.t
+        return self.workspaces[len(P.b)].do(SOLVE_MODES)
+
+    def again(self, P: DenseProblem) -> int:
+        """Solve it once more from the states that stand in it, with reaches as they are. Returns how it ended."""
+        return self.workspaces[len(P.b)].do(RESUME_SOLVE)
+
+    def arrive(self) -> None:
+        """Put the state on the rows as they are now held."""
+        if self.ask(ARRIVE) == 0:
+            self.here.y[:] = self.desk.y[0]
+
+    def guards(self) -> np.ndarray:
+        """What is watched, (ng,)."""
+        self.ask(GUARD_VALUES)
+        out = self.output.rows[0, : len(self.S.guards.kind)].copy()
+        if self.shares:
+            out[-1] = margin_kernel(*self.tables, self.here.t, self.here.group)
+        return out
+
+    def name(self, s: int) -> str:
+        """Name of the element that switch s is of; of the coordinate that an event locks."""
+        spec = self.here.structure.switches[s]
+        return str(spec.switch.label if spec.element.category == "events" else spec.element.name)
+
+    def holds(self, s: int) -> bool:
+        """Whether switch s held when it was looked at."""
+        return bool(self.mode[s] == HELD)
+
+
+def reference_rate(here: EventContext) -> float:
+    """A rate [1/s] that per length is a speed, squared an acceleration, of which small parts are none.
+
+    That of the mechanism itself, or a change in the whole time of a motion where that is slower. A time that is short
+    makes nothing small: a force of the weight of a body at rest presses, however little it would move the body.
+    """
+    return min(float(here.c.system.scales.rate.real), 1.0 / float(here.clock.real.span))
+
+
+def instant_problem(here: EventContext) -> InstantProblem:
+    """What decides at the instants of a motion, at the present one: the same as long as tables and scratch are."""
+    n = here.instant_problem
+    if n is None or n.S is not here.c.system or n.W is not here.c.work:
+        here.instant_problem = n = InstantProblem(here)
+    n.begin()
+    return n
+
+
+SLIP_SPEED_SHARE = 0.9  # of the speed at which a slip goes the way of its velocity alone
+SLOW_SLIP = 1e3  # times what is still: slower where the end of a slip in space was found, it is over
+
+
+def slips_at_gap(n: InstantProblem, gap: int) -> list[int]:
+    """Slips of the place of a gap: none, one or two in a row."""
+    return [s for s in n.of(SLIP) if n.S.switches.other[s] == gap]
+
+
+def gaps_beyond_edges(n: InstantProblem) -> set[int]:
+    """Gaps of corners that leave their face: at its end, and going on."""
+    leaving = (n.x <= n.near) & ((n.rate < -n.still) | (n.x < -n.near))
+    return {int(n.S.switches.other[s]) for s in n.of(EDGE) if leaving[s]}
+
+
+def mark_ended_slips(n: InstantProblem, fired: np.ndarray, still: np.ndarray) -> None:
+    """Whether slips are over, into ``still``: of a pair both or none."""
+    done = n.fired(fired, G_TURNS)
+    for s in n.of(SLIP):
+        other = int(n.S.switches.partner[s])
+        if other < 0:
+            still[s] |= s in done
+        elif s < other:
+            slow = np.hypot(n.rate[s], n.rate[other]) <= SLOW_SLIP * (n.still[s] + n.still[other])
+            still[[s, other]] = (still[s] and still[other]) or (
+                slow and s in done and not _slip_continues(n, [s, other])
+            )
+
+
+def stop_slips(n: InstantProblem, fired: np.ndarray) -> None:
+    """Take what is left of their speed from slips in space that are over: what follows slides by its acceleration.
+
+    What was closed stays so; all else is looked at again.
+    """
+    over = []
+    for s in sorted(n.fired(fired, G_TURNS)):
+        pair = [s, int(n.S.switches.partner[s])]
+        speed, still = np.linalg.norm(n.rate[pair]), n.still[pair].sum()
+        if n.kind[s] == SLIP and pair[1] >= 0 and still < speed <= SLOW_SLIP * still and not _slip_continues(n, pair):
+            over += pair
+    if not over:
+        return
+    gaps = np.flatnonzero((n.kind == STOP) & (n.mode != OFF)).tolist()
+    B, P, _ = n.problem([ProblemRow(s, BILATERAL) for s in (*over, *gaps)])
+    rates = np.zeros(len(B.which))
+    rates[: len(over)] = n.rate[over]
+    n.here.v[:] -= np.linalg.lstsq(P.A, rates, rcond=1e-12)[0] @ B.Y
+    n.reevaluate_switches()
+
+
+def _slip_continues(n: InstantProblem, pair: list[int]) -> bool:
+    """Whether a slip that has just begun still goes its way: it is slow since it was at rest."""
+    fresh = len(pair) > 1 and n.way[pair] @ n.way[pair] > ONSET_LENGTH and n.way[pair] @ n.rate[pair] > 0.0
+    return bool(
+        fresh and np.linalg.norm(n.rate[pair]) < SLIP_SPEED_SHARE * ONSET_END * ONSET_SPEED * n.here.c.values.length
+    )
+
+
+def _slip_direction(n: InstantProblem, slips: list[int]) -> np.ndarray:
+    """Direction in which a place slides, as the motion has it (`equations.sliding.heading`)."""
+    u = n.rate[slips]
+    if _slip_continues(n, slips):
+        first = ONSET_SPEED * n.here.c.values.length
+        u = u + first * np.exp(-(u @ u) / first**2) * n.way[slips] / ONSET_LENGTH
+    return np.asarray(u / np.linalg.norm(u))
+
+
+def slip_rows(n: InstantProblem, gap: int, at: int, still: np.ndarray, *, known_direction: bool) -> list[ProblemRow]:
+    """Rows of the slips of a gap, which is row ``at``.
+
+    What slides does so its known way if ``known_direction``; else it is asked where to, as in an impact.
+    """
+    own = slips_at_gap(n, gap)
+    if not own:
+        return []
+    held = bool(still[own].all())
+    numbers = n.S.switch_numbers
+    mu = float((numbers.static_friction if held else numbers.kinetic_friction)[own[0]])
+    if held or not known_direction:
+        rules = (FRICTION_LINE,) if len(own) == 1 else (FRICTION_DISC, FRICTION_DISC_2)
+        return [ProblemRow(s, rule, state=AT_REST, gain=mu, of=at) for s, rule in zip(own, rules, strict=True)]
+    d = _slip_direction(n, own)
+    return [ProblemRow(s, SLIDING, lean=float(x), gain=mu, of=at) for s, x in zip(own, d, strict=True)]
+
+
+def use_kinetic_friction(n: InstantProblem, parts: Sequence[ProblemRow], P: DenseProblem, resting: np.ndarray) -> bool:
+    """Let what begins to slip hold what it carries in motion, not what others keep at rest.
+
+    Returns whether that is another problem.
+    """
+    other = False
+    for i, p in enumerate(parts):
+        if n.kind[p.switch] == SLIP and P.rule[i] != FRICTION_DISC_2 and P.state[i] != AT_REST and not resting[i]:
+            mu = float(n.S.switch_numbers.kinetic_friction[p.switch])
+            other |= P.gain[i, p.of] != mu
+            P.gain[i, p.of] = mu
+    return other
+
+
+def sliding_at_cone(
+    n: InstantProblem, parts: Sequence[ProblemRow], found: tuple[np.ndarray, ...], fired: np.ndarray
+) -> dict[int, ProblemRow]:
+    """Rows that stick at the very end of what they hold, by guards that fired, as what slides.
+
+    ``found`` are forces, states, reaches, and forces that are nothing.
+    """
+    x, state, reach, least = found
+    ends = n.fired(fired, G_CONE)
+    out = {}
+    for i, p in enumerate(parts):
+        own = [i] if p.rule == FRICTION_LINE else [i, i + 1]
+        if (
+            p.switch not in ends
+            or p.rule not in (FRICTION_LINE, FRICTION_DISC)
+            or n.kind[p.switch] != SLIP
+            or state[i] != AT_REST
+        ):
+            continue
+        size = float(np.linalg.norm(x[own]))
+        if size >= reach[i] - least[i]:
+            mu = float(n.S.switch_numbers.kinetic_friction[p.switch])
+            for k in own:
+                out[k] = parts[k]._replace(rule=SLIDING, lean=-float(x[k]) / size if size else 0.0, gain=mu)
+    return out
+
+
+def write_slips(n: InstantProblem, parts: Sequence[ProblemRow], found: tuple[np.ndarray, ...]) -> None:
+    """Modes and ways of all slips: they stick or slide where the gap is closed.
+
+    ``found`` are states, forces, rates, and ways that are known.
+    """
+    state, x, u, lean = found
+    W, ways = n.W, n.ways()
+    slips = n.of(SLIP)
+    W.modes.mode[slips], W.modes.hold[slips] = OFF, 0.0
+    for i, p in enumerate(parts):
+        own = slips_at_gap(n, int(n.S.switches.other[p.switch])) if n.kind[p.switch] == SLIP else [-1]
+        if p.switch != own[0] or state[p.of] != AT_REST:
+            continue
+        rows = np.arange(i, i + len(own))
+        if (state[rows] == AT_REST).all():
+            W.modes.mode[own], ways[own] = HELD, 0.0
+            continue
+        d = lean[rows]
+        if state[i] == DISC_SLIPS:  # the way it accelerates; against its friction, where that is none
+            d = u[rows] if np.linalg.norm(u[rows]) > 0.0 else -x[rows]
+            d = d / np.linalg.norm(d)
+        if n.mode[own[0]] == OFF and _slip_continues(n, own):
+            ways[own] = n.way[own]
+            continue
+        ways[own] = ONSET_LENGTH * d if len(own) > 1 and _slip_begins(n, own, d, u[rows]) else d
+
+
+def _slip_begins(n: InstantProblem, slips: list[int], d: np.ndarray, u: np.ndarray) -> bool:
+    """Whether a slip in space has hardly any speed yet and gets faster the way d."""
+    speed = np.linalg.norm(n.rate[slips])
+    return bool(speed <= n.still[slips].sum() or (speed < ONSET_SPEED * n.here.c.values.length and u @ d > 0.0))
+
+
+SIDE_OF_GUARD = {G_LOWER: 1.0, G_UPPER: -1.0}
+
+
+def closed_bounds(n: InstantProblem, fired: np.ndarray) -> dict[int, tuple[float, ...]]:
+    """Of every stop the sides that it is at: +1 the lower one, -1 the upper one."""
+    hit = {(s, SIDE_OF_GUARD[k]) for k, s, _ in (n.guarded[g] for g in fired) if k in SIDE_OF_GUARD}
+    out = {}
+    gone = gaps_beyond_edges(n)
+    for s in n.of(*STOP_KINDS):
+        if s in gone:
+            continue
+        gaps = {1.0: n.x[s] - n.W.modes.lower[s], -1.0: n.W.modes.upper[s] - n.x[s]}
+        held = n.way[s] if n.mode[s] != OFF else 0.0
+        at = tuple(w for w, gap in gaps.items() if gap < np.inf and (gap <= n.near[s] or (s, w) in hit or w == held))
+        if at:
+            out[s] = at
+    return out
+
+
+def switches_at_rest(n: InstantProblem, fired: np.ndarray) -> np.ndarray:
+    """Whether the rate of each switch is none, (ns,)."""
+    still = np.abs(n.rate) <= n.still
+    still[list(n.fired(fired, G_SLIDES, G_BACK))] = True
+    mark_ended_slips(n, fired, still)
+    return still
+
+
+def rows_of_velocities(n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray) -> list[ProblemRow]:
+    """Rows that impulses may act along."""
+    out = []
+    for s, kind in enumerate(n.kinds):
+        if kind in STOP_KINDS and s in at:
+            out += _stop_rows(s, at[s])
+            out += slip_rows(n, s, len(out) - 1, still, known_direction=False)
+        elif kind == ONE_WAY:
+            out.append(ProblemRow(s, UNILATERAL, state=AT_REST))
+        elif kind == LOCK and n.m[s] >= 0 and n.mode[s] != OFF:
+            out.append(ProblemRow(s, BILATERAL))
+        elif kind == FRICTION and n.S.forces.load[n.force[s]] >= 0:
+            held = bool(still[s]) or n.mode[s] != OFF
+            out.append(
+                ProblemRow(
+                    s,
+                    FRICTION_LINE,
+                    1.0,
+                    STATIC if held else _sign_of(n.rate[s]),
+                    0.0 if held else n.rate[s],
+                    state=AT_REST,
+                )
+            )
+    return out
+
+
+def rows_of_accelerations(n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray) -> list[ProblemRow]:
+    """Rows that forces may act along: of those that move apart, or slide, only friction that follows its load."""
+    out = []
+    for s, kind in enumerate(n.kinds):
+        if kind in STOP_KINDS and s in at and still[s]:
+            out += _stop_rows(s, at[s], AT_REST if n.mode[s] != OFF else NO_IMPULSE)
+            out += slip_rows(n, s, len(out) - 1, still, known_direction=True)
+        elif kind == ONE_WAY and still[s]:
+            out.append(ProblemRow(s, UNILATERAL, state=AT_REST if n.mode[s] != OFF else NO_IMPULSE))
+        elif kind == LOCK and n.m[s] >= 0 and n.mode[s] != OFF:
+            out.append(ProblemRow(s, BILATERAL))
+        elif kind == FRICTION:
+            if still[s]:
+                out.append(ProblemRow(s, FRICTION_LINE, way=STATIC, state=AT_REST))
+            elif n.S.forces.load[n.force[s]] >= 0:
+                sign = _sign_of(n.rate[s])
+                out.append(ProblemRow(s, SLIDING, way=sign, rate=float(n.rate[s]), lean=sign))
+    return out
+
+
+def _stop_rows(s: int, at: tuple[float, ...], state: int = AT_REST) -> list[ProblemRow]:
+    """One that is at both sides holds."""
+    return [ProblemRow(s, BILATERAL)] if len(at) > 1 else [ProblemRow(s, UNILATERAL, at[0], state=state)]
+
+
+def _sign_of(x: float) -> float:
+    return 1.0 if x > 0.0 else -1.0

@@ -1,0 +1,529 @@
+"""Resolution of an instant: actions, jumps of velocities and modes, repeated until nothing violates its rule.
+
+Elastic stops and ratchets need no problem. Where friction grows with the load that it makes itself, rigid bodies
+may have no accelerations, or several (Painleve 1895): of several the one is taken that continues the modes before;
+with none velocities jump without a collision, the impulses being the limit of a time step that goes to zero
+(Stewart 2000, SIAM Review 42).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from ...constraints.switch_kinds import ELASTIC, FROZEN, ONE_WAY, RATCHET, SLIP, STOP, TURN
+from ...engine.calls import MOTION
+from ...engine.mode_complementarity import STEP_IMPULSES, SUDDEN_IMPULSES, TERM_ROUNDING
+from ...model.contact_point import Touch
+from ...numerics.complementarity.dense_problem import AT_REST, FRICTION_LINE, NO_IMPULSE, NO_SOLUTION, SOLUTION_FOUND
+from ...tables.table_definitions import (
+    BIAS,
+    G_BACK,
+    G_CONE,
+    G_CORNER,
+    G_HOLDS,
+    G_PRESS_LOWER,
+    G_PRESS_UPPER,
+    G_PULL,
+    G_SHARED,
+    G_SLIDES,
+    G_TURNS,
+    HELD,
+    OFF,
+)
+from ..diagnosis import body_names
+from .context import EventContext
+from .event_actions import perform_actions, perform_initial_actions
+from .event_messages import (
+    endless_instant,
+    guard_titles,
+    no_admissible_forces,
+    no_admissible_impulses,
+    passed_bound,
+    record_jump,
+    record_mode_changes,
+    start_beyond_bound,
+)
+from .impacts import (
+    Jump,
+    apply_impulses,
+    apply_velocities,
+    coming_to_rest,
+    no_jump,
+    note_bounces,
+    settle_down,
+    violates_rule,
+)
+from .instant_problem import (
+    InstantProblem,
+    ProblemRow,
+    closed_bounds,
+    instant_problem,
+    rows_of_velocities,
+    stop_slips,
+    switches_at_rest,
+)
+from .mode_selection import ModeDecision, decide_modes, element_titles, remove_residual_rates
+from .nonsmooth_laws import Corners
+
+SLOW_ACCELERATION = 1e-9  # of the mechanism's length (of a radian), at its own rate: an acceleration that is none
+TOOTH_TOLERANCE = 1e-9  # of the pitch: as good as at a tooth
+UNDECIDED_SIDE = 0.0  # way of an elastic switch whose force looks where it is
+
+
+def update_ratchets(n: InstantProblem, still: np.ndarray) -> None:
+    """Ratchets that do not hold: going on, or back to the last tooth that was passed; ``still``: those at rest."""
+    for s in n.of(RATCHET):
+        first, n.W.modes.upper[s] = n.W.modes.upper[s] < np.inf, np.inf
+        if n.mode[s] != OFF:
+            n.W.modes.lower[s] = n.hold[s]  # of a motion that goes on, too
+        elif n.rate[s] > 0.0 and not still[s]:
+            _move_freely(n, s)
+        elif first or n.way[s] >= 0.0:
+            tooth, pitch = n.S.switch_numbers.tooth[s], n.S.switch_numbers.pitch[s]
+            n.W.modes.lower[s] = tooth + pitch * np.floor((n.x[s] - tooth) / pitch + TOOTH_TOLERANCE)
+            n.ways()[s] = n.way[s] = -1.0
+
+
+def release_ratchets(n: InstantProblem, hit: Collection[int]) -> None:
+    """Ratchets whose tooth let go, or threw back what it was ``hit`` by, go on, and those that begin to; modes are
+    decided.
+    """
+    for s in n.of(RATCHET):
+        if n.W.modes.mode[s] != OFF:
+            continue
+        slow = abs(n.rate[s]) <= 2.0 * TURN * n.unit[s] * n.characteristic_rate
+        if (
+            n.mode[s] != OFF
+            or s in hit
+            or (slow and _switch_acceleration(n, s) > SLOW_ACCELERATION * n.unit[s] * n.characteristic_rate**2)
+        ):
+            _move_freely(n, s)
+        else:
+            n.ways()[s] = n.way[s]
+
+
+def _move_freely(n: InstantProblem, s: int) -> None:
+    """No tooth is in the way until it turns round."""
+    n.ways()[s] = n.way[s] = 1.0
+    n.W.modes.lower[s] = -np.inf
+
+
+def _switch_acceleration(n: InstantProblem, s: int) -> float:
+    """Second derivative of a quantity with the modes as they stand."""
+    n.ask(MOTION)
+    nq = n.S.sizes.coordinates
+    vdot = n.desk.K[0, nq : nq + n.here.structure.nv]
+    return float(n.gradients(np.array([s]))[0] @ vdot + n.W.sensed[BIAS, n.m[s]])
+
+
+def update_elastic_stops(n: InstantProblem, fired: np.ndarray, previous: np.ndarray) -> None:
+    """Which sides of elastic stops are pressed now; ``n`` has looked there.
+
+    What fired is pressed if it was open by the ``previous`` before the instant, and the other way round.
+    """
+    for s in n.of(ELASTIC):
+        hit = {k for k, of, _ in (n.guarded[g] for g in fired) if of == s}
+        n.ways()[s] = FROZEN + _pressed_side(n, s, float(previous[s]) - FROZEN, hit)
+
+
+def _pressed_side(n: InstantProblem, s: int, old: float, hit: set[int]) -> float:
+    """1 if pressed at the lower side, -1 at the upper, 0 if open; `UNDECIDED_SIDE` less `FROZEN` where nothing tells."""
+    k, c = n.S.switch_numbers.stiffness[s], n.S.switch_numbers.damping[s]
+    now = 0.0
+    bounds = n.W.modes.lower, n.W.modes.upper
+    for side, bound, guard in zip((1.0, -1.0), bounds, (G_PRESS_LOWER, G_PRESS_UPPER), strict=True):
+        depth, rate = side * (bound[s] - n.x[s]), -side * n.rate[s]
+        if not np.isfinite(depth):
+            continue
+        if guard in hit:
+            on = old != side
+        elif abs(depth) > n.near[s]:
+            on = depth > 0.0 and k * depth + c * rate > 0.0
+        elif abs(rate) > n.still[s]:
+            on = rate > 0.0
+        else:
+            n.ways()[s] = FROZEN
+            rise = -side * _switch_acceleration(n, s)
+            if abs(rise) <= SLOW_ACCELERATION * n.unit[s] * n.characteristic_rate**2:
+                return UNDECIDED_SIDE - FROZEN
+            on = rise > 0.0
+        now = side if on else now
+    return now
+
+
+DIFFERENT_SOLUTION = 1e-6  # of the accelerations: they are others
+NULL_EIGENVALUE = 1e-9  # of the largest eigenvalue: nothing tells rows apart
+LIMIT_STEP = 1e-9  # part of the speed that forces make in a step of time that goes to zero
+IMPULSE_FACTOR = 1e3  # times the impulse that forces make in it: a blow
+
+
+def report_indeterminacy(n: InstantProblem, found: ModeDecision) -> None:
+    """Say what is left open at this instant, of the same elements once in a motion."""
+    if not found.gain.any():
+        return
+    if (said := _several_solutions(n, found)) and not any(x.endswith(said) for x in n.here.doubts):
+        n.here.doubts.append(f"at t = {n.here.t:.6g} s {said}")
+    if (said := _undetermined_friction(n, found)) and said not in n.here.doubts:
+        n.here.doubts.append(said)
+
+
+def report_distribution(n: InstantProblem, guards: Sequence[int]) -> None:
+    """Say whose shares of what holds a body no guard watches: it holds by others than those that are computed."""
+    group = np.flatnonzero(n.W.modes.shared).tolist()
+    own = [x for g in guards for x in (group if n.guarded[g][0] == G_SHARED else [n.guarded[g][1]])]
+    which = [n.here.structure.switches[s].element for s in dict.fromkeys(own)]
+    who = " and ".join(
+        dict.fromkeys(f"{e.title} of {body_names(e)}" if isinstance(e, Touch) else e.title for e in which)
+    )
+    said = (
+        f"{who} would carry more than can be held there by the least forces, by others it holds: how rigid bodies at "
+        f"rest share what holds them is not determined, and when this gives way can be wrong. Steps by impulses "
+        f"(method='impulse') share anew in each step"
+    )
+    if said not in n.here.doubts:
+        n.here.doubts.append(said)
+
+
+def _several_solutions(n: InstantProblem, found: ModeDecision) -> str:
+    """Other solutions of the problem that was solved last, looked for from the opposite modes."""
+    P = n.workspaces[len(found.parts)].P
+    size = max(
+        np.abs(P.b).max(), P.grain.max() / TERM_ROUNDING
+    )  # at a take-off accelerations are differences of larger ones
+    for state in (NO_IMPULSE, AT_REST):
+        P.state[:] = state
+        if n.again(P) == SOLUTION_FOUND and np.abs(P.u - found.u).max() > DIFFERENT_SOLUTION * size:
+            who = " and ".join(element_titles(n, found.parts))
+            return (
+                f"rigid bodies with friction can go on in several ways (Painleve's paradox) at "
+                f"{who}; taken: the one that goes on from the modes before"
+            )
+    return ""
+
+
+def _undetermined_friction(n: InstantProblem, found: ModeDecision) -> str:
+    """Friction whose most depends on what redundancy leaves open."""
+    held = np.flatnonzero(found.state == AT_REST)
+    grips = [i for i in held.tolist() if found.parts[i].rule == FRICTION_LINE and found.gain[i].any()]
+    if len(held) < 2 or not grips:
+        return ""
+    d = np.sqrt(found.A.diagonal()[held])
+    d[d == 0.0] = 1.0
+    size, Z = np.linalg.eigh(found.A[np.ix_(held, held)] / np.outer(d, d))
+    Z = Z[:, size < NULL_EIGENVALUE * size.max()] / d[:, None]
+    open_ = [
+        i
+        for i in grips
+        if (np.abs(found.gain[i][held] @ Z) > DIFFERENT_SOLUTION * np.abs(found.gain[i][held]).max()).any()
+    ]
+    if not open_ or _friction_is_needless(n, found, open_):
+        return ""
+    who = " and ".join(element_titles(n, [found.parts[i] for i in open_]))
+    return (
+        f"whether {who} holds is not determined: the most that it holds follows reactions that redundancy leaves open; "
+        f"taken: those whose sum of squares, each by the mass that it moves, is least"
+    )
+
+
+def _friction_is_needless(n: InstantProblem, found: ModeDecision, rows: list[int]) -> bool:
+    """Whether these are places of contact without whose friction nothing moves either: a ball at rest in a groove."""
+    if any(n.kind[found.parts[i].switch] != SLIP for i in rows):
+        return False
+    P = n.workspaces[len(found.parts)].P
+    P.const[rows], P.gain[rows], P.state[:] = 0.0, 0.0, found.state
+    size = max(np.abs(P.b).max(), P.grain.max() / TERM_ROUNDING)
+    return n.again(P) == SOLUTION_FOUND and bool(np.abs(P.u - found.u).max() <= DIFFERENT_SOLUTION * size)
+
+
+def jump_without_collision(n: InstantProblem, parts: list[ProblemRow], held: float) -> Jump | None:
+    """The jump of velocities without a collision, if there is one, for rows that have no accelerations.
+
+    ``held`` is what friction holds at least, without any load.
+    """
+    B, P, _ = n.problem(parts)
+    forces, before = P.b.copy(), B.sign * n.rate[B.which]
+    size = np.abs(before).max(initial=0.0)
+    if not size > 0.0:
+        return None
+    scale = np.sqrt(np.maximum(P.A.diagonal(), 1e-300))
+    finite = max(np.abs(forces).max(), (P.A.diagonal() * held).max())
+    B.step[0] = LIMIT_STEP * size / max(finite, 1e-300)
+    P.b[:] = before + B.step[0] * forces
+    B.loaded[:] *= B.step[0]
+    if n.balance(B, P, STEP_IMPULSES) != SOLUTION_FOUND:
+        return None
+    if not (scale * np.abs(P.x)).max() > IMPULSE_FACTOR * B.step[0] * finite / scale.max():
+        return None
+    P.b[:], B.loaded[:] = before, 0.0
+    if n.balance(B, P, SUDDEN_IMPULSES) != SOLUTION_FOUND:
+        return None
+    out = no_jump(n)
+    out.jammed = tuple(p.switch for p in parts)
+    return apply_velocities(n, (B, P), parts, (before, P.x.copy(), P.u.copy()), out, np.zeros_like(out.along))
+
+
+MOST_ROUNDS = 100
+MOST_REPEATS = 5  # times that ways of sliding are decided again for the same modes
+RATE_GUARDS = (G_SLIDES, G_BACK, G_TURNS, G_PRESS_LOWER, G_PRESS_UPPER)  # guards of rates, or whose meaning they decide
+HOLDING_GUARDS = (G_PULL, G_HOLDS, G_CONE)  # guards of what holds, by the forces that it carries
+BROKEN_FORCE = 1e-8  # of the forces that a force is the difference of: beyond what rounding makes
+VIOLATED_START = 1e-9  # of the mechanism's length or a radian, of rates at its own rate: a start beyond its limit
+PENETRATED = 1e-7  # of the same: what is open and past its bound has gone through it
+
+
+def resolve_start(here: EventContext) -> None:
+    """As the motion begins: what is kicked, closed, stuck or slides there.
+
+    Raises
+    ------
+    ModelError
+        If a limit starts violated.
+    """
+    s = here.structure
+    if here.start.before is None and not (s.switches or s.events or s.model.events):
+        return
+    acts = perform_initial_actions(here)
+    if len(here.c.system.switches.row) or here.external_impulse is not None:
+        n = instant_problem(here)
+        corners = Corners(n)
+        corners.begin()
+        n.evaluate_switches()
+        n.restore_modes()
+        remove_slight_overlaps(n)
+        refuse_violated(n)
+        resolve_jumps_and_corners(n, corners, np.zeros(0, np.int64), record=False)
+    acts.told(["start"])
+    _resolve_chain(here, acts.passed())
+
+
+def resolve_event(here: EventContext, fired: Sequence[int]) -> None:
+    """Where guards fired.
+
+    Parameters
+    ----------
+    here : Here
+    fired : sequence of int
+        Rows of `System.guard_i`.
+
+    Raises
+    ------
+    SimulationError
+        If no forces or impulses go with all that is asked, or there is no end of it.
+    """
+    _resolve_chain(here, np.array(fired, np.int64))
+
+
+def _resolve_chain(here: EventContext, fired: np.ndarray) -> None:
+    """Events, jumps and modes, as long as expressions of events pass zero by what was done."""
+    for _ in range(MOST_ROUNDS if len(fired) else 0):
+        acts = perform_actions(here, fired.tolist())
+        if len(here.c.system.switches.row) or here.external_impulse is not None:
+            n = instant_problem(here)
+            resolve_jumps_and_corners(n, Corners(n), fired)
+        acts.told(["start"])
+        fired = acts.passed()
+        here.settled_keys.clear()  # what follows from it comes later
+        if not len(fired) or here.stopped:
+            return
+    if len(fired):
+        raise endless_instant(here.t, guard_titles(instant_problem(here), fired.tolist()), MOST_ROUNDS)
+
+
+def resolve_jumps_and_corners(n: InstantProblem, corners: Corners, fired: np.ndarray, record: bool = True) -> None:
+    """Jumps and modes, and the sides of laws' corners: each by what the others are, until they agree."""
+    corners.fired(fired)
+    by_rows = [g for g in fired.tolist() if n.guarded[g][0] != G_CORNER]
+    if not len(fired) or by_rows:
+        resolve_modes(n, np.array(by_rows, np.int64), record)
+    let_go = np.array([g for g in by_rows if n.guarded[g][0] in HOLDING_GUARDS], np.int64)
+    for _ in range(MOST_ROUNDS):
+        if not corners.settle() or not n.decided:
+            return
+        resolve_modes(n, let_go, record)
+    raise endless_instant(n.here.t, [n.name(s) for s in sorted(corners.at)], MOST_ROUNDS)
+
+
+def refuse_violated(n: InstantProblem) -> None:
+    """Refuse a start beyond a limit."""
+    for s, kind in enumerate(n.kinds):
+        lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
+        back = -n.rate[s] / n.characteristic_rate if kind == ONE_WAY else 0.0
+        past = max(lower - n.x[s], n.x[s] - upper) if kind == STOP else back
+        if past > VIOLATED_START * n.unit[s]:
+            raise start_beyond_bound(n, s)
+
+
+def refuse_penetration(n: InstantProblem) -> None:
+    """Refuse to go on from where what is open is past its bound, by more than what is closed may be."""
+    for s in n.of(STOP):
+        past = max(n.W.modes.lower[s] - n.x[s], n.x[s] - n.W.modes.upper[s])
+        if n.mode[s] == OFF and past > PENETRATED * n.unit[s] + n.W.options.position_tolerance:
+            raise passed_bound(n, s, past)
+
+
+def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> None:
+    """Jumps and modes at the instant, until nothing is against its rule; those that a motion begins in are no news."""
+    here = n.here
+    before, modes, ways = here.y.copy(), n.W.modes.mode.copy(), n.ways().copy()
+    since = before  # the last jump that was recorded
+    hits: dict[int, bool] = {}
+    calm: list[int] = []
+    gone: list[int] = []  # guards of what was held and could not hold
+    again = 0
+    for _ in range(MOST_ROUNDS):
+        n.evaluate_switches()
+        refuse_penetration(n)
+        stop_slips(n, fired)
+        still = switches_at_rest(n, fired)
+        still[calm] = True
+        update_ratchets(n, still)
+        at = closed_bounds(n, fired)
+        rate = n.rate.copy()
+        jumped = jump_if_needed(n, at, still)
+        if jumped is None:
+            still |= n.mode != OFF
+        else:
+            hits |= {s: s in jumped.at_rest for s in jumped.closing if s not in here.astray}
+            fired = guards_still_valid(n, fired, rate)
+            still = switches_at_rest(n, fired)
+            still[list(jumped.at_rest)] = True
+        update_elastic_stops(n, fired, ways)
+        found = modes_or_jump(n, at, still, fired, jumped)
+        if isinstance(found, Jump):  # no accelerations: velocities have jumped, all is looked at again
+            record_jump(n, found, since)
+            since = here.y.copy()
+            n.reevaluate_switches()
+            fired, calm = guards_still_valid(n, fired, rate), list(found.at_rest)
+            continue
+        release_ratchets(n, hits)
+        remove_residual_rates(n, found)
+        n.arrive()
+        if jumped is not None and (
+            jumped.external_impulses or jumped.given or not jumped.closing.keys() <= here.astray
+        ):
+            record_jump(n, jumped, since)
+            since = here.y.copy()
+        guards = n.guards()
+        if again < MOST_REPEATS and slides_against_direction(n, guards):
+            n.reevaluate_switches()
+            again += 1
+            continue
+        against = broken_guards(n, found, guards)
+        new = [g for g in against if g not in gone]
+        if not new:
+            if against:  # it was let go, and is held again: by other shares than the least
+                report_distribution(n, against)
+            if record:
+                record_mode_changes(n, (modes, ways), before, hits)
+            return
+        fired, gone = np.array([*fired, *new], np.int64), [*gone, *new]
+    raise endless_instant(here.t, guard_titles(n, fired.tolist()), MOST_ROUNDS)
+
+
+def slides_against_direction(n: InstantProblem, guards: np.ndarray) -> bool:
+    """Whether something slides against its way: where bounces are cut off, what they were changes other rates too."""
+    sliding = ((g, s) for g, (kind, s, _) in enumerate(n.guarded) if kind in (G_SLIDES, G_TURNS))
+    return any(guards[g] < -n.still[s] for g, s in sliding)
+
+
+def guards_still_valid(n: InstantProblem, fired: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Guards that fired, without those of rates that were something else before a jump."""
+    other = np.abs(n.rate - rate) > n.still
+    return np.array(
+        [g for g in fired.tolist() if n.guarded[g][0] not in RATE_GUARDS or not other[n.guarded[g][1]]], np.int64
+    )
+
+
+def jump_if_needed(n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Jump | None:
+    """The jump of velocities, if there is one; ``n`` has looked where it leads."""
+    here = n.here
+    parts = rows_of_velocities(n, at, still)
+    kick, here.external_impulse = here.external_impulse, None
+    blows, here.external_impulses = tuple(here.external_impulses), []
+    if kick is None and not violates_rule(n, parts, n.rate):
+        return None
+    jumped = apply_impulses(n, parts, kick)
+    jumped.external_impulses = blows
+    if jumped.ended != SOLUTION_FOUND:
+        n.restore_modes()
+        raise no_admissible_impulses(n, parts)
+    here.lost, here.given, here.fresh = here.lost + jumped.lost, here.given + jumped.given, True
+    n.reevaluate_switches()
+    note_bounces(n, jumped)
+    return jumped
+
+
+def modes_or_jump(
+    n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray, jumped: Jump | None
+) -> ModeDecision | Jump:
+    """Modes; a series of bounces that has become shorter than rounding is over.
+
+    Where there are no accelerations velocities may jump without a collision.
+    """
+    found = decide_modes(n, at, still, fired)
+    if found.ended == SOLUTION_FOUND and (over := coming_to_rest(n, at, still)).any():
+        still |= over
+        settle_down(n, np.flatnonzero(over).tolist(), still, jumped)
+        found = decide_modes(n, at, still, fired)
+    if found.ended == SOLUTION_FOUND:
+        report_indeterminacy(n, found)
+        return found
+    blow = (
+        jump_without_collision(n, rows_of_velocities(n, at, still), np.abs(found.reach).max(initial=0.0))
+        if found.ended == NO_SOLUTION
+        else None
+    )
+    if blow is None:
+        n.restore_modes()
+        raise no_admissible_forces(n, found)
+    n.here.lost, n.here.fresh = n.here.lost + blow.lost, True
+    return blow
+
+
+def broken_guards(n: InstantProblem, found: ModeDecision, guards: np.ndarray) -> list[int]:
+    """Guards of what holds that say that it cannot, beyond rounding."""
+    out = [
+        k
+        for k, (kind, s, _) in enumerate(n.guarded)
+        if kind in HOLDING_GUARDS and s in found.sizes and guards[k] < -BROKEN_FORCE * found.sizes[s] - found.least[s]
+    ]
+    last = len(guards) - 1
+    if n.shares and guards[last] < -BROKEN_FORCE * n.here.group.size[0]:
+        out.append(last)
+    return out
+
+
+# Overlaps of rounding size at the start: bodies are put side by side, as assembly closes joints.
+
+
+SLIGHT_OVERLAP = 1e-5  # of the mechanism's length, or of a radian: as positions are rounded in a description
+REPORTED_OVERLAP = 1e-7  # of the same: worth a word
+
+
+def remove_slight_overlaps(n: InstantProblem) -> None:
+    """Take overlaps up to `SLIGHT_OVERLAP` away, of contacts, stops and ropes; velocities stay."""
+    over = {}
+    for s in np.flatnonzero(n.kind == STOP).tolist():
+        lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
+        for side, depth in ((lower, lower - n.x[s]), (upper, n.x[s] - upper)):
+            if n.near[s] < depth <= SLIGHT_OVERLAP * n.unit[s]:
+                over[s] = side, depth
+    if not over:
+        return
+    y, modes, hold = n.here.y.copy(), n.W.modes.mode.copy(), n.W.modes.hold.copy()
+    for s, (side, _) in over.items():
+        n.W.modes.mode[s], n.W.modes.hold[s] = HELD, side
+    n.arrive()
+    n.W.modes.mode[:], n.W.modes.hold[:] = modes, hold
+    n.here.v[:] = y[n.here.structure.nq : n.here.structure.nq + n.here.structure.nv]
+    n.arrive()  # velocities on the rows of joints, where they are now
+    n.evaluate_switches()
+    n.restore_modes()
+    told = {s: x for s, (_, x) in over.items() if x > REPORTED_OVERLAP * n.unit[s]}
+    if told:
+        most = max(told, key=lambda s: told[s])
+        n.here.doubts.append(
+            f"the start overlaps by up to {told[most]:.2g} ({n.name(most)}); what is there was moved by as much"
+        )

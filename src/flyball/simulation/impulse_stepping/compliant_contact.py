@@ -1,0 +1,307 @@
+"""Compliant contacts: the law of their normal force as rows of the cone problem with compliance.
+
+With overlap d, f = k d^n (1 + c ddot) + (d/dt) damping d, not less than 0 (Hertz 1881; Hunt and Crossley 1975).
+Over a step of length h from the overlap a to b, U' = k d^n, the impulse is
+
+    p = h ((1 - s) (U(b) - U(a)) / (b - a) + s U'(b)) (1 + c (b - a) / h) + damping (b - a),
+    b = a - h ((1 - s) / 2 u- + (1 + s) / 2 u+).
+
+With s = 0 the elastic energy is conserved exactly (Gonzalez 1996), but for what c and damping take; the step is of
+second order. With s = 1 it is Euler's implicit one, which brings to rest what is too stiff for the step; s goes
+with the square of h^2 k' / m. As p falls with u+, the problem is monotone; by Newton's method p(u+) becomes rows u
++ bias + soft p >= 0. Displacements end at the overlaps b.
+"""
+
+from __future__ import annotations
+
+from ...collision.shape_kinds import SPHERE
+from ...collision.tables import BEFORE, FOUND, GAP, KIND, MATERIAL, PAR, SHAPE_1, SHAPE_2
+from ...compiler.formulas import formula
+from ...math.scalar import sqrt
+from ...numerics.complementarity.contact_operator import contact_velocity, diagonal_block
+from ...tables.table_definitions import DAMPING, DISSIPATION, EXPONENT, MODULUS, STIFFNESS
+from .free_bodies import rest_speed
+from .stepping_tables import (
+    DIVIDES_STEPS,
+    HISTORY_END_GAP,
+    HISTORY_LAW_OVERLAP,
+    HISTORY_OVERLAP,
+    HISTORY_OVERLAP_RATE,
+    HISTORY_SHARE,
+    HISTORY_SPRING_OVERLAP,
+    HISTORY_STIFFNESS,
+    LAST_STEP,
+    LONGEST_STEP,
+    LOST_IMPACT,
+    NUMERICAL,
+    STEP,
+    STEPS_TAKEN,
+    STORED_AT_START,
+    STORED_ENERGY,
+    VELOCITY_TOLERANCE,
+)
+
+LAW_ITERATIONS = 20  # of Newton's method; three or four are usual
+FEW_LAW_ITERATIONS = 3  # after which it is enough where solves are cut off
+LAW_TOLERANCE = 1e-2  # of the residual that is enough: what the law may differ by from its tangent
+RESIDUAL_SHARE = 0.1  # of the residual that is left: the same
+SMALL_CHANGE = (
+    1e-3  # change of the overlap, relative to it, over which a mean force is that in its middle, and a correction
+)
+LARGEST_COMPLIANCE = 1e6  # times the mobility: compliance of what does not touch
+RESOLVED_STIFFNESS = 0.01  # h^2 k' / 4 m of a step that resolves an impact: 20 steps of one by Hertz
+
+
+@formula
+def contact_law(G, C, L, c):
+    """Exponent, dissipation and damping of contact c, and what its stiffness is or follows from."""
+    a, b = G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]
+    return (
+        L.pair[a, b, EXPONENT],
+        L.pair[a, b, DISSIPATION],
+        L.pair[a, b, DAMPING],
+        L.pair[a, b, STIFFNESS],
+        L.pair[a, b, MODULUS],
+    )
+
+
+@formula
+def contact_stiffness(G, C, L, c):
+    """Stiffness of contact c, 0 if it is hard; of spheres by E*: k = 4/3 E* sqrt(R), 1/R = 1/R_1 + 1/R_2."""
+    _, _, _, k, modulus = contact_law(G, C, L, c)
+    if modulus > 0.0:
+        s = 0.0
+        for side in (SHAPE_1, SHAPE_2):
+            i = C.at[c, side]
+            if G.shape_i[i, KIND] == SPHERE:
+                s += 1.0 / G.shape_x[i, PAR]
+        return modulus / sqrt(s)
+    return k
+
+
+@formula
+def elastic_energy(k, n, d):
+    """Stored at the overlap d."""
+    return k * d ** (n + 1.0) / (n + 1.0) if d > 0.0 else 0.0
+
+
+@formula
+def elastic_force(k, n, d):
+    """Elastic force, and its slope."""
+    if d <= 0.0:
+        return 0.0, 0.0
+    f = k * d**n
+    return f, n * f / d
+
+
+@formula
+def mean_elastic_force(k, n, a, b):
+    """What the energy changes by from a to b, over the way; its slope with b."""
+    m, d = 0.5 * (a + b), b - a
+    if abs(d) <= SMALL_CHANGE * abs(m):
+        f, slope = elastic_force(k, n, m)
+        f *= 1.0 + n * (n - 1.0) / 24.0 * (d / m) * (d / m) if m > 0.0 else 1.0
+        return f, 0.5 * slope * (1.0 + (n - 1.0) / 6.0 * d / m if m > 0.0 else 1.0)
+    f = (elastic_energy(k, n, b) - elastic_energy(k, n, a)) / d
+    return f, (elastic_force(k, n, b)[0] - f) / d
+
+
+@formula
+def law_impulse(k, law, a, b, h, share):
+    """Impulse, less than 0 where the law would pull, and its slope with b."""
+    n, c, damping, _, _ = law
+    mean, at_end = mean_elastic_force(k, n, a, b), elastic_force(k, n, b)
+    f = (1.0 - share) * mean[0] + share * at_end[0]
+    slope = (1.0 - share) * mean[1] + share * at_end[1]
+    loss = 1.0 + c * (b - a) / h
+    p = h * f * loss + damping * (max(b, 0.0) - max(a, 0.0))
+    return p, h * slope * loss + f * c + (damping if b > 0.0 else 0.0)
+
+
+@formula
+def end_overlap(now, c, h, u):
+    """Overlap at the end of the step, of which the law is, with the rate u then."""
+    s = now[c, HISTORY_SHARE]
+    return now[c, HISTORY_OVERLAP] - h * (0.5 * (1.0 - s) * now[c, HISTORY_OVERLAP_RATE] + 0.5 * (1.0 + s) * u)
+
+
+@formula
+def find_compliant_contacts(G, C, P, L, X, pace, now, before):
+    """Put aside what is known of contacts that give way at the start of the step. Returns whether there are any."""
+    any_ = False
+    gone = pace.real[STORED_ENERGY]
+    for c in range(C.count[FOUND]):
+        k, o = contact_stiffness(G, C, L, c), C.at[c, BEFORE]
+        now[c, HISTORY_STIFFNESS] = k
+        if k > 0.0:
+            any_ = True
+            now[c, HISTORY_OVERLAP] = now[c, HISTORY_LAW_OVERLAP] = now[c, HISTORY_SPRING_OVERLAP] = -C.x[c, GAP]
+            now[c, HISTORY_OVERLAP_RATE] = contact_velocity(P, X.v, X.wide, c)[0]
+            if o >= 0:
+                now[c, HISTORY_LAW_OVERLAP], now[c, HISTORY_SPRING_OVERLAP] = (
+                    before[o, HISTORY_LAW_OVERLAP],
+                    before[o, HISTORY_SPRING_OVERLAP],
+                )
+                gone -= elastic_energy(k, contact_law(G, C, L, c)[0], before[o, HISTORY_SPRING_OVERLAP])
+            elif pace.count[STEPS_TAKEN] > 0:
+                now[c, HISTORY_SPRING_OVERLAP] = 0.0
+    pace.real[NUMERICAL] += gone
+    if pace.count[STEPS_TAKEN] == 0:
+        pace.real[STORED_AT_START] = 0.0
+        for c in range(C.count[FOUND]):
+            pace.real[STORED_AT_START] += elastic_energy(
+                now[c, HISTORY_STIFFNESS], contact_law(G, C, L, c)[0], -C.x[c, GAP]
+            )
+    return any_
+
+
+@formula
+def elastic_overlap(share, overlap, target):
+    """The part of an overlap that is its spring's."""
+    return overlap - share * max(0.0, overlap - max(target, 0.0))
+
+
+@formula
+def start_overlap(now, c, k, n, new):
+    """Set the overlap that contact c begins the step with; energy that comes of what is no spring's.
+
+    What is too stiff for the step has the overlap that its law ended with. Where surfaces have turned, they overlap by
+    more, which displacements take away. Points that come and go take their energy from those that go and come.
+    """
+    s, kept = now[c, HISTORY_SHARE], now[c, HISTORY_SPRING_OVERLAP]
+    now[c, HISTORY_OVERLAP] = elastic_overlap(s, now[c, HISTORY_OVERLAP], kept)
+    if new:
+        return elastic_energy(k, n, now[c, HISTORY_OVERLAP])
+    return s * (elastic_energy(k, n, now[c, HISTORY_OVERLAP]) - elastic_energy(k, n, kept))
+
+
+@formula
+def expected_speed(C, now, before, c, pace):
+    """Speed of contact c along its normal, and what it may change by in the step: as it did in the one before."""
+    o = C.at[c, BEFORE]
+    change = (
+        now[c, HISTORY_OVERLAP_RATE] - before[o, HISTORY_OVERLAP_RATE]
+        if o >= 0 and before[o, HISTORY_STIFFNESS] > 0.0
+        else 0.0
+    )
+    part = pace.real[STEP] / pace.real[LAST_STEP] if pace.real[LAST_STEP] > 0.0 else 0.0
+    return abs(now[c, HISTORY_OVERLAP_RATE]) + part * abs(change)
+
+
+@formula
+def start_compliant_rows(G, C, P, L, X, pace, now, before):
+    """Choose shares, by how stiff the contacts are, and the first rows; ``X``: velocities without contact.
+
+    Rows are tangent to the law at the overlap that there was, or at that with these velocities. Returns whether the
+    step is to be divided: too long for an impact.
+    """
+    h, too_long = pace.real[STEP], False
+    slow = rest_speed(pace, pace.real[LONGEST_STEP])
+    for c in range(C.count[FOUND]):
+        k = now[c, HISTORY_STIFFNESS]
+        if k > 0.0:
+            n = contact_law(G, C, L, c)[0]
+            u = contact_velocity(P, X.v, X.wide, c)[0]
+            z = max(now[c, HISTORY_OVERLAP], now[c, HISTORY_OVERLAP] - h * u)
+            z = 0.25 * h * h * elastic_force(k, n, z)[1] * diagonal_block(P, c)[0]
+            s = now[c, HISTORY_SHARE] = z * z / (1.0 + z * z)
+            too_long = too_long or (z > RESOLVED_STIFFNESS and expected_speed(C, now, before, c, pace) > slow)
+            if pace.count[STEPS_TAKEN] > 0:
+                pace.real[NUMERICAL] -= start_overlap(now, c, k, n, C.at[c, BEFORE] < 0)
+            if now[c, HISTORY_LAW_OVERLAP] > 0.0:
+                u = (
+                    now[c, HISTORY_OVERLAP]
+                    - now[c, HISTORY_LAW_OVERLAP]
+                    - 0.5 * h * (1.0 - s) * now[c, HISTORY_OVERLAP_RATE]
+                ) / (0.5 * h * (1.0 + s))
+            tangent_row(G, C, P, L, pace, now, c, u)
+    return too_long and pace.count[DIVIDES_STEPS] != 0
+
+
+@formula
+def tangent_row(G, C, P, L, pace, now, c, u):
+    """Make row c tangent to the law at the velocity u."""
+    h, mobility = pace.real[STEP], diagonal_block(P, c)[0]
+    now[c, HISTORY_LAW_OVERLAP] = end_overlap(now, c, h, u)
+    law = contact_law(G, C, L, c)
+    p, slope = law_impulse(
+        now[c, HISTORY_STIFFNESS], law, now[c, HISTORY_OVERLAP], now[c, HISTORY_LAW_OVERLAP], h, now[c, HISTORY_SHARE]
+    )
+    slope *= 0.5 * h * (1.0 + now[c, HISTORY_SHARE])
+    P.soft[c] = 1.0 / slope if slope * LARGEST_COMPLIANCE * mobility > 1.0 else LARGEST_COMPLIANCE * mobility
+    P.bias[c, 0] = -u - P.soft[c] * p
+    return p
+
+
+@formula
+def linearise_compliant_rows(G, C, P, L, X, pace, now):
+    """Rows that give way, tangent to the law at the velocities of ``X``; how far off the last were [m/s]."""
+    worst = 0.0
+    for c in range(C.count[FOUND]):
+        if now[c, HISTORY_STIFFNESS] > 0.0:
+            u = contact_velocity(P, X.v, X.wide, c)[0]
+            row = -(u + P.bias[c, 0]) / P.soft[c] if P.soft[c] > 0.0 else 0.0
+            p = tangent_row(G, C, P, L, pace, now, c, u)
+            worst = max(worst, diagonal_block(P, c)[0] * abs(max(p, 0.0) - max(row, 0.0)))
+    return worst
+
+
+@formula
+def restore_free_velocities(N, M, X):
+    """Velocities without contact, from which the rows are solved once more."""
+    for k in range(N.body.shape[0]):
+        for i in range(6):
+            X.v[k, i] = M.twist[k, i]
+
+
+@formula
+def remaining_gap(now, c, gap):
+    """What is left of the gap at the end of the step beyond that at which contact c comes to be, if it gives way."""
+    if now[c, HISTORY_STIFFNESS] > 0.0:
+        now[c, HISTORY_END_GAP] = gap
+        return gap + max(now[c, HISTORY_LAW_OVERLAP], 0.0)
+    return gap
+
+
+@formula
+def dissipated_energy(k, law, now, c, h, pressed):
+    """Energy that the law itself takes in the step; all that was stored where it would pull."""
+    n, dissipation, damping, _, _ = law
+    a, b = now[c, HISTORY_OVERLAP], now[c, HISTORY_LAW_OVERLAP]
+    if dissipation == 0.0 and damping == 0.0:
+        return 0.0
+    if not pressed:
+        return max(0.0, elastic_energy(k, n, a) - elastic_energy(k, n, b))
+    return (
+        (mean_elastic_force(k, n, a, b)[0] * dissipation * (b - a) + damping * (max(b, 0.0) - max(a, 0.0)))
+        * (b - a)
+        / h
+    )
+
+
+@formula
+def store_elastic_energy(G, C, P, L, X, Y, pace, now):
+    """Energy in contacts at the end of the step, and what of the work done on them was not stored.
+
+    What the law does not take of that is the method's.
+    """
+    h = pace.real[STEP]
+    pace.real[STORED_ENERGY] = 0.0
+    for c in range(C.count[FOUND]):
+        if now[c, HISTORY_STIFFNESS] > 0.0:
+            k, n = now[c, HISTORY_STIFFNESS], contact_law(G, C, L, c)[0]
+            overlap = -now[c, HISTORY_END_GAP] - h * contact_velocity(P, Y.v, Y.wide, c)[0]
+            now[c, HISTORY_SPRING_OVERLAP] = elastic_overlap(
+                now[c, HISTORY_SHARE], overlap, now[c, HISTORY_LAW_OVERLAP]
+            )
+            after = elastic_energy(k, n, now[c, HISTORY_SPRING_OVERLAP])
+            pace.real[STORED_ENERGY] += after
+            lost = dissipated_energy(k, contact_law(G, C, L, c), now, c, h, X.p[c, 0] > 0.0)
+            pace.real[LOST_IMPACT] += lost
+            pace.real[NUMERICAL] -= after - elastic_energy(k, n, now[c, HISTORY_OVERLAP]) + lost
+
+
+@formula
+def law_is_met(worst, residual, pace):
+    """Whether rows are as near to the law as velocities are asked to be, or as they came."""
+    return worst <= max(LAW_TOLERANCE * pace.real[VELOCITY_TOLERANCE], RESIDUAL_SHARE * residual)

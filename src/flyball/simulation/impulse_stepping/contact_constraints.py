@@ -1,0 +1,448 @@
+"""Contacts as constraints of the cone problem: rows, warm start, persistent contacts, energy account.
+
+A contact that pressed in the step before, and neither opens nor is hit, takes no energy if its impulse p acts
+along the row D along which the mean velocity of the step vanishes: its work is p . D (v- + v+) / 2. So D v+ = -D
+v-, with rows in the middle of the step, where bodies are after half of it with the velocities of its start. This
+is the midpoint rule of constraints. Gaps and overlaps that are left are closed by displacements, as far as the
+contact presses; what these change the energy of gravity by is the error that is left, of third order in the step.
+
+The rule returns a velocity that the contact has at the start of the step with the opposite sign, so that what
+impacts and solvers leave would never decay. It is used where this velocity is less than the change of the rows in
+half a step, which is of a lower order in smooth motion; else the velocity at the start is left out, and the
+contact has at the end of the step only the change of its rows. The same holds along the tangents of what slides or
+has just come to stick.
+"""
+
+from __future__ import annotations
+
+from ...collision.tables import APART, BEFORE, FEATURE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
+from ...compiler.formulas import formula
+from ...math.scalar import cos, sin, sqrt
+from ...math.vec import (
+    add,
+    axes_across,
+    cross,
+    dot,
+    load3,
+    load9,
+    mm,
+    mv,
+    norm,
+    quaternion_matrix,
+    scale,
+    store3,
+    store9,
+    sub,
+)
+from ...numerics.complementarity.contact_operator import (
+    contact_angular_velocity,
+    contact_velocity,
+    to_contact_frame,
+    to_world_frame,
+)
+from ...tables.table_definitions import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
+from .compliant_contact import contact_stiffness
+from .free_bodies import rest_speed, speed_of_fall
+from .stepping_tables import (
+    COMPLIANT,
+    GIVEN_BY_SURFACES,
+    HISTORY_IMPACT_IMPULSE,
+    HISTORY_IMPULSE,
+    HISTORY_MIDDLE_BIAS,
+    HISTORY_PERSISTS,
+    HISTORY_SLIDING,
+    HISTORY_START_VELOCITY,
+    HISTORY_STIFFNESS,
+    HISTORY_TORQUE,
+    LAST_RESIDUAL,
+    LOST_FRICTION,
+    LOST_IMPACT,
+    MIDDLE_FOUND,
+    MIDDLE_WANTED,
+    NUMERICAL,
+    PRESSES,
+    STEP,
+    VELOCITY_TOLERANCE,
+)
+
+
+@formula
+def fill_rows(G, M, C, P, L, pace):
+    """Everything of the problem but impulses and masses; its sizes too."""
+    h = pace.real[STEP]
+    P.size[0] = C.count[FOUND]
+    P.island[0], P.island[1] = 0, C.count[FOUND]
+    turns = P.turn.shape[0] > 0
+    for c in range(C.count[FOUND]):
+        i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
+        a, b = P.at[c, 0], P.at[c, 1] = movers_of_contact(G, C, c)
+        point = load3(C.x, c, POINT)
+        store3(P.frame, c, 0, load3(C.x, c, NORMAL))
+        apart = load3(C.x, c, APART)
+        store3(P.arm, c, 0, arm_to(M, a, sub(point, apart)))
+        store3(P.arm, c, 3, arm_to(M, b, add(point, apart)))
+        law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
+        fill_tangents(G, M, C, P, L, c)
+        gap = C.x[c, GAP]
+        P.bias[c, 0] = gap / h if gap > 0.0 else 0.0
+        P.mu[c] = law[KINETIC]
+        P.soft[c] = 0.0
+        if turns:
+            P.turn[c, 0], P.turn[c, 1] = law[ROLLING], law[SPINNING]
+
+
+@formula
+def movers_of_contact(G, C, c):
+    """Movers of contact c."""
+    return G.shape_i[C.at[c, SHAPE_1], MOVER], G.shape_i[C.at[c, SHAPE_2], MOVER]
+
+
+@formula
+def arm_to(M, a, point):
+    """From the origin of mover a to a point; 0 for what stands still."""
+    return sub(point, load3(M.pose, a, 0)) if a >= 0 else (0.0, 0.0, 0.0)
+
+
+@formula
+def fill_tangents(G, M, C, P, L, c):
+    """Tangents of contact c, and how its surfaces move along these by themselves."""
+    i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
+    a, b = G.shape_i[i, MOVER], G.shape_i[j, MOVER]
+    law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
+    tangent, square = tangent_direction(M, L, (i, a), (j, b), load3(P.frame, c, 0))
+    write_tangents(P.frame, c, tangent, law[ACROSS] if square else 1.0, law[ACROSS])
+    P.bias[c, 1] = P.bias[c, 2] = 0.0
+    if L.belt.shape[0] > 0:
+        add_surface_velocity(M, L, P, c, i, a, -1.0)
+        add_surface_velocity(M, L, P, c, j, b, 1.0)
+
+
+@formula
+def tangent_direction(M, L, first, second, n):
+    """A tangent along the grain of either shape, and whether there is none in the tangent plane: then it is any other.
+
+    ``first`` and ``second``: shape and mover. Of two surfaces with a grain, friction does not depend on the direction.
+    """
+    if L.grain.shape[0] > 0:
+        for shape, mover in (first, second):
+            g = in_world_axes(M, mover, load3(L.grain, shape, 0))
+            g = sub(g, scale(dot(g, n), n))
+            s = dot(g, g)
+            if s > 1e-12:
+                return scale(1.0 / sqrt(s), g), False
+    return axes_across(n)[0], True
+
+
+@formula
+def in_world_axes(M, a, g):
+    """A vector in the axes of mover a, or of what stands still, along the world's."""
+    return mv(load9(M.pose, a, 3), g) if a >= 0 else g
+
+
+@formula
+def write_tangents(frame, c, t, along, across):
+    """Rows t1 = along t and t2 = across n x t: in a circular cone, forces are so many times as large in either."""
+    store3(frame, c, 3, scale(along, t))
+    store3(frame, c, 6, scale(across, cross(load3(frame, c, 0), t)))
+
+
+@formula
+def add_surface_velocity(M, L, P, c, shape, mover, sign):
+    """The velocity of a surface on its mover, such as a conveyor's."""
+    g = in_world_axes(M, mover, load3(L.belt, shape, 0))
+    for k in range(2):
+        P.bias[c, 1 + k] += sign * dot(load3(P.frame, c, 3 + 3 * k), g)
+
+
+@formula
+def warm_start(C, P, X, now, before):
+    """Impulses of the same contacts in the step before; what stuck there has the static friction coefficient."""
+    for c in range(C.count[FOUND]):
+        o = C.at[c, BEFORE]
+        now[c, HISTORY_SLIDING] = before[o, HISTORY_SLIDING] if o >= 0 else -1.0
+        store3(X.p, c, 0, previous_impulse(P, c, before, o, HISTORY_IMPULSE))
+        if X.torque.shape[0] > 0:
+            store3(X.torque, c, 0, previous_impulse(P, c, before, o, HISTORY_TORQUE))
+
+
+@formula
+def previous_impulse(P, c, before, o, first):
+    """What `to_world_frame` makes a vector in the world that is kept in row o; 0 where nothing is (-1)."""
+    if o < 0:
+        return (0.0, 0.0, 0.0)
+    x = to_contact_frame(P, c, load3(before, o, first))
+    n, s, t = load3(P.frame, c, 0), load3(P.frame, c, 3), load3(P.frame, c, 6)
+    return (x[0] / dot(n, n), projection_coefficient(x[1], s), projection_coefficient(x[2], t))
+
+
+@formula
+def projection_coefficient(x, row):
+    """Product x of a vector and a row over the row's square; 0 along a row that is zero, where friction is none."""
+    square = dot(row, row)
+    return x / square if square > 0.0 else 0.0 * x
+
+
+@formula
+def static_friction_of_sticking(G, C, P, L, X, pace, now):
+    """The static coefficient for contacts that stuck before, and for new ones that hardly slide."""
+    slow = speed_of_fall(pace, pace.real[STEP])
+    for c in range(C.count[FOUND]):
+        law = L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]]
+        if law[STATIC] > law[KINETIC] and now[c, HISTORY_SLIDING] < 0.5:
+            u = contact_velocity(P, X.v, X.wide, c)
+            s, t = u[1] + P.bias[c, 1], u[2] + P.bias[c, 2]
+            if now[c, HISTORY_SLIDING] == 0.0 or s * s + t * t <= slow * slow:
+                P.mu[c] = law[STATIC]
+
+
+SAME_NORMAL = (
+    0.95  # cosine between normals of a step's start and its middle from which on a contact is none that goes on
+)
+LARGEST_JUMP = (
+    0.3  # part of the velocities by which rows may change in half a step: a contact that jumps does not go on
+)
+CLEAR_FACTOR = 10.0  # times the residual of the last solve: what is slower may be noise of it
+NO_CHANGE = 1e-9  # change of a normal, or turn of a body, in a step that is none
+NO_ARM = 1e-10  # part of an arm across the normal that is none: as in balls
+
+
+@formula
+def side_of_contact(P, M, G, C, c, side):
+    """Mover of a side of contact c, its arm, and the part of that across the normal, 0 where nothing moves."""
+    a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+    n, r = load3(P.frame, c, 0), load3(P.arm, c, 3 * side)
+    s = sub(r, scale(dot(r, n), n))
+    if dot(s, s) <= NO_ARM * NO_ARM * dot(r, r):
+        s = (0.0, 0.0, 0.0)
+    return a, r, s
+
+
+@formula
+def arms_along_normal(P, M, G, C, c):
+    """Whether both arms are along the normal."""
+    s, t = side_of_contact(P, M, G, C, c, 0)[2], side_of_contact(P, M, G, C, c, 1)[2]
+    return dot(s, s) + dot(t, t) == 0.0
+
+
+@formula
+def rows_change(G, M, C, D, P, c, h):
+    """Whether the rows of contact c change within the step: normals turn, or bodies whose arms are across them."""
+    change = norm(sub(load3(C.x, c, NORMAL), load3(D.x, C.at[c, BEFORE], NORMAL)))
+    for side in range(2):
+        a, _, s = side_of_contact(P, M, G, C, c, side)
+        if a >= 0 and dot(s, s) > 0.0:
+            change += h * norm(load3(M.twist, a, 3))
+    return change > NO_CHANGE
+
+
+@formula
+def point_velocity(M, a, r):
+    """Velocity of the point at r from the origin of mover a."""
+    return add(load3(M.twist, a, 0), cross(load3(M.twist, a, 3), r)) if a >= 0 else (0.0, 0.0, 0.0)
+
+
+@formula
+def contact_jumps(M, P, c, movers, arms):
+    """Whether contact c with other arms is elsewhere: where bodies move otherwise by a part of their speeds."""
+    fast, way = 0.0, (0.0, 0.0, 0.0)
+    for side in range(2):
+        a, r = movers[side], load3(P.arm, c, 3 * side)
+        v = point_velocity(M, a, r)
+        way = add(way, scale(2.0 * side - 1.0, sub(point_velocity(M, a, arms[side]), v)))
+        fast += norm(v) + (norm(sub(v, load3(M.twist, a, 0))) if a >= 0 else 0.0)
+    return norm(way) > LARGEST_JUMP * fast
+
+
+@formula
+def save_start(N, M, X):
+    """Keep poses, and twists, which at the start of a step are in ``M`` those of the mechanism's bodies only."""
+    for k in range(M.pose.shape[0]):
+        for i in range(12):
+            N.start[k, i] = M.pose[k, i]
+        for i in range(6):
+            N.start[k, 12 + i] = X.v[k, i] if k < N.body.shape[0] else M.twist[k, i]
+
+
+@formula
+def start_velocity(G, C, N, P, X, c):
+    """Relative velocity of contact c at the start of the step, in the world."""
+    u = (0.0, 0.0, 0.0)
+    for side in range(2):
+        a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+        if a >= 0:
+            v, w = start_twist(N, X, a)
+            u = add(u, scale(2.0 * side - 1.0, add(v, cross(w, load3(P.arm, c, 3 * side)))))
+    return u
+
+
+@formula
+def start_twist(N, X, a):
+    """Velocities of mover a at the start of the step."""
+    if a < N.body.shape[0]:
+        return load3(X.v, a, 0), load3(X.v, a, 3)
+    return load3(N.start, a, 12), load3(N.start, a, 15)
+
+
+@formula
+def speed_is_clear(G, C, N, P, X, c, pace):
+    """Whether the bodies' speeds at contact c are more than what the last solve left."""
+    fast, way = 0.0, (0.0, 0.0, 0.0)
+    for side in range(2):
+        a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
+        if a >= 0:
+            v, w = start_twist(N, X, a)
+            fast += norm(cross(w, load3(P.arm, c, 3 * side)))
+            way = add(way, scale(2.0 * side - 1.0, v))
+    return fast + norm(way) > CLEAR_FACTOR * pace.real[LAST_RESIDUAL]
+
+
+@formula
+def had_impact(now, c):
+    """Whether contact c had an impact before the step."""
+    return (
+        now[c, HISTORY_IMPACT_IMPULSE] != 0.0
+        or now[c, HISTORY_IMPACT_IMPULSE + 1] != 0.0
+        or now[c, HISTORY_IMPACT_IMPULSE + 2] != 0.0
+    )
+
+
+@formula
+def was_in_impact(G, C, now, c, impacts):
+    """Whether contact c was hit before the step, or a mechanism that it is on.
+
+    impacts: first mover of the mechanism, and whether there were any.
+    """
+    first, any_ = impacts
+    a, b = movers_of_contact(G, C, c)
+    return had_impact(now, c) or (any_ and max(a, b) >= first)
+
+
+@formula
+def find_persistent_contacts(G, M, C, D, N, P, X, L, pace, now, before, impacts):
+    """Which contacts go on, and the relative velocities at the start. Returns whether rows are wanted in the middle."""
+    h, wanted = pace.real[STEP], False
+    slow = rest_speed(pace, h)
+    for c in range(C.count[FOUND]):
+        o, u = C.at[c, BEFORE], start_velocity(G, C, N, P, X, c)
+        store3(now, c, HISTORY_MIDDLE_BIAS, (0.0, 0.0, 0.0))
+        store3(now, c, HISTORY_START_VELOCITY, u)
+        now[c, HISTORY_PERSISTS] = 0.0
+        if o < 0 or not before[o, HISTORY_SLIDING] >= 0.0:
+            continue
+        soft = pace.count[COMPLIANT] != 0 and contact_stiffness(G, C, L, c) > 0.0
+        closing = -dot(load3(C.x, c, NORMAL), u)
+        if soft or closing <= pace.real[VELOCITY_TOLERANCE]:
+            now[c, HISTORY_PERSISTS] = PRESSES
+        steady = closing <= slow and not was_in_impact(G, C, now, c, impacts) and speed_is_clear(G, C, N, P, X, c, pace)
+        if not soft and steady and rows_change(G, M, C, D, P, c, h):
+            now[c, HISTORY_PERSISTS] = MIDDLE_WANTED
+            wanted = True
+    return wanted
+
+
+@formula
+def move_half_step(N, M, X, h):
+    """Free bodies where they are after half the step with the velocities of its start."""
+    for k in range(N.body.shape[0]):
+        w = load3(X.v, k, 3)
+        store3(M.pose, k, 0, add(load3(M.pose, k, 0), scale(0.5 * h, load3(X.v, k, 0))))
+        turn = 0.25 * h * norm(w)
+        if turn > 0.0:
+            e = scale(0.25 * h * sin(turn) / turn, w)
+            store9(M.pose, k, 3, mm(quaternion_matrix(cos(turn), e[0], e[1], e[2]), load9(N.start, k, 3)))
+
+
+@formula
+def restore_poses(N, M):
+    """Poses of the start of the step again."""
+    for k in range(M.pose.shape[0]):
+        for i in range(12):
+            M.pose[k, i] = N.start[k, i]
+
+
+@formula
+def middle_rows(G, M, C, H, P, L, now):
+    """Rows of the contacts that go on, with poses and contacts ``H`` of the middle. Returns whether there are any."""
+    found = False
+    for k in range(H.count[FOUND]):
+        c = H.at[k, BEFORE]
+        if c < 0 or now[c, HISTORY_PERSISTS] != MIDDLE_WANTED or C.at[c, FEATURE] != H.at[k, FEATURE]:
+            continue
+        n, point = load3(H.x, k, NORMAL), load3(H.x, k, POINT)
+        a, b = movers_of_contact(G, C, c)
+        r, s = arm_to(M, a, point), arm_to(M, b, point)
+        if dot(n, load3(P.frame, c, 0)) < SAME_NORMAL or contact_jumps(M, P, c, (a, b), (r, s)):
+            continue
+        if arms_along_normal(P, M, G, C, c):  # it stays so to rounding
+            r, s = scale(dot(r, n), n), scale(dot(s, n), n)
+        store3(P.frame, c, 0, n)
+        store3(P.arm, c, 0, r)
+        store3(P.arm, c, 3, s)
+        fill_tangents(G, M, C, P, L, c)
+        now[c, HISTORY_PERSISTS] = MIDDLE_FOUND
+        found = True
+    return found
+
+
+@formula
+def bias_persistent_contacts(G, M, C, P, X, now, before):
+    """Biases of the contacts whose rows are in the middle; see above."""
+    for c in range(C.count[FOUND]):
+        if now[c, HISTORY_PERSISTS] != MIDDLE_FOUND:
+            continue
+        u = contact_velocity(P, X.v, X.wide, c)
+        first = to_contact_frame(P, c, load3(now, c, HISTORY_START_VELOCITY))
+        more = sub(u, first)
+        mean = abs(first[0]) <= abs(more[0])
+        ahead = (u[0] if mean else more[0], 0.0, 0.0)
+        if not arms_along_normal(P, M, G, C, c):
+            s, t = more[1], more[2]
+            own = P.bias[c, 1], P.bias[c, 2]
+            a, b = first[1] + own[0], first[2] + own[1]
+            if before[C.at[c, BEFORE], HISTORY_SLIDING] == 0.0 and a * a + b * b <= s * s + t * t:
+                s, t = u[1] + own[0], u[2] + own[1]
+            ahead = (ahead[0], s, t)
+        store3(now, c, HISTORY_MIDDLE_BIAS, ahead)
+        if mean:  # displacements close its gap
+            P.bias[c, 0] = 0.0
+        else:
+            now[c, HISTORY_PERSISTS] = MIDDLE_WANTED
+        store3(P.bias, c, 0, add(load3(P.bias, c, 0), ahead))
+
+
+CONE_TOLERANCE = 1e-9  # part of the friction cone's radius within which an impulse is on it
+
+
+@formula
+def account_contact(P, X, c, u, pace, now):
+    """Impulse of contact c for the next step, and its work at the mean velocities u of the step.
+
+    A contact that goes on neither opens nor is hit: work along its normal is the method's error, and so is that along
+    its tangents where it sticks before and after. Friction never gives energy: what it would have given as a mean of
+    the step is the other part's, whose sum with it is exact.
+    """
+    n, s, t = X.p[c, 0], X.p[c, 1], X.p[c, 2]
+    store3(now, c, HISTORY_IMPULSE, to_world_frame(P, c, n, s, t))
+    if n > 0.0:
+        belt = (P.bias[c, 1] - now[c, HISTORY_MIDDLE_BIAS + 1]) * s + (
+            P.bias[c, 2] - now[c, HISTORY_MIDDLE_BIAS + 2]
+        ) * t
+        other = NUMERICAL if now[c, HISTORY_PERSISTS] > 0.0 or now[c, HISTORY_STIFFNESS] > 0.0 else LOST_IMPACT
+        slides = sqrt(s * s + t * t) >= (1.0 - CONE_TOLERANCE) * P.mu[c] * n
+        worn = -(s * u[1] + t * u[2] + belt)
+        sticks = now[c, HISTORY_PERSISTS] > 0.0 and now[c, HISTORY_SLIDING] == 0.0 and not slides
+        pace.real[other] -= n * u[0]
+        pace.real[other if sticks or worn < 0.0 else LOST_FRICTION] += worn
+        pace.real[GIVEN_BY_SURFACES] -= belt
+        now[c, HISTORY_SLIDING] = 1.0 if slides else 0.0
+    else:
+        now[c, HISTORY_SLIDING] = -1.0
+
+
+@formula
+def account_rolling(P, X, Y, c, pace, now):
+    """Impulse of rolling and spinning friction at contact c, and its work at the mean velocities ``Y`` of the step."""
+    t = load3(X.torque, c, 0)
+    store3(now, c, HISTORY_TORQUE, to_world_frame(P, c, t[0], t[1], t[2]))
+    worn = -dot(t, contact_angular_velocity(P, Y.v, Y.wide, c))
+    pace.real[LOST_FRICTION if worn >= 0.0 else NUMERICAL] += worn

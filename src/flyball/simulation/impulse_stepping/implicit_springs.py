@@ -1,0 +1,278 @@
+"""Springs and dampers of the mechanism taken implicitly, as an addition of low rank to the mass matrix.
+
+A force s along J v, with stiffness k and damping c, is taken at
+
+    x + (1 - b) / 4 h (r+ - r-) + b h r+   and   (1 - b) / 2 r- + (1 + b) / 2 r+
+
+x being the place at half the step, r- and r+ the rates at the ends of the step: J v- and J v+ less and more h / 2
+times the bias acceleration. With b = 0 that is the trapezoidal rule, which keeps the energy of a linear spring;
+with b = 1 whatever is stiff is at rest after two steps. Between them it is stable for any h, k, c: with z = h^2 k
+/ m the matrix of one step has the determinant (1 + (1 - b) / 4 z) / (1 + b' z), where b' = (1 + 3 b) / 4. b goes
+with the square of z, so that the step stays of second order. M + J' A J, with A = h^2 k b' + h c (1 + b) / 2, is
+inverted by Sherman, Morrison and Woodbury's formula.
+
+The end of a stiff spring that rotates leaves the line along which the spring was taken implicitly, by w^2 h^2 / 8
+of its length, more than a stiff spring ever yields: its length at the end of the step is corrected along its own
+response.
+"""
+
+from __future__ import annotations
+
+from ...compiler.formulas import call, formula
+from ...engine.calls import POSITION, SLOPES, SOLVE
+from ...engine.kinematics import load_record, project_wrench, retract
+from ...engine.residual import DAMPING, DIRECTIONS, STIFFNESS, probe_direction
+from ...engine.solve import apply_inverse_mass
+from ...math.rotation import rotation_vector
+from ...math.scalar import sqrt
+from ...math.vec import col, dot, mm, norm, sub, transpose
+from ...tables.table_definitions import BIAS, SCHUR, VALUE
+from .stepping_tables import (
+    SPRING_ADDED_MASS,
+    SPRING_BIAS,
+    SPRING_C,
+    SPRING_DIRECTION,
+    SPRING_DIRECTIONS,
+    SPRING_FORCE,
+    SPRING_K,
+    SPRING_LENGTH,
+    SPRING_SHARE,
+    SPRING_SOLUTION,
+    STEP_DISPLACEMENT,
+)
+
+SOFT_SPRING = 1e-3  # h^2 k / m + h c / m: what is softer than this is left to the evaluation at half the step
+
+
+@formula
+def add_wrench_power(S, W, b, out, at, sign, force, torque, point):
+    """Add the power of a wrench on body b along all velocities that move it; ``out[at]`` is that of velocity 0."""
+    while b >= 0:
+        if S.tree.nv[b] > 0:
+            project_wrench(S, W, b, out, at + S.tree.v[b], sign, force, torque, point)
+        b = S.tree.parent[b]
+
+
+@formula
+def spring_gradient(S, W, k, n, i, row):
+    """What force k acts along, direction i of n, as a row over all velocities."""
+    for d in range(row.shape[0]):
+        row[d] = 0.0
+    if S.forces.family[k] == 1:
+        r = S.rows.law.shape[0] + S.forces.F[k]
+        for e in range(S.row_start[r], S.row_start[r + 1]):
+            row[S.column[e]] += W.G[e]
+        return
+    F, M = load_record(W.FK, S.forces.F[k]), load_record(W.FK, S.forces.M[k])
+    axis = probe_direction(F, M[0], n, i)
+    zero = (0.0, 0.0, 0.0)
+    force, torque = (axis, zero) if i < 3 else (zero, axis)
+    add_wrench_power(S, W, S.frame_body[S.forces.M[k]], row, 0, 1.0, force, torque, M[0])
+    add_wrench_power(S, W, S.frame_body[S.forces.F[k]], row, 0, -1.0, force, torque, M[0])
+
+
+@formula
+def dot_rows(a, b):
+    """Scalar product of two rows."""
+    s = 0.0
+    for d in range(a.shape[0]):
+        s += a[d] * b[d]
+    return s
+
+
+@formula
+def impulse_response(A, force, out):
+    """What generalised impulses change the velocities by, rows of joints closed; springs have no say."""
+    nv, nr = A.wide.shape[1], A.S.rows.law.shape[0]
+    rows = A.output.rows
+    for d in range(nv):
+        rows[0, d] = force[d]
+    for r in range(nr):
+        rows[1, r] = 0.0
+    call(A.door[0], A.S, A.W, A.R, A.clock, A.output, SOLVE)
+    for d in range(nv):
+        out[d] = rows[2, d]
+
+
+@formula
+def find_implicit_springs(A, h):
+    """Find what is to be taken implicitly, at the state evaluated last, and factor what it adds."""
+    S, W = A.S, A.W
+    A.count.springs = 0
+    if S.forces.F.shape[0] == 0:
+        return
+    call(A.door[0], S, W, A.R, A.clock, A.slopes, SLOPES)
+    found = A.slopes.rows
+    used = 0
+    for k in range(S.forces.F.shape[0]):
+        n = max(1, int(found[k, DIRECTIONS]))
+        for i in range(n):
+            stiffness, damping = max(0.0, found[k, STIFFNESS + i]), max(0.0, found[k, DAMPING + i])
+            if stiffness + damping > 0.0 and add_spring(A, h, used, (k, n, i), stiffness, damping):
+                A.spring_x[used, SPRING_FORCE] = k
+                A.spring_x[used, SPRING_DIRECTIONS], A.spring_x[used, SPRING_DIRECTION] = n, i
+                used += 1
+    A.count.springs = used
+    factor_springs(A)
+
+
+@formula
+def add_spring(A, h, n, which, stiffness, damping):
+    """Put a spring into row n of the tables; whether it is stiff enough to stay there."""
+    J, Y, x = A.spring_J[n], A.spring_Y[n], A.spring_x[n]
+    spring_gradient(A.S, A.W, which[0], which[1], which[2], J)
+    z = h * (h * stiffness + damping)
+    if A.S.sizes.solver == SCHUR:  # joints make nothing lighter
+        for b in range(A.S.tree.parent.shape[0]):
+            apply_inverse_mass(A.S, b, J, A.S.tree.v[b], Y, A.S.tree.v[b])
+        if z * dot_rows(J, Y) < SOFT_SPRING:
+            return False
+    impulse_response(A, J, Y)
+    z *= dot_rows(J, Y)
+    if z < SOFT_SPRING:
+        return False
+    y = (0.25 * z) * (0.25 * z)
+    share = y / (1.0 + y)
+    x[SPRING_K], x[SPRING_C], x[SPRING_SHARE] = stiffness, damping, share
+    x[SPRING_ADDED_MASS] = h * h * stiffness * (0.25 + 0.75 * share) + h * damping * (0.5 + 0.5 * share)
+    return True
+
+
+@formula
+def factor_springs(A):
+    """Cholesky's factor of 1 / A + J M^-1 J'."""
+    C = A.stiff
+    for i in range(A.count.springs):
+        for j in range(i + 1):
+            s = dot_rows(A.spring_J[i], A.spring_Y[j])
+            if i == j:
+                s += 1.0 / A.spring_x[i, SPRING_ADDED_MASS]
+            for k in range(j):
+                s -= C[i, k] * C[j, k]
+            C[i, j] = sqrt(s) if i == j else s / C[j, j]
+
+
+@formula
+def with_spring_response(A, x):
+    """Turn a response without springs into one with them, in place."""
+    n, t = A.count.springs, A.spring_x
+    for i in range(n):
+        t[i, SPRING_SOLUTION] = dot_rows(A.spring_J[i], x)
+    solve_springs(A)
+    for i in range(n):
+        for d in range(x.shape[0]):
+            x[d] -= t[i, SPRING_SOLUTION] * A.spring_Y[i, d]
+
+
+@formula
+def solve_springs(A):
+    """Solve with Cholesky's factor, in place."""
+    n, C, t = A.count.springs, A.stiff, A.spring_x
+    for i in range(n):
+        s = t[i, SPRING_SOLUTION]
+        for k in range(i):
+            s -= C[i, k] * t[k, SPRING_SOLUTION]
+        t[i, SPRING_SOLUTION] = s / C[i, i]
+    for i in range(n - 1, -1, -1):
+        s = t[i, SPRING_SOLUTION]
+        for k in range(i + 1, n):
+            s -= C[k, i] * t[k, SPRING_SOLUTION]
+        t[i, SPRING_SOLUTION] = s / C[i, i]
+
+
+@formula
+def spring_impulse(A, h, i, before, change):
+    """Impulse against spring i beyond the force at half the step and half the change of velocities."""
+    x = A.spring_x[i]
+    b, bend = x[SPRING_SHARE], h * x[SPRING_BIAS]
+    r, dr = dot_rows(A.spring_J[i], before) - 0.5 * bend, dot_rows(A.spring_J[i], change) + bend
+    return h * h * x[SPRING_K] * (b * (r - 0.125 * bend) + (0.25 + 0.75 * b) * dr) + 0.5 * h * x[SPRING_C] * b * dr
+
+
+LENGTH_ITERATIONS = 3
+STIFF_SHARE = 1e-3  # share of the end of the step from which on a spring is put right
+LENGTH_TOLERANCE = 1e-12  # change of a spring's length that is none, of its own or a radian
+
+
+@formula
+def force_length(S, W, k, n, i):
+    """How far force k is along its direction i of n, at the kinematics in W."""
+    if S.forces.family[k] == 1:
+        return W.sensed[VALUE, S.forces.F[k]]
+    F, M = load_record(W.FK, S.forces.F[k]), load_record(W.FK, S.forces.M[k])
+    line = sub(M[0], F[0])
+    if n == 1:
+        return norm(line)
+    if i < 3:
+        return dot(col(F[1], i), line)
+    return rotation_vector(mm(transpose(F[1]), M[1]))[i - 3]
+
+
+@formula
+def spring_length(A, i):
+    """`force_length` of spring i of the step."""
+    x = A.spring_x[i]
+    return force_length(A.S, A.W, int(x[SPRING_FORCE]), int(x[SPRING_DIRECTIONS]), int(x[SPRING_DIRECTION]))
+
+
+@formula
+def save_spring_biases(A):
+    """Keep the bias accelerations of what springs act along."""
+    for i in range(A.count.springs):
+        x = A.spring_x[i]
+        k = int(x[SPRING_FORCE])
+        x[SPRING_BIAS] = 0.0
+        if A.S.forces.family[k] == 1:
+            x[SPRING_BIAS] = A.W.sensed[BIAS, A.S.forces.F[k]]
+        elif x[SPRING_DIRECTIONS] < 2.0:
+            x[SPRING_BIAS] = distance_bias(load_record(A.W.FK, A.S.forces.F[k]), load_record(A.W.FK, A.S.forces.M[k]))
+
+
+@formula
+def distance_bias(F, M):
+    """Bias acceleration of the distance of two origins."""
+    d, u = sub(M[0], F[0]), sub(M[3], F[3])
+    far = norm(d)
+    if not far > 0.0:
+        return 0.0
+    rate = dot(d, u) / far
+    return (dot(u, u) - rate * rate + dot(d, sub(M[5], F[5]))) / far
+
+
+@formula
+def save_spring_lengths(A):
+    """Keep where the springs are at half the step."""
+    for i in range(A.count.springs):
+        A.spring_x[i, SPRING_LENGTH] = spring_length(A, i)
+
+
+@formula
+def correct_spring_lengths(A):
+    """Move the positions in the clock, which went ``A.wide[WAY]`` from half the step, to where springs were told."""
+    stiff = False
+    for i in range(A.count.springs):
+        stiff = stiff or A.spring_x[i, SPRING_SHARE] > STIFF_SHARE
+    if not stiff:
+        return
+    h = A.real.step
+    q = A.clock.y[0, : A.S.sizes.coordinates]
+    step = A.mixing[0]
+    for _ in range(LENGTH_ITERATIONS):
+        call(A.door[0], A.S, A.W, A.R, A.clock, A.output, POSITION)
+        worst = 0.0
+        for i in range(A.count.springs):
+            x = A.spring_x[i]
+            told = (
+                x[SPRING_LENGTH] + dot_rows(A.spring_J[i], A.wide[STEP_DISPLACEMENT]) + 0.125 * h * h * x[SPRING_BIAS]
+            )
+            x[SPRING_SOLUTION] = spring_length(A, i) - told
+            worst = max(worst, abs(x[SPRING_SOLUTION]) / (1.0 + abs(told)))
+        if not LENGTH_TOLERANCE < worst < 1.0:
+            return
+        solve_springs(A)
+        for d in range(step.shape[0]):
+            step[d] = 0.0
+        for i in range(A.count.springs):
+            for d in range(step.shape[0]):
+                step[d] -= A.spring_x[i, SPRING_SOLUTION] * A.spring_Y[i, d]
+        retract(A.S, q, step)

@@ -1,0 +1,468 @@
+"""Motion by impulse time stepping, from the model to its result: steps to the output times, health."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...assembly.assembled_state import Assembly
+from ...assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from ...assembly.positions_and_velocities import described_velocities
+from ...collision.tables import FOUND, GAP, MOVER, SHAPE_1, SHAPE_2
+from ...compiler.object_code import compiled_since
+from ...errors import AnalysisError, SimulationError
+from ...math.vec import mtv, quaternion_matrix
+from ...mobility.mobility import mobility
+from ...model.contact import contact_warnings
+from ...model.model import Model
+from ...numerics.complementarity.solver_choice import OTHER_SOLVED, PASSED_ON, SMALL_SOLVED
+from ...progress import ReportProgress
+from ...results import diagnostics
+from ...results.body_sets import BodySetMotion
+from ...results.contacts import OPEN, SLIP, STICK, ContactBodies, Contacts
+from ...results.energy_balance import CONTACT_ELASTIC, EXCHANGE_SIGNS
+from ...results.health import ContactHealth, Health
+from ...results.result import Result
+from ...tables.contact_tables import ContactTables, contact_tables
+from ...tables.reference_configuration import BodyState
+from ..integration_intervals import PAUSED_MESSAGE, Segment, whole_motion
+from ..integration_options import Stepping
+from .setup import (
+    MechanismMotion,
+    assembled_start,
+    make_stepper,
+    movers_of_assembly,
+    partition_bodies,
+    place_body_sets,
+    place_movers,
+    separate_mechanism,
+    smallest_radius,
+    values_with_stops,
+    with_earlier_energy,
+)
+from .step_loop import solver_counts
+from .stepper import NoSolution, Stepper
+from .stepping_tables import (
+    ANGLE,
+    ENDLESS_IMPACTS,
+    GIVEN_BY_SURFACES,
+    HISTORY_IMPACT_IMPULSE,
+    HISTORY_IMPULSE,
+    HISTORY_SLIDING,
+    IMPACTS,
+    ITERATIONS,
+    LOST_FRICTION,
+    LOST_IMPACT,
+    MOST_CONTACTS,
+    NUMERICAL,
+    OVERLAP_AT_START,
+    REDUCED_EXPANSIONS,
+    STEP,
+    STEPS_TAKEN,
+    STORED_AT_START,
+    STORED_ENERGY,
+    TIME,
+    UNCONVERGED,
+    WORST_AT,
+    WORST_FORCE,
+    WORST_OVERLAP,
+    WORST_RESIDUAL,
+)
+
+ENERGY_SUMS = (LOST_FRICTION, LOST_IMPACT, GIVEN_BY_SURFACES, NUMERICAL, STORED_ENERGY)
+
+
+class OutputRecorder:
+    """Rows of output, put together at the end.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    held : Held, optional
+        The mechanism.
+    side_of : (movers + 1,) of int
+        Of each mover the side that it is in `ContactBodies`; the last one is that of ground.
+    """
+
+    def __init__(self, stepper: Stepper, held: MechanismMotion | None, side_of: np.ndarray) -> None:
+        self.stepper, self.held, self.side_of = stepper, held, side_of
+        self.t: list[float] = []
+        self.pose: list[np.ndarray] = []
+        self.turn: list[np.ndarray] = []
+        self.angle: list[np.ndarray] = []  # of bodies in the plane: whole turns count
+        self.twist: list[np.ndarray] = []
+        self.acceleration: list[
+            np.ndarray
+        ] = []  # mean of the step that ends at the time; of the first step at the start
+        self.sums: list[np.ndarray] = []
+        self.contacts: list[dict[str, np.ndarray]] = []
+
+    def add(self, moved: bool) -> None:
+        """Keep where the stepper is now, and the contacts of the last step if one led here."""
+        s = self.stepper
+        self.t.append(float(s.pace.real[TIME]))
+        self.pose.append(s.movers.pose[: len(s.free.turn), :3].copy())
+        self.turn.append(s.free.turn.copy())
+        self.angle.append(s.free.move[:, ANGLE].copy())
+        self.twist.append(s.workspaces.X.v[:, :6].copy())
+        sums = s.pace.real[list(ENERGY_SUMS)]
+        sums[ENERGY_SUMS.index(LOST_IMPACT)] += s.joints.real.lost
+        sums[ENERGY_SUMS.index(NUMERICAL)] += s.joints.real.astray
+        self.sums.append(sums)
+        if self.held:
+            self.held.add(s.joints, moved)
+        if moved:
+            self.begin()
+        self.contacts.append(self._active_contacts() if moved else {})
+
+    def first(self) -> None:
+        """Keep the mean accelerations of the first step for the start, and what was stored there."""
+        self.sums[0][ENERGY_SUMS.index(STORED_ENERGY)] = self.stepper.pace.real[STORED_AT_START]
+        self.begin()
+
+    def begin(self) -> None:
+        """Keep the mean accelerations of the last step."""
+        s = self.stepper
+        self.acceleration.append((s.workspaces.X.v[:, :6] - s.free.before[:, :6]) / s.pace.real[STEP])
+
+    def _active_contacts(self) -> dict[str, np.ndarray]:
+        """Contacts with a force, and the normals along which these were found: those of the middle of the step.
+
+        Their points have the arms by which they were found, from where mass centres were when the step began; between
+        two that move the mean of both. So the torques of the table are those of the motion.
+        """
+        s = self.stepper
+        C, kept = s.last()
+        n = int(C.count[FOUND])
+        impulse = (
+            kept[:n, HISTORY_IMPULSE : HISTORY_IMPULSE + 3]
+            + kept[:n, HISTORY_IMPACT_IMPULSE : HISTORY_IMPACT_IMPULSE + 3]
+        )
+        k = np.flatnonzero((impulse != 0.0).any(axis=1))
+        mover = s.geometry.shape_i[C.at[k][:, [SHAPE_1, SHAPE_2]], MOVER]
+        moving = (mover >= 0)[:, :, None]
+        points = np.where(moving, s.free.start[mover, :3] + s.workspaces.P.arm[k].reshape(-1, 2, 3), 0.0)
+        return {
+            "pair": self.side_of[mover],
+            "point": points.sum(axis=1) / np.maximum(moving.sum(axis=1), 1),
+            "normal": s.workspaces.P.frame[k, :3].copy(),
+            "gap": C.x[k, GAP],
+            "force": impulse[k] / s.pace.real[STEP],
+            "state": np.where(
+                kept[k, HISTORY_SLIDING] > 0.5, SLIP, np.where(kept[k, HISTORY_SLIDING] < -0.5, OPEN, STICK)
+            ),
+            "friction": s.workspaces.P.mu[k],
+        }
+
+    def as_contacts(self, contact_bodies: ContactBodies, planar: bool) -> Contacts:
+        """All contacts of all output times."""
+        empty: dict[str, Any] = {"pair": np.zeros((0, 2), np.int64), "state": np.zeros(0, np.int64)}
+        empty |= {k: np.zeros((0, 3)) for k in ("point", "normal", "force")}
+        empty |= {k: np.zeros(0) for k in ("gap", "friction")}
+        rows = [c or empty for c in self.contacts]
+        begin = np.cumsum([0, *(len(c["gap"]) for c in rows)])
+        table: dict[str, Any] = {k: np.concatenate([c[k] for c in rows]) for k in empty}
+        return Contacts(t=np.array(self.t), sides=contact_bodies, begin=begin, planar=planar, **table)
+
+
+def free_coordinates(
+    base: Assembly, scene: ContactTables, recorder: OutputRecorder
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Absolute coordinates (n, nq), velocities and accelerations (n, nv) of single bodies over time."""
+    s = base.compiled.structure
+    tree = s.tables["tree"]
+    n = len(recorder.t)
+    q, v = np.tile(base.q, (n, 1)), np.zeros((n, s.nv))
+    a = np.zeros((n, s.nv))
+    pose, turn, twist = np.array(recorder.pose), np.array(recorder.turn), np.array(recorder.twist)
+    change = np.array(recorder.acceleration[:n]) if recorder.acceleration else np.zeros_like(twist)
+    for name, b in s.place.items():
+        if b < 0 or name not in scene.carriers.slices:
+            continue
+        k = scene.carriers.slices[name].start
+        if k >= pose.shape[1]:  # of the mechanism
+            continue
+        q0, v0, width = tree.q[b], tree.v[b], tree.nv[b]
+        line = slice(v0, v0 + 2 if s.model.planar else v0 + 3)
+        v[:, line], a[:, line] = twist[:, k, : line.stop - v0], change[:, k, : line.stop - v0]
+        if s.model.planar:
+            q[:, q0 : q0 + 2] = pose[:, k, :2]
+            if width == 3:
+                q[:, q0 + 2] = base.q[q0 + 2] + np.array(recorder.angle)[:, k]
+                v[:, v0 + 2], a[:, v0 + 2] = twist[:, k, 5], change[:, k, 5]
+            continue
+        q[:, q0 : q0 + 3] = pose[:, k]
+        if width == 6:
+            e = turn[:, k] * (1.0 if turn[0, k] @ base.q[q0 + 3 : q0 + 7] >= 0.0 else -1.0)
+            q[:, q0 + 3 : q0 + 7] = e
+            R = quaternion_matrix(*e.T)
+            v[:, v0 + 3 : v0 + 6] = np.stack(mtv(R, twist[:, k, 3:].T), axis=1)
+            a[:, v0 + 3 : v0 + 6] = np.stack(mtv(R, change[:, k, 3:].T), axis=1)
+    return q, v, a
+
+
+def body_sets(model: Model, scene: ContactTables, recorder: OutputRecorder) -> dict[str, BodySetMotion]:
+    """Sets of bodies by name."""
+    out = {}
+    for name in scene.carriers.names:
+        if name in scene.carriers.single:
+            continue
+        at = scene.carriers.slices[name]
+        J = scene.carriers.inertia[at]
+        out[name] = BodySetMotion(
+            name=name,
+            mass=scene.carriers.mass[at],
+            inertia=J,
+            com=model[name].sizes()[:, None] * scene.carriers.com[name],
+            position=np.array([p[at] for p in recorder.pose]),
+            quaternion=np.array([p[at] for p in recorder.turn]),
+            velocity=np.array([p[at, :3] for p in recorder.twist]),
+            angular_velocity=np.array([p[at, 3:] for p in recorder.twist]),
+        )
+    return out
+
+
+INTERRUPTED_MESSAGE = "interrupted by the user at t = {:.6g} s; what was computed is kept"
+END_MESSAGE = "reached the end"
+
+
+def make_impulse_result(
+    base: Assembly,
+    scene: ContactTables,
+    stepper: Stepper,
+    recorder: OutputRecorder,
+    contact_bodies: ContactBodies,
+    o: Stepping,
+    since: float,
+    message: str,
+) -> Result:
+    """The motion by name; ``message`` says how it ended."""
+    values, model = base.compiled.values, base.compiled.structure.model
+    q, v, vdot = free_coordinates(base, scene, recorder)
+    t = np.array(recorder.t)
+    count = stepper.pace.count
+    contact = _contact_health(scene, stepper, o, smallest_radius(scene, values))
+    health = Health(
+        success=message == END_MESSAGE,
+        message=message,
+        violation=0.0,
+        velocity_violation=0.0,
+        steps=int(count[STEPS_TAKEN]),
+        rejected=0,
+        evaluations=int(count[ITERATIONS]),
+        factorisations=0,
+        seconds=time.perf_counter() - since,
+        compiling=compiled_since(since),
+        options={"method": dataclasses.asdict(o)},
+        coordinates="absolute: steps of impulses",
+        remarks=contact_warnings(model),
+        crowd=sum(b.count for b in model.bulk),
+        contact=contact,
+    )
+    health.late = {
+        "mobility": partial(mobility, model, base),
+        "energy_drift": lambda: result.energy.drift,
+        "doubtful": lambda: diagnostics.impulse_stepping_doubts(result),
+        "warnings": lambda: diagnostics.impulse_stepping_warnings(result),
+    }
+    states = np.zeros((len(t), len(values.structure.states)))
+    lam = np.zeros((len(t), len(values.system.rows.law)))
+    if recorder.held:
+        states, lam = recorder.held.into(values, q, v, vdot)
+        health.violation, health.velocity_violation = max(recorder.held.gaps), max(recorder.held.slips)
+    result = Result(model, values, t, q, v, states, vdot, lam, health)
+    result.final = (float(t[-1]), np.concatenate([q[-1], v[-1], states[-1]]))
+    sums = np.array(recorder.sums)
+    result.exchanged = dict(zip((*EXCHANGE_SIGNS, CONTACT_ELASTIC), sums.T, strict=True))
+    result.contacts = recorder.as_contacts(contact_bodies, model.planar)
+    result.bulk = body_sets(model, scene, recorder)
+    return result
+
+
+def _solvers_in_words(stepper: Stepper, solver: str) -> str:
+    """The solver, and which islands went where."""
+    picked = solver_counts(stepper.workspaces.F)
+    if not len(picked):
+        return solver
+    newton, sweeps = int(picked[SMALL_SOLVED] - picked[PASSED_ON]), int(picked[OTHER_SOLVED] + picked[PASSED_ON])
+    if solver != "auto":
+        return f"{solver}; {sweeps} of {newton + sweeps} islands by Gauss-Seidel" if sweeps else solver
+    return f"auto: {newton} islands of bodies that touch by Newton's method, {sweeps} by Gauss-Seidel"
+
+
+def _contact_health(scene: ContactTables, stepper: Stepper, o: Stepping, size: float) -> ContactHealth:
+    real, count = stepper.pace.real, stepper.pace.count
+    return ContactHealth(
+        solver=_solvers_in_words(stepper, o.solver),
+        impacts=f"{o.restitution.title()}, {o.impacts}" if count[IMPACTS] else "",
+        most=int(count[MOST_CONTACTS]),
+        worst_overlap=max(0.0, -float(real[WORST_OVERLAP])),
+        overlap_at_start=max(0.0, -float(real[OVERLAP_AT_START])),
+        residual=float(real[WORST_RESIDUAL]),
+        force_residual=float(real[WORST_FORCE]),
+        tolerance=o.tolerance,
+        solves=int(count[STEPS_TAKEN]),
+        iterations=int(count[ITERATIONS]),
+        unconverged=int(count[UNCONVERGED]),
+        worst_at=float(real[WORST_AT]),
+        size=size,
+        halved=int(stepper.halved),
+        reduced=int(count[REDUCED_EXPANSIONS]),
+        impacted=int(count[IMPACTS]),
+        endless=int(count[ENDLESS_IMPACTS]),
+    )
+
+
+NO_WAY_MESSAGE = (
+    "a force or a law gives no finite number, the equations have no solution, or joints cannot be closed: give shorter "
+    "steps, method=fb.Stepping(step=...)"
+)
+MOST_STEPS_PER_CALL, CALL_SECONDS = (
+    1000,
+    1.0,
+)  # steps after which it is told how far it is, and seconds that they take at most
+
+
+def simulate_by_impulses(
+    model: Model,
+    span: tuple[float, float],
+    times: np.ndarray,
+    o: Stepping,
+    parameters: Mapping[str, float] | None,
+    report: ReportProgress,
+    before: Result | None = None,
+    part: Segment | None = None,
+) -> Result:
+    """The motion by steps of impulses over a span of time; see `Mechanism.simulate`.
+
+    Raises
+    ------
+    ModelError
+        If the scene makes no sense.
+    SimulationError
+        If the steps cannot go on.
+    """
+    since, part = time.perf_counter(), part or whole_motion()
+    model = model.snapshot()
+    plain = compile_mechanism(model, parameters=parameters)
+    values = plain.values
+    found = partition_bodies(model, values_with_stops(model, values, parameters))
+    scene = contact_tables(model, values.given, (*found.free, *found.held))
+    free = len(scene.carriers.mass) - len(found.held)
+    drawn = unassembled_start(plain, span[0]) if before is None else None
+    base = drawn or assembled_start(model, span[0], parameters, before)
+    held = separate_mechanism(values, span[0], parameters, found, free, base if before is not None else None)
+    at = place_movers(scene, body_states(drawn)) if drawn else movers_of_assembly(scene, base)
+    if before is not None:
+        place_body_sets(scene, at, before)
+    try:
+        stepper = make_stepper(scene, at, values, o, held)
+    except NoSolution:
+        raise AnalysisError(f"{model.name!r} cannot start: {NO_WAY_MESSAGE}") from None
+    names = [*scene.carriers.names, "ground"]
+    counts = [-1 if n in scene.carriers.single or n == "ground" else _set_size(scene, n) for n in names]
+    sides = ContactBodies(names, counts)
+    kept = OutputRecorder(stepper, held, np.arange(len(scene.carriers.mass) + 1))
+    part.begin_by_impulses(len(scene.carriers.mass))
+    try:
+        interrupted = step_to_outputs(stepper, span, times, o, kept, report, part)
+    except NoSolution:
+        result = with_earlier_energy(make_impulse_result(base, scene, stepper, kept, sides, o, since, ""), before, part)
+        t = float(stepper.pace.real[TIME])
+        result.health.message = f"{model.name!r} cannot go on at t = {t:.6g} s: {NO_WAY_MESSAGE}"
+        raise SimulationError(result.health.message, result, t) from None
+    message = INTERRUPTED_MESSAGE if interrupted else PAUSED_MESSAGE if part.paused else END_MESSAGE
+    message = message.format(float(stepper.pace.real[TIME]))
+    return with_earlier_energy(make_impulse_result(base, scene, stepper, kept, sides, o, since, message), before, part)
+
+
+def _set_size(scene: ContactTables, name: str) -> int:
+    at = scene.carriers.slices[name]
+    return at.stop - at.start
+
+
+def step_to_outputs(
+    stepper: Stepper,
+    span: tuple[float, float],
+    times: np.ndarray,
+    o: Stepping,
+    recorder: OutputRecorder,
+    report: ReportProgress,
+    part: Segment,
+) -> bool:
+    """Steps that end at the output times, as equal as these allow. Returns whether the user interrupted.
+
+    Where the part ends there is a row of output in any case.
+    """
+    first, last = span
+    real, each = stepper.pace.real, 1
+    real[TIME] = first
+    if len(times) and times[0] == first:
+        recorder.add(False)
+    try:
+        for t in (*times[times > first].tolist(), last):
+            way = t - float(real[TIME])
+            steps = math.ceil(way / o.longest * (1.0 - 1e-9) - 1e-12)
+            if steps > 0:
+                stepper.run(1, way / steps)
+                if recorder.t and not recorder.acceleration:
+                    recorder.first()
+                part.count_steps(1)
+                left = steps - 1
+                while left and not part.over():
+                    n, began = part.most(min(each, left)), time.perf_counter()
+                    stepper.run(n, way / steps)
+                    part.count_steps(n)
+                    each = max(
+                        1, min(MOST_STEPS_PER_CALL, int(n * CALL_SECONDS / max(time.perf_counter() - began, 1e-9)))
+                    )
+                    left -= n
+                    report((float(real[TIME]) - first) / (last - first))
+                if left:
+                    recorder.add(True)
+                    return False
+            real[TIME] = t
+            if len(recorder.t) < len(times):
+                recorder.add(True)
+            report((t - first) / (last - first))
+            if t < last and part.over():
+                if recorder.t[-1] < t:
+                    recorder.add(True)
+                return False
+    except KeyboardInterrupt:
+        return True
+    return False
+
+
+# A start of bodies on which nothing acts: as drawn and told, without the engine, which need not be compiled then.
+
+
+def unassembled_start(c: CompiledMechanism, t: float) -> Assembly | None:
+    """The assembled start if there is nothing to assemble; None otherwise."""
+    s, model = c.structure, c.structure.model
+    if s.rows or s.terms or s.states or len(s.forces) or model.initial:
+        return None
+    q = c.values.q.copy()
+    return Assembly(c, t, q, described_velocities(c.values, q))
+
+
+def body_states(base: Assembly) -> dict[str, BodyState]:
+    """How every body moves at that start."""
+    values, out = base.compiled.values, {}
+    tree = values.structure.tables["tree"]
+    for name, b in values.structure.place.items():
+        if b >= 0:
+            d = values.bodies[name]
+            u = base.v[tree.velocities(b)]
+            if values.structure.model.planar:
+                v, w = np.r_[u[:2], 0.0], np.r_[0.0, 0.0, u[2:] if len(u) > 2 else 0.0]
+            else:
+                v, w = u[:3], d.R @ u[3:] if len(u) > 3 else np.zeros(3)
+            out[name] = BodyState(d.c, d.R, v, w, d.angle)
+    return out

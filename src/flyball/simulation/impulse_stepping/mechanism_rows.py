@@ -1,0 +1,368 @@
+"""Rows on the mechanism: its contacts, and single rows (stops, ropes, friction in joints), with their responses.
+
+- A stop: velocity and impulse are complementary, as at a contact; it rebounds by Newton's law.
+- A rope pulls or is slack within one step, and is taken implicitly as springs are.
+- Friction is bounded by its own law, at the load that follows from the reactions of the last step.
+
+The response to a row's impulse is one solve with the factor of the joints; groups are independent of each other,
+so that one solve answers a row of each.
+"""
+
+from __future__ import annotations
+
+from ...compiler.formulas import formula
+from ...engine.loads import dry_friction, reaction_loads, static_friction_limit
+from ...math.vec import add, load3
+from ...numerics.complementarity.contact_problem import FIXED_SIDE, LINE_BIAS, LINE_HIGH, LINE_LOW, LINE_SOFT
+from ...tables.table_definitions import BIAS as BEND_OF
+from ...tables.table_definitions import RETURNED, VALUE
+from .implicit_springs import add_wrench_power, impulse_response, with_spring_response
+from .stepping_tables import (
+    FRICTION_LOAD,
+    GENERALISED_IMPULSE,
+    JOB_AT,
+    JOB_NEXT,
+    JOB_ROWS,
+    LINE_AT,
+    LINE_FORCE,
+    LINE_FRICTION,
+    LINE_GROUP,
+    LINE_KIND,
+    LINE_LOWER,
+    LINE_OF,
+    LINE_QUANTITY,
+    LINE_REACTION,
+    LINE_RESTITUTION,
+    LINE_ROPE,
+    LINE_STOP,
+    LINE_UPPER,
+    ROPE_C,
+    ROPE_K,
+    ROPE_LENGTH,
+    TABLES_FULL,
+    V_AFTER,
+    V_BEFORE,
+    V_CHANGE,
+    V_IMPULSIVE,
+)
+
+REST_SHARE = 1e-9  # part of what friction slows down within a step below which a rate is none
+STOP_LOOKAHEAD = 4.0  # a stop is a line where what it stops may reach it within as many steps
+INFINITE = 1e300
+
+
+@formula
+def line_group(A, k):
+    """Group of the quantity that line k acts along; -1 if nothing moves it."""
+    r = A.S.rows.law.shape[0] + A.line[k, LINE_QUANTITY]
+    for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
+        for g in range(A.queue.shape[0]):
+            if A.group[g] <= A.S.column[e] < A.group[g + 1]:
+                return g
+    return -1
+
+
+@formula
+def line_rate(A, k, v):
+    """Rate of the quantity of line k with velocities v."""
+    s = 0.0
+    r = A.S.rows.law.shape[0] + A.line[k, LINE_QUANTITY]
+    for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
+        s += A.W.G[e] * v[A.S.column[e]]
+    return s
+
+
+@formula
+def stop_gap(A, k, side):
+    """How far the quantity of a stop was from it when the step began; side 1 is the lower stop, -1 the upper."""
+    x = A.W.sensed[VALUE, A.line[k, LINE_QUANTITY]] - 0.5 * A.real.step * line_rate(A, k, A.wide[V_BEFORE])
+    return x - A.line_x[k, LINE_LOWER] if side > 0 else A.line_x[k, LINE_UPPER] - x
+
+
+@formula
+def line_acts(A, k, side):
+    """Whether line k acts in this step: of two stops always the nearer one, since impacts elsewhere may lead there."""
+    if A.line[k, LINE_KIND] != LINE_STOP:
+        return side > 0
+    r, dr = line_rate(A, k, A.wide[V_BEFORE]), line_rate(A, k, A.wide[V_CHANGE])
+    if stop_gap(A, k, side) < stop_gap(A, k, -side):
+        return True
+    return stop_gap(A, k, side) < STOP_LOOKAHEAD * A.real.step * (abs(r) + abs(dr)) + 1e-9
+
+
+@formula
+def line_rows(A, P, used, jobs, write):
+    """Rows of the lines that act, behind those of the contacts, if ``write``. Returns (numbers, jobs, lines)."""
+    n = 0
+    for k in range(A.line.shape[0]):
+        g = line_group(A, k)
+        if g < 0:
+            continue
+        for turn in range(2):
+            side = 1 - 2 * turn
+            if not line_acts(A, k, side):
+                continue
+            size = A.group[g + 1] - A.group[g]
+            if write:
+                A.active[n, LINE_OF], A.active[n, LINE_GROUP], A.active[n, LINE_AT] = side * (k + 1), g, used
+                line_row(A, P, k, g, (used, size, side))
+            used += size
+            jobs += 1
+            n += 1
+    return used, jobs, n
+
+
+@formula
+def line_row(A, P, k, g, where):
+    """The gradient of the quantity of line k, reversed for an upper stop."""
+    at, size, side = where
+    for d in range(size):
+        P.J[at + d] = 0.0
+    r = A.S.rows.law.shape[0] + A.line[k, LINE_QUANTITY]
+    for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
+        P.J[at + A.S.column[e] - A.group[g]] += side * A.W.G[e]
+
+
+@formula
+def line_laws(A, P, n):
+    """Biases, compliances and bounds of the lines, whose responses are known."""
+    h = A.real.step
+    P.size[3] = n
+    for i in range(n):
+        k = abs(A.active[i, LINE_OF]) - 1
+        side = 1 if A.active[i, LINE_OF] > 0 else -1
+        x = P.line_x[i]
+        P.line_at[i, 0], P.line_at[i, 1] = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
+        x[LINE_BIAS], x[LINE_SOFT], x[LINE_LOW], x[LINE_HIGH] = 0.0, 0.0, 0.0, INFINITE
+        rate = side * line_rate(A, k, A.wide[V_BEFORE])
+        if A.line[k, LINE_KIND] == LINE_STOP:
+            gap = stop_gap(A, k, side)
+            hit = rate < 0.0 and gap + h * rate <= 0.0
+            x[LINE_BIAS] = A.line_x[k, LINE_RESTITUTION] * rate if hit else max(gap, 0.0) / h
+        elif A.line[k, LINE_KIND] == LINE_ROPE:
+            rope_law(A, P, i, k, x)
+        else:
+            friction_law(A, P, i, k, x)
+
+
+@formula
+def friction_law(A, P, i, k, x):
+    """Between -h F and h F. What moves no faster than rounding would have it is at rest, and held by more."""
+    h = A.real.step
+    g, at = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
+    w = 0.0
+    for d in range(A.group[g + 1] - A.group[g]):
+        w += P.J[at + d] * P.Y[at + d]
+    t, arm, load = A.real.time + 0.5 * h, A.line_x[k, LINE_LOWER], A.line_x[k, FRICTION_LOAD]
+    rate = line_rate(A, k, A.wide[V_BEFORE])
+    held = h * static_friction_limit(A.S, A.W, A.line[k, LINE_FORCE], t, arm, load)
+    if abs(rate) > REST_SHARE * held * w:
+        held = h * dry_friction(A.S, A.W, A.line[k, LINE_FORCE], t, rate, arm, load)
+    x[LINE_LOW], x[LINE_HIGH] = -held, held
+
+
+@formula
+def rope_law(A, P, i, k, x):
+    """-s = h (K (x - x0) + C r), at the place and the rate that `implicit` takes springs at; it never pushes."""
+    h = A.real.step
+    K, C = A.line_x[k, ROPE_K], A.line_x[k, ROPE_C]
+    g, at = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
+    w = 0.0
+    for d in range(A.group[g + 1] - A.group[g]):
+        w += P.J[at + d] * P.Y[at + d]
+    z = 0.25 * h * (h * K + C) * w
+    b = z * z / (1.0 + z * z)
+    added = h * h * K * (0.25 + 0.75 * b) + h * C * (0.5 + 0.5 * b)
+    bend = h * A.W.sensed[BEND_OF, A.line[k, LINE_QUANTITY]]
+    r = line_rate(A, k, A.wide[V_BEFORE]) - 0.5 * bend
+    stretch = A.W.sensed[VALUE, A.line[k, LINE_QUANTITY]] - A.line_x[k, ROPE_LENGTH] - 0.125 * b * h * bend
+    force = h * K * (stretch - 0.25 * (1.0 - b) * h * r) + 0.5 * h * C * (1.0 - b) * r
+    x[LINE_BIAS], x[LINE_SOFT], x[LINE_LOW], x[LINE_HIGH] = 0.5 * bend + force / added, 1.0 / added, -INFINITE, 0.0
+
+
+@formula
+def account_lines(A, P, X):
+    """Works of the lines, and the loads of joints with friction for the next step."""
+    for i in range(P.size[3]):
+        k = abs(A.active[i, LINE_OF]) - 1
+        side = 1.0 if A.active[i, LINE_OF] > 0 else -1.0
+        work = X.line[i] * side * 0.5 * (line_rate(A, k, A.wide[V_BEFORE]) + line_rate(A, k, A.wide[V_AFTER]))
+        if A.line[k, LINE_KIND] == LINE_STOP:
+            A.real.lost -= work
+        else:
+            f = A.line[k, LINE_FORCE]
+            if A.S.forces.work[f] >= 0:
+                z = A.S.sizes.coordinates + A.wide.shape[1] + A.S.forces.work[f]
+                A.clock.K[0, z] += work / A.real.step
+            A.line_x[k, LINE_REACTION] = X.line[i] * side / A.real.step
+    update_friction_loads(A)
+
+
+@formula
+def update_friction_loads(A):
+    """Loads of joints with friction, from the reactions of the step."""
+    if A.S.load_terms.load.shape[0] == 0:
+        return
+    for r in range(A.lam.shape[1]):
+        A.W.rows.multiplier[r] = A.lam[0, r] + (A.lam[1, r] + A.lam[2, r]) / A.real.step
+    reaction_loads(A.S, A.W)
+    for k in range(A.line.shape[0]):
+        if A.line[k, LINE_KIND] == LINE_FRICTION and A.S.forces.load[A.line[k, LINE_FORCE]] >= 0:
+            A.line_x[k, FRICTION_LOAD] = A.W.sensed[RETURNED, A.S.forces.load[A.line[k, LINE_FORCE]]]
+
+
+@formula
+def keep_stops_only(A, P, X):
+    """For the second solve: stops let pass what they are overrun by, and nothing else acts."""
+    A.real.overrun = 0.0
+    for i in range(P.size[3]):
+        k = abs(A.active[i, LINE_OF]) - 1
+        side = 1 if A.active[i, LINE_OF] > 0 else -1
+        x = P.line_x[i]
+        X.line[i] = 0.0
+        x[LINE_SOFT] = x[LINE_LOW] = x[LINE_HIGH] = 0.0
+        if A.line[k, LINE_KIND] == LINE_STOP:
+            mean = 0.5 * (line_rate(A, k, A.wide[V_BEFORE]) + line_rate(A, k, A.wide[V_AFTER]))
+            gap = stop_gap(A, k, side) + A.real.step * side * mean
+            A.real.overrun = min(A.real.overrun, gap)
+            x[LINE_BIAS], x[LINE_HIGH] = gap / A.real.step, INFINITE
+
+
+@formula
+def mechanism_contact_rows(A, M, C, P):
+    """Rows of all contacts on the mechanism into ``P``, whose sides are movers' numbers: they become groups.
+
+    Returns 0, or NO_ROOM where J and Y, or the table of jobs, are too small for ``A.count[NEEDED]`` and [JOBS].
+    """
+    first = A.count.first
+    rows = 6 if P.turn.shape[0] > 0 else 3
+    used, jobs = table_sizes(A, P, rows)
+    used, jobs, lines = line_rows(A, P, used, jobs, False)
+    A.count.needed, A.count.jobs = used, jobs
+    if used > min(P.J.shape[0], P.Y.shape[0]) or jobs > A.job.shape[0] or lines > P.line_at.shape[0]:
+        return TABLES_FULL
+    for g in range(A.queue.shape[0]):
+        A.queue[g] = -1
+    used = 0
+    jobs = 0
+    for c in range(P.size[0]):
+        last = -1
+        for side in range(2):
+            P.block[c, side] = -1
+            mover = P.at[c, side]
+            if mover < first:
+                continue
+            b, g = A.mover[mover - first, 0], A.mover[mover - first, 1]
+            if g < 0:  # joints hold it to the ground
+                P.at[c, side] = FIXED_SIDE
+                continue
+            n = A.group[g + 1] - A.group[g]
+            if g == last:  # both sides in one group: the difference
+                at = P.block[c, 0]
+                for i in range(rows * n):
+                    P.J[at + i] = -P.J[at + i]
+                P.block[c, 0], P.at[c, 0] = -1, FIXED_SIDE
+            else:
+                at = used
+                for i in range(rows * n):
+                    P.J[at + i] = 0.0
+                used += rows * n
+                queue_row(A, g, jobs, at, rows)
+                jobs += 1
+            point = add(load3(A.W.BK, b, 0), load3(P.arm, c, 3 * side))
+            side_rows(A, P, c, (b, at - A.group[g], n), point, rows)
+            P.block[c, side], P.at[c, side] = at, -2 - g
+            last = g
+    line_rows(A, P, used, jobs, True)
+    for i in range(lines):
+        queue_row(A, A.active[i, LINE_GROUP], jobs + i, A.active[i, LINE_AT], 1)
+    row_responses(A, P)
+    line_laws(A, P, lines)
+    return 0
+
+
+@formula
+def table_sizes(A, P, rows):
+    """How many numbers J and Y hold, and how many jobs there are."""
+    used = 0
+    jobs = 0
+    for c in range(P.size[0]):
+        last = -1
+        for side in range(2):
+            mover = P.at[c, side]
+            if mover >= A.count.first:
+                g = A.mover[mover - A.count.first, 1]
+                if g != last and g >= 0:
+                    used += rows * (A.group[g + 1] - A.group[g])
+                    jobs += 1
+                last = g
+    return used, jobs
+
+
+@formula
+def queue_row(A, g, job, at, rows):
+    """Ask for the response to rows of group g."""
+    A.job[job, JOB_AT], A.job[job, JOB_ROWS], A.job[job, JOB_NEXT] = at, rows, A.queue[g]
+    A.queue[g] = job
+
+
+@formula
+def side_rows(A, P, c, where, point, rows):
+    """Add velocities of a point of body b along the frame of contact c; with six rows its turning after them."""
+    b, at, n = where
+    zero = (0.0, 0.0, 0.0)
+    for i in range(rows):
+        axis = load3(P.frame, c, 3 * (i % 3))
+        force, torque = (axis, zero) if i < 3 else (zero, axis)
+        add_wrench_power(A.S, A.W, b, P.J, at + i * n, 1.0, force, torque, point)
+
+
+@formula
+def row_responses(A, P):
+    """Responses Y to all rows that are queued: a row of each group in every solve."""
+    force, out = A.wide[GENERALISED_IMPULSE], A.wide[V_IMPULSIVE]
+    busy = True
+    while busy:
+        busy = False
+        for i in range(6):
+            asked = fill_impulses(A, P, i, force)
+            if asked == 0:
+                break
+            busy = True
+            impulse_response(A, force, out)
+            with_spring_response(A, out)
+            read_responses(A, P, i, out)
+        for g in range(A.queue.shape[0]):
+            if A.queue[g] >= 0:
+                A.queue[g] = A.job[A.queue[g], JOB_NEXT]
+
+
+@formula
+def fill_impulses(A, P, i, force):
+    """Row i of the job that is next in each group; how many have one."""
+    asked = 0
+    for d in range(force.shape[0]):
+        force[d] = 0.0
+    for g in range(A.queue.shape[0]):
+        k = A.queue[g]
+        if k >= 0 and i < A.job[k, JOB_ROWS]:
+            asked += 1
+            a = A.group[g]
+            n = A.group[g + 1] - a
+            at = A.job[k, JOB_AT] + i * n
+            for d in range(n):
+                force[a + d] = P.J[at + d]
+    return asked
+
+
+@formula
+def read_responses(A, P, i, out):
+    """Read what `fill_impulses` asked for."""
+    for g in range(A.queue.shape[0]):
+        k = A.queue[g]
+        if k >= 0 and i < A.job[k, JOB_ROWS]:
+            a = A.group[g]
+            n = A.group[g + 1] - a
+            at = A.job[k, JOB_AT] + i * n
+            for d in range(n):
+                P.Y[at + d] = out[a + d]

@@ -1,0 +1,543 @@
+"""The jointed mechanism in a step: smooth velocities, impulses, projection onto the constraints, energy.
+
+Positions go half a step on with the velocities before. There everything is evaluated, at the mean of the
+velocities before and after: a step that is symmetric in time, so of second order. The mean is found by Anderson's
+mixing (1965; Walker and Ni 2011); stiff springs and dampers are solved for with the masses.
+
+Impulses are found where joints are at half the step, and bodies are then projected onto the constraints at its
+end, measured by the masses, which takes energy and never gives any. That energy is counted as the method's.
+"""
+
+from __future__ import annotations
+
+from ...collision.tables import Contacts, Movers
+from ...compiler.formulas import call, formula
+from ...compiler.kernels import kernel
+from ...engine.calls import ARRIVE, MOTION, POSITION, SOLVE
+from ...engine.kinematics import retract
+from ...engine.rows import row_times
+from ...math.scalar import sqrt
+from ...math.vec import dot, load3, load9, mtv, mv, store3, store9
+from ...numerics.complementarity.contact_problem import ContactProblem, ContactState
+from ...tables.table_definitions import SCHUR
+from .implicit_springs import (
+    correct_spring_lengths,
+    dot_rows,
+    find_implicit_springs,
+    impulse_response,
+    save_spring_biases,
+    save_spring_lengths,
+    spring_impulse,
+    with_spring_response,
+)
+from .mechanism_rows import account_lines, keep_stops_only, mechanism_contact_rows, update_friction_loads
+from .stepping_tables import (
+    EFFORTS,
+    GENERALISED_IMPULSE,
+    NOT_CONVERGED,
+    SPRING_ADDED_MASS,
+    SPRING_C,
+    SPRING_FORCE,
+    STEP_DISPLACEMENT,
+    TASK_APPLY_IMPULSES,
+    TASK_BEGIN,
+    TASK_CONSISTENT,
+    TASK_FINAL_VELOCITIES,
+    TASK_FINISH,
+    TASK_FREE_VELOCITIES,
+    TASK_IMPACT_IMPULSES,
+    TASK_MEAN_VELOCITIES,
+    TASK_POSES,
+    TASK_ROWS,
+    TASK_START,
+    V_AFTER,
+    V_BEFORE,
+    V_CHANGE,
+    V_IMPULSIVE,
+    V_SMOOTH,
+    MechanismTables,
+)
+
+
+@formula
+def kinetic_energy(A):
+    """Kinetic energy at the kinematics in the engine's room."""
+    total = 0.0
+    for b in range(A.S.tree.parent.shape[0]):
+        v, w = load3(A.W.BK, b, 15), mtv(load9(A.W.BK, b, 3), load3(A.W.BK, b, 12))
+        total += 0.5 * A.S.bodies.mass[b] * dot(v, v) + 0.5 * dot(w, mv(load9(A.S.bodies.inertia, b, 0), w))
+    return total
+
+
+@formula
+def gravity_sum(A, column):
+    """Sum of m g . x, x in three columns of the bodies' kinematics: places from 0 on, velocities from 15 on."""
+    total = 0.0
+    for b in range(A.S.tree.parent.shape[0]):
+        x = load3(A.W.BK, b, column)
+        total += A.S.bodies.mass[b] * (A.S.gravity[0] * x[0] + A.S.gravity[1] * x[1] + A.S.gravity[2] * x[2])
+    return total
+
+
+@formula
+def add_reaction_work(A, lam, v):
+    """Work of joints' impulses of impacts at velocities v, beyond that of what is prescribed."""
+    for r in range(A.S.rows.law.shape[0]):
+        A.real.astray -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.rows.nu[r])
+
+
+@formula
+def save_gravity_work(A, h):
+    """Keep gravity's work over the step at the mean velocities, at which impulses' works are taken too."""
+    A.real.gravity_work = h * gravity_sum(A, 15)
+
+
+@formula
+def close_energy_account(A):
+    """At the end of the step, where something was hit: what putting onto the joints took."""
+    now = -gravity_sum(A, 0)
+    if A.real.kinetic >= 0.0:
+        A.real.astray += A.real.kinetic - kinetic_energy(A) - (now - A.real.potential) - A.real.gravity_work
+    A.real.potential = now
+
+
+MIXED_GUESSES = 5  # evaluations that the next guess is made of
+MOST_EVALUATIONS = 40
+VELOCITY_CHANGE_TOLERANCE = 1e-10  # part of the velocities, or of their change, by which the last guess may be off
+# rows of Joined.mixing: of each guess in memory what it missed, and the guess; then what is missed now, and half a way
+MISSED_ROWS, GUESS_ROWS, RESIDUAL_ROW, HALF_STEP_ROW, MIXING_ROWS = (
+    0,
+    MIXED_GUESSES,
+    2 * MIXED_GUESSES,
+    2 * MIXED_GUESSES + 1,
+    2 * MIXED_GUESSES + 2,
+)
+DEPENDENT_COLUMN = 1e-12  # part of a column that is left of it: it says nothing new
+
+
+@formula
+def free_velocities(A):
+    """Go half a step on, and find there how the velocities change by all but contact. Returns a status."""
+    nq, nv = A.S.sizes.coordinates, A.wide.shape[1]
+    y, h = A.clock.y, A.real.step
+    before, change, half = A.wide[V_BEFORE], A.wide[V_CHANGE], A.mixing[HALF_STEP_ROW]
+    for d in range(nv):
+        before[d] = y[0, nq + d]
+        change[d] = 0.0
+        half[d] = 0.5 * h * before[d]
+    retract(A.S, y[0, :nq], half)
+    A.clock.real.t = A.real.time + 0.5 * h
+    for n in range(MOST_EVALUATIONS):
+        for d in range(nv):
+            y[0, nq + d] = before[d] + 0.5 * change[d]
+        status = call(A.door[0], A.S, A.W, A.R, A.clock, A.output, MOTION)
+        A.count.evaluated += 1
+        if status != 0:
+            return status
+        save_evaluation(A, h)
+        if n == 0:
+            find_implicit_springs(A, h)
+            save_spring_lengths(A)
+        save_spring_biases(A)
+        change_residual(A, h)
+        if change_converged(A):
+            return 0
+        if n < MOST_EVALUATIONS - 1:
+            next_guess(A, n)
+    A.count.unsettled += 1
+    return 0 if A.count.accept_unsettled != 0 else NOT_CONVERGED
+
+
+@formula
+def save_evaluation(A, h):
+    """What the evaluation found: h vdot, multipliers, efforts of drivers. Solving for others writes over it."""
+    nq = A.S.sizes.coordinates
+    for d in range(A.wide.shape[1]):
+        A.wide[V_SMOOTH, d] = h * A.clock.K[0, nq + d]
+        A.wide[EFFORTS, d] = A.W.velocities.effort[d]
+    for r in range(A.lam.shape[1]):
+        A.lam[0, r] = A.W.rows.multiplier[r]
+
+
+@formula
+def change_residual(A, h):
+    """By how much the change of velocities is not what it makes of itself."""
+    now, change = A.mixing[RESIDUAL_ROW], A.wide[V_CHANGE]
+    for d in range(now.shape[0]):
+        now[d] = A.wide[V_SMOOTH, d] - change[d]
+    for i in range(A.count.springs):
+        s = spring_impulse(A, h, i, A.wide[V_BEFORE], change)
+        for d in range(now.shape[0]):
+            now[d] -= s * A.spring_Y[i, d]
+    with_spring_response(A, now)
+
+
+@formula
+def change_converged(A):
+    """Whether the change of velocities is what it makes of itself; then it is made so to the last digit."""
+    size = 1e-300
+    worst = 0.0
+    for d in range(A.wide.shape[1]):
+        size = max(size, abs(A.wide[V_BEFORE, d]) + abs(A.wide[V_CHANGE, d]))
+        worst = max(worst, abs(A.mixing[RESIDUAL_ROW, d]))
+    return worst <= VELOCITY_CHANGE_TOLERANCE * size
+
+
+@formula
+def next_guess(A, n):
+    """The next change of velocities: what the last ones would miss least of, mixed, and what it makes of itself."""
+    mixing, C, change = A.mixing, A.weight, A.wide[V_CHANGE]
+    now = mixing[RESIDUAL_ROW]
+    kept = min(n, MIXED_GUESSES)
+    for i in range(kept):  # normal equations of |now - sum w_i (now - missed_i)|
+        for j in range(i + 1):
+            C[i, j] = 0.0
+        C[i, MIXED_GUESSES] = 0.0
+        for d in range(now.shape[0]):
+            a = now[d] - mixing[MISSED_ROWS + i, d]
+            C[i, MIXED_GUESSES] += a * now[d]
+            for j in range(i + 1):
+                C[i, j] += a * (now[d] - mixing[MISSED_ROWS + j, d])
+    solve_weights(C, kept)
+    slot = n % MIXED_GUESSES
+    for d in range(now.shape[0]):
+        to = change[d] + now[d]
+        for i in range(kept):
+            to -= C[i, MIXED_GUESSES] * (change[d] - mixing[GUESS_ROWS + i, d] + now[d] - mixing[MISSED_ROWS + i, d])
+        mixing[GUESS_ROWS + slot, d] = change[d]
+        mixing[MISSED_ROWS + slot, d] = now[d]
+        change[d] = to
+
+
+@formula
+def solve_weights(C, n):
+    """Solve n normal equations by Cholesky's factor, in place; what says nothing new has no weight."""
+    for i in range(n):
+        whole = C[i, i]
+        for j in range(i + 1):
+            s = C[i, j]
+            for k in range(j):
+                s -= C[i, k] * C[j, k]
+            if j < i:
+                C[i, j] = s / C[j, j] if C[j, j] > 0.0 else 0.0
+            else:
+                C[i, i] = sqrt(s) if s > DEPENDENT_COLUMN * whole else 0.0
+        s = C[i, MIXED_GUESSES]
+        for k in range(i):
+            s -= C[i, k] * C[k, MIXED_GUESSES]
+        C[i, MIXED_GUESSES] = s / C[i, i] if C[i, i] > 0.0 else 0.0
+    for i in range(n - 1, -1, -1):
+        s = C[i, MIXED_GUESSES]
+        for k in range(i + 1, n):
+            s -= C[k, i] * C[k, MIXED_GUESSES]
+        C[i, MIXED_GUESSES] = s / C[i, i] if C[i, i] > 0.0 else 0.0
+
+
+NO_VELOCITY_CHANGE = 1e-12  # part of the velocities that is no change of them
+
+
+@formula
+def run_task(A, M, C, P, X, task):
+    """One task of `mechanism_kernel`."""
+    if task == TASK_START:
+        return start_mechanism(A, M, X)
+    if task == TASK_FREE_VELOCITIES:
+        return free_step(A, M, X)
+    if task == TASK_BEGIN:
+        for d in range(A.wide.shape[1]):
+            X.wide[d] = A.wide[V_BEFORE, d] + A.wide[V_CHANGE, d]
+        for k in range(P.size[3]):
+            X.line[k] = 0.0
+        return 0
+    if task == TASK_ROWS:
+        return mechanism_contact_rows(A, M, C, P)
+    if task == TASK_APPLY_IMPULSES:
+        apply_step_impulses(A, P, X)
+        return 0
+    if task == TASK_MEAN_VELOCITIES:
+        for i in range(A.S.sizes.coordinates):  # at half the step, from where FINISH goes on
+            A.clock.y[2, i] = A.clock.y[0, i]
+        for d in range(A.wide.shape[1]):
+            X.wide[d] = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
+        keep_stops_only(A, P, X)
+        return 0
+    if task == TASK_FINISH:
+        return finish_step(A, M, X)
+    if task == TASK_POSES:
+        write_body_states(A, M, True)
+        return 0
+    if task == TASK_CONSISTENT:
+        make_consistent(A, X)
+        return 0
+    if task == TASK_IMPACT_IMPULSES:
+        for d in range(A.wide.shape[1]):
+            A.wide[GENERALISED_IMPULSE, d] = 0.0
+        contact_impulses(A, P, X, A.wide[GENERALISED_IMPULSE])
+        impulse_response(A, A.wide[GENERALISED_IMPULSE], A.wide[V_IMPULSIVE])
+        for d in range(A.wide.shape[1]):
+            A.wide[STEP_DISPLACEMENT, d] = 0.5 * (A.wide[V_BEFORE, d] + X.wide[d])
+        add_reaction_work(A, A.output.rows[3], A.wide[STEP_DISPLACEMENT])
+        for r in range(A.lam.shape[1]):
+            A.lam[2, r] += A.output.rows[3, r]
+    if task == TASK_FINAL_VELOCITIES:
+        A.real.time += A.real.step
+        A.count.begun = 0
+        close_energy_account(A)
+        for d in range(A.wide.shape[1]):
+            X.wide[d] = A.clock.y[0, A.S.sizes.coordinates + d]
+    return 0
+
+
+@formula
+def make_consistent(A, X):
+    """Velocities before an impact made those that joints allow at half the step, where the rows are.
+
+    Those of the start of the step are none by what joints turn in half of it. Impulses of contacts along which nothing
+    can move do not end such a part, and where friction jams they would grow without bound.
+    """
+    rows = A.output.rows
+    for d in range(A.wide.shape[1]):
+        rows[0, d] = 0.0
+    for r in range(A.S.rows.law.shape[0]):
+        rows[1, r] = A.W.rows.nu[r] - row_times(A.S, A.W, r, X.wide)
+    call(A.door[0], A.S, A.W, A.R, A.clock, A.output, SOLVE)
+    for d in range(A.wide.shape[1]):
+        A.wide[STEP_DISPLACEMENT, d] = X.wide[d] + 0.5 * rows[2, d]
+        X.wide[d] += rows[2, d]
+        A.wide[V_BEFORE, d] = X.wide[d]
+    for r in range(A.S.rows.law.shape[0]):
+        A.real.astray -= rows[3, r] * row_times(A.S, A.W, r, A.wide[STEP_DISPLACEMENT])
+
+
+@formula
+def start_mechanism(A, M, X):
+    """Evaluate where the motion begins, which must be on the constraints: accelerations, multipliers, efforts."""
+    A.count.begun = 0
+    A.clock.real.t = A.real.time
+    status = call(A.door[0], A.S, A.W, A.R, A.clock, A.output, MOTION)
+    save_evaluation(A, A.real.step)
+    nq = A.S.sizes.coordinates
+    for d in range(A.wide.shape[1]):
+        X.wide[d] = A.wide[V_BEFORE, d] = A.wide[V_AFTER, d] = A.clock.y[0, nq + d]
+        A.wide[V_IMPULSIVE, d] = 0.0
+    for r in range(A.lam.shape[1]):
+        A.lam[1, r] = A.lam[2, r] = 0.0
+    update_friction_loads(A)
+    write_body_states(A, M, True)
+    A.real.kinetic = -1.0
+    close_energy_account(A)
+    return status
+
+
+@formula
+def free_step(A, M, X):
+    """Velocities without contact, from those in State.wide; asked once more it begins at the same place again."""
+    y, nq = A.clock.y, A.S.sizes.coordinates
+    if A.count.begun == 0:
+        for i in range(y.shape[1]):
+            y[1, i] = y[0, i]
+        for r in range(A.lam.shape[1]):
+            A.lam[2, r] = 0.0
+        A.count.begun = 1
+    for i in range(y.shape[1]):
+        y[0, i] = y[1, i]
+    for d in range(A.wide.shape[1]):
+        y[0, nq + d] = X.wide[d]
+    status = free_velocities(A)
+    write_body_states(A, M, False)
+    return status
+
+
+@formula
+def write_body_states(A, M, poses):
+    """Velocities of the bodies for what looks for contacts, and poses if these are asked for, as last evaluated."""
+    for k in range(A.mover.shape[0]):
+        b, to = A.mover[k, 0], A.count.first + k
+        if poses:
+            store3(M.pose, to, 0, load3(A.W.BK, b, 0))
+            store9(M.pose, to, 3, load9(A.W.BK, b, 3))
+        store3(M.twist, to, 0, load3(A.W.BK, b, 15))
+        store3(M.twist, to, 3, load3(A.W.BK, b, 12))
+
+
+@formula
+def apply_step_impulses(A, P, X):
+    """Velocities after the step, from the impulses that were found; what these do to joints and drivers.
+
+    They follow from one solve for all impulses: joints are exact to rounding, whatever the cone solver left.
+    """
+    nv, h = A.wide.shape[1], A.real.step
+    before, total = A.wide[V_BEFORE], A.wide[GENERALISED_IMPULSE]
+    for d in range(nv):
+        total[d] = 0.0
+        A.wide[STEP_DISPLACEMENT, d] = X.wide[d] - before[d] - A.wide[V_CHANGE, d]
+    contact_impulses(A, P, X, total)
+    for i in range(A.count.springs):
+        s = spring_impulse(A, h, i, before, A.wide[V_CHANGE])
+        s += A.spring_x[i, SPRING_ADDED_MASS] * dot_rows(A.spring_J[i], A.wide[STEP_DISPLACEMENT])
+        for d in range(nv):
+            total[d] -= s * A.spring_J[i, d]
+    impulse_response(A, total, A.wide[V_IMPULSIVE])
+    for r in range(A.lam.shape[1]):
+        A.lam[1, r] = A.output.rows[3, r]
+    for d in range(nv):
+        A.wide[EFFORTS, d] += A.W.velocities.effort[d] / h
+        A.wide[V_AFTER, d] = before[d] + A.wide[V_SMOOTH, d] + A.wide[V_IMPULSIVE, d]
+        A.wide[V_IMPULSIVE, d] = A.wide[V_AFTER, d] - before[d] - A.wide[V_CHANGE, d]  # by contact and lines
+    for d in range(nv):
+        A.wide[STEP_DISPLACEMENT, d] = 0.5 * (before[d] + A.wide[V_AFTER, d])
+    add_reaction_work(A, A.lam[1], A.wide[STEP_DISPLACEMENT])
+    account_works(A, h)
+    account_lines(A, P, X)
+    correct_velocity_forces(A, h)
+    for d in range(nv):
+        X.wide[d] = A.wide[V_AFTER, d]
+
+
+@formula
+def velocities_changed(A):
+    """Whether contact or lines changed the velocities."""
+    size, change = 1e-300, 0.0
+    for d in range(A.wide.shape[1]):
+        size = max(size, abs(A.wide[V_BEFORE, d]) + abs(A.wide[V_AFTER, d]))
+        change = max(change, abs(A.wide[V_IMPULSIVE, d]))
+    return change > NO_VELOCITY_CHANGE * size
+
+
+@formula
+def evaluate_at_mean(A, part):
+    """Evaluate at half the step once more, at the mean velocities with a part of what impacts changed."""
+    nq = A.S.sizes.coordinates
+    for d in range(A.wide.shape[1]):
+        mean = A.wide[V_BEFORE, d] + 0.5 * A.wide[V_CHANGE, d]
+        A.clock.y[0, nq + d] = mean + part * A.wide[V_IMPULSIVE, d]
+    return call(A.door[0], A.S, A.W, A.R, A.clock, A.output, MOTION)
+
+
+@formula
+def correct_velocity_forces(A, h):
+    """Velocity-dependent forces of the second half of the step at velocities after impacts, in joint coordinates.
+
+    Coriolis' terms make up for masses that change along the way: with those of the velocities before, impacts would
+    give energy. In absolute coordinates the projection that ends the step does that.
+    """
+    y, z = A.clock.y, A.S.sizes.coordinates + A.wide.shape[1]
+    if A.S.sizes.solver == SCHUR or not velocities_changed(A):
+        return
+    for i in range(z, y.shape[1]):
+        y[2, i] = A.clock.K[0, i]
+    if evaluate_at_mean(A, 1.0) == 0:
+        for d in range(A.wide.shape[1]):
+            vdot = A.clock.K[0, A.S.sizes.coordinates + d]
+            A.wide[V_AFTER, d] += 0.5 * (h * vdot - A.wide[V_SMOOTH, d])
+        for i in range(A.count.springs):  # their dampers are taken at the velocities after impacts already
+            s = 0.5 * h * A.spring_x[i, SPRING_C] * dot_rows(A.spring_J[i], A.wide[V_IMPULSIVE])
+            for d in range(A.wide.shape[1]):
+                A.wide[V_AFTER, d] += s * A.spring_Y[i, d]
+    for i in range(z, y.shape[1]):
+        A.clock.K[0, i] = y[2, i]
+
+
+@formula
+def contact_impulses(A, P, X, total):
+    """Add the generalised impulses of all contacts and lines."""
+    for c in range(P.size[0]):
+        for side in range(2):
+            at = P.block[c, side]
+            if P.at[c, side] <= -2 and at >= 0:
+                g = -2 - P.at[c, side]
+                a = A.group[g]
+                n = A.group[g + 1] - a
+                sign = 1.0 if side == 1 else -1.0
+                for i in range(6 if P.turn.shape[0] > 0 else 3):
+                    s = sign * (X.p[c, i] if i < 3 else X.torque[c, i - 3])
+                    for d in range(n):
+                        total[a + d] += s * P.J[at + i * n + d]
+    for k in range(P.size[3]):
+        g, at = P.line_at[k, 0], P.line_at[k, 1]
+        for d in range(A.group[g + 1] - A.group[g]):
+            total[A.group[g] + d] += X.line[k] * P.J[at + d]
+
+
+@formula
+def account_works(A, h):
+    """Rates of the works over the step, in the clock: forces at the mean velocities, drivers with all they gave."""
+    S, W = A.S, A.W
+    if velocities_changed(A):
+        evaluate_at_mean(A, 0.5)
+    save_gravity_work(A, h)
+    work = A.clock.K[0, S.sizes.coordinates + A.wide.shape[1] :]
+    for r in range(S.rows.law.shape[0]):
+        if S.rows.work[r] >= 0:
+            work[S.rows.work[r]] = (A.lam[0, r] + A.lam[1, r] / h) * W.rows.nu[r]
+    for b in range(S.tree.parent.shape[0]):
+        if S.tree.law[b] >= 0:
+            d = S.tree.v[b]
+            mean = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
+            work[S.tree.work[b]] = A.wide[EFFORTS, d] * mean
+    for d in range(A.wide.shape[1]):
+        A.wide[STEP_DISPLACEMENT, d] = A.wide[V_AFTER, d] - A.wide[V_BEFORE, d]
+    for i in range(A.count.springs):
+        k = int(A.spring_x[i, SPRING_FORCE])
+        if S.forces.work[k] >= 0:
+            rate = dot_rows(A.spring_J[i], A.wide[V_BEFORE]) + 0.5 * dot_rows(A.spring_J[i], A.wide[STEP_DISPLACEMENT])
+            work[S.forces.work[k]] -= spring_impulse(A, h, i, A.wide[V_BEFORE], A.wide[STEP_DISPLACEMENT]) / h * rate
+
+
+@formula
+def save_poses(A):
+    """Poses of the movers as evaluated last."""
+    for k in range(A.mover.shape[0]):
+        store3(A.pose, k, 0, load3(A.W.BK, A.mover[k, 0], 0))
+        store9(A.pose, k, 3, load9(A.W.BK, A.mover[k, 0], 3))
+
+
+@formula
+def has_displacement(displacements):
+    """Whether there are any."""
+    found = False
+    for d in range(displacements.shape[0]):
+        found = found or displacements[d] != 0.0
+    return found
+
+
+@formula
+def finish_step(A, M, X):
+    """Go on with the mean velocities and those in State.wide beside them, onto the constraints. Returns a status.
+
+    It may be asked again, with others beside them.
+    """
+    S, nq, nv, h = A.S, A.S.sizes.coordinates, A.wide.shape[1], A.real.step
+    y, way = A.clock.y, A.wide[STEP_DISPLACEMENT]
+    for d in range(nv):
+        way[d] = 0.5 * h * A.wide[V_AFTER, d] + h * X.wide[d]
+        y[0, nq + d] = A.wide[V_AFTER, d]
+    for i in range(nq):
+        y[0, i] = y[2, i]
+    retract(S, y[0, :nq], way)
+    for i in range(nq + nv, y.shape[1]):
+        y[0, i] = y[1, i] + h * A.clock.K[0, i]
+    A.clock.real.t = A.real.time + h
+    correct_spring_lengths(A)
+    A.real.kinetic = -1.0
+    if velocities_changed(A) or has_displacement(X.wide):
+        call(A.door[0], S, A.W, A.R, A.clock, A.output, POSITION)
+        A.real.kinetic = kinetic_energy(A)
+        save_poses(A)
+    A.W.options.placed = 1.0
+    status = call(A.door[0], S, A.W, A.R, A.clock, A.output, ARRIVE)
+    A.W.options.placed = 0.0
+    if status != 0:
+        return status
+    call(A.door[0], S, A.W, A.R, A.clock, A.output, POSITION)
+    write_body_states(A, M, True)
+    return 0
+
+
+@kernel
+def mechanism_kernel(A: MechanismTables, M: Movers, C: Contacts, P: ContactProblem, X: ContactState, task: int) -> int:
+    """The mechanism: ``A`` as `MechanismTables`, then movers, contacts, problem and state of the step; see ``joined.py``.
+
+    Returns 0, NO_ROOM, or the engine's status.
+    """
+    return run_task(A, M, C, P, X, task)

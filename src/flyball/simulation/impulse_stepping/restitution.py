@@ -1,0 +1,391 @@
+"""Impacts: restitution by Poisson's, Newton's or Moreau's law, simultaneous or one contact after the other.
+
+Impacts are over before a step begins. Contacts that close within the step, faster than smooth forces make them,
+are hit with the velocities of the start:
+
+- Poisson: compression (an inelastic impact with impulses p_c), then expansion with normal impulses of at least e
+  p_c and friction for these (Pfeiffer and Glocker, 1996, section 8.3);
+- Newton: u+ >= -e u- normal to the contact; Moreau: the same along all three directions.
+
+No law may add energy: what goes beyond an inelastic impact is done only as far as that leaves energy for it
+(Newton's law with friction would add some: Kane and Levinson, 1985). Impacts are repeated until nothing more is
+hit.
+
+One after the other, as in Newton's cradle, the contact that closes fastest is hit first, by Poisson's law, until
+none closes.
+"""
+
+from __future__ import annotations
+
+from ...collision.tables import FOUND, GAP, MATERIAL, SHAPE_1, SHAPE_2
+from ...compiler.formulas import call, formula
+from ...math.scalar import sqrt
+from ...math.vec import add, dot, load3, scale, store3, sub
+from ...numerics.complementarity.contact_operator import (
+    apply_contact_impulse,
+    contact_angular_velocity,
+    contact_velocity,
+    diagonal_block,
+    to_world_frame,
+)
+from ...numerics.complementarity.contact_problem import CONVERGED, FIXED_SIDE
+from ...tables.table_definitions import RESTITUTION
+from .compliant_contact import contact_stiffness
+from .free_bodies import rest_speed
+from .stepping_tables import (
+    ADDRESS_IMPACTS,
+    COMPLIANT,
+    GIVEN_BY_SURFACES,
+    HISTORY_HIT,
+    HISTORY_IMPACT_IMPULSE,
+    HISTORY_IMPACT_SPIN,
+    HISTORY_IMPACT_VELOCITY,
+    IMPACTS,
+    LOST_FRICTION,
+    LOST_IMPACT,
+    MOREAU,
+    NO_OVERLAP_BELOW,
+    NO_RESTITUTION,
+    POISSON,
+    REDUCED_EXPANSIONS,
+    REPORTED_RESIDUAL,
+    RESTITUTION_LAW,
+    SEQUENTIAL,
+    STEP,
+    UNCONVERGED,
+    VELOCITY_ITERATIONS,
+    VELOCITY_TOLERANCE,
+)
+
+IMPACTS_PER_CONTACT = 200  # impacts for each contact, after which what still closes is left to the step
+NO_MOBILITY = 1e-13  # part of what an impulse moves along all three directions that is none
+NO_CLOSING = 1e-12  # closing speed that is none, in parts of the fastest
+
+
+@formula
+def sequential_impacts(R, Z, X, C, pace, now):
+    """Impacts of the contacts that are hit; impulses in ``Z.p``, velocities in ``X``. Returns whether all are over.
+
+    Their restitutions stand in ``R.least``. What closes within the step after others' impacts is hit too.
+    """
+    n = C.count[FOUND]
+    for c in range(n):
+        for i in range(3):
+            Z.p[c, i] = 0.0
+    fastest = 0.0
+    for c in range(n):
+        if now[c, HISTORY_HIT] > 0.0:
+            fastest = max(fastest, -now[c, HISTORY_IMPACT_VELOCITY])
+    for _ in range(IMPACTS_PER_CONTACT * n):
+        first, most = -1, NO_CLOSING * fastest
+        for c in range(n):
+            if now[c, HISTORY_HIT] > 0.0 or R.least[c] > 0.0:
+                u = contact_velocity(R, X.v, X.wide, c)
+                there = now[c, HISTORY_HIT] > 0.0 or C.x[c, GAP] + pace.real[STEP] * u[0] <= pace.real[NO_OVERLAP_BELOW]
+                if there and -u[0] > most:
+                    first, most = c, -u[0]
+        if first < 0:
+            return True
+        now[first, HISTORY_HIT] = 1.0
+        single_impact(R, Z, X, first, R.least[first])
+    return False
+
+
+@formula
+def single_impact(R, Z, X, c, e):
+    """One contact's impact."""
+    D = diagonal_block(R, c)
+    n = compression_impulse(R, Z, X, c, D)
+    u = contact_velocity(R, X.v, X.wide, c)
+    p = expansion_impulse(R, c, D, e * n, u)
+    apply_impulse(R, Z, X, c, p)
+
+
+@formula
+def reciprocal_mobility(d, D):
+    """1 / d of a diagonal entry d of D; 0 for a direction along which joints let nothing move."""
+    return 1.0 / d if d > NO_MOBILITY * (D[0] + D[3] + D[5]) else 0.0
+
+
+@formula
+def compression_impulse(R, Z, X, c, D):
+    """Impulses that end the approach; the normal one is returned.
+
+    Normal and tangential impulses act on each other's velocities: they are taken in turn until they agree.
+    """
+    total = 0.0
+    s, t = 0.0, 0.0
+    for _ in range(IMPACTS_PER_CONTACT):
+        u = contact_velocity(R, X.v, X.wide, c)
+        d = -u[0] * reciprocal_mobility(D[0], D)
+        if total + d < 0.0:
+            d = -total
+        apply_impulse(R, Z, X, c, (d, 0.0, 0.0))
+        total += d
+        u = contact_velocity(R, X.v, X.wide, c)
+        ps = s - (u[1] + R.bias[c, 1]) * reciprocal_mobility(D[3], D)
+        pt = t - (u[2] + R.bias[c, 2]) * reciprocal_mobility(D[5], D)
+        size = sqrt(ps * ps + pt * pt)
+        if size > R.mu[c] * total:
+            ps, pt = ps * R.mu[c] * total / size, pt * R.mu[c] * total / size
+        apply_impulse(R, Z, X, c, (0.0, ps - s, pt - t))
+        change = abs(d) + abs(ps - s) + abs(pt - t)
+        s, t = ps, pt
+        if change <= 1e-14 * total:
+            break
+    return total
+
+
+@formula
+def expansion_impulse(R, c, D, n, u):
+    """Impulses of expansion: n along the normal, and along the tangents what ends sliding, within the cone."""
+    a, b = -(u[1] + R.bias[c, 1] + D[1] * n), -(u[2] + R.bias[c, 2] + D[2] * n)
+    s, t = a * reciprocal_mobility(D[3], D), b * reciprocal_mobility(D[5], D)
+    d = D[3] * D[5] - D[4] * D[4]
+    if d > NO_MOBILITY * D[3] * D[5] and s != 0.0 and t != 0.0:
+        s, t = (D[5] * a - D[4] * b) / d, (D[3] * b - D[4] * a) / d
+    size = sqrt(s * s + t * t)
+    if size > R.mu[c] * n:
+        s, t = s * R.mu[c] * n / size, t * R.mu[c] * n / size
+    return (n, s, t)
+
+
+@formula
+def apply_impulse(R, Z, X, c, p):
+    """An impulse at contact c."""
+    apply_contact_impulse(R, X.v, X.wide, c, p)
+    for i in range(3):
+        Z.p[c, i] += p[i]
+
+
+IMPACT_ROUNDS = 1000  # of impacts in one step, after which what still closes comes to rest against what it meets
+NEAR_GAPS = 1e3  # gaps up to so many times what is none are hit at once
+REDUCED_BELOW = 1.0 - 1e-6  # part of an expansion below which it is told that it was reduced
+ITERATION_FACTOR = 4  # times as many iterations as for velocities that are warm started
+
+
+@formula
+def restitution_of(G, C, L, c):
+    """Restitution of contact c."""
+    return L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL], RESTITUTION]
+
+
+@formula
+def resolve_impacts(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
+    """The impacts that `find_impacts` found; velocities in ``X.v`` and ``X.wide`` are those after them.
+
+    ``R`` is the problem with biases and least normal impulses of its own, ``Z`` the state of compression, which shares
+    its velocities with ``X``, ``E`` that of expansion.
+    """
+    if pace.count[SEQUENTIAL] != 0:
+        for c in range(C.count[FOUND]):
+            R.least[c] = restitution_of(G, C, L, c)
+        if not sequential_impacts(R, Z, X, C, pace, now):
+            pace.count[REDUCED_EXPANSIONS] += 1
+    elif pace.count[RESTITUTION_LAW] == POISSON:
+        poisson_impacts(G, C, bias, R, Z, E, X, W, O, F, L, pace, now)
+    else:
+        newton_impacts(C, bias, R, Z, E, X, W, O, F, pace, now)
+    account_impacts(R, bias, Z, X, C, pace, now)
+
+
+@formula
+def clear_impact_impulses(C, now):
+    """Nothing has been hit in this step yet."""
+    for c in range(C.count[FOUND]):
+        for i in range(3):
+            now[c, HISTORY_IMPACT_IMPULSE + i] = 0.0
+
+
+@formula
+def poisson_impacts(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
+    """Poisson's law: an inelastic impact, then expansion."""
+    solve_from_zero(pace.door[ADDRESS_IMPACTS], R, Z, W, O, F, pace)
+    for c in range(C.count[FOUND]):
+        R.least[c] = restitution_of(G, C, L, c) * Z.p[c, 0] if now[c, HISTORY_HIT] > 0.0 else 0.0
+    copy_velocities(X, E)
+    solve_from_zero(pace.door[ADDRESS_IMPACTS], R, E, W, O, F, pace)
+    add_expansion(R, bias, Z, E, X, C, pace, now)
+
+
+@formula
+def newton_impacts(C, bias, R, Z, E, X, W, O, F, pace, now):
+    """Newton's and Moreau's law; where they make energy, as far as an inelastic impact leaves enough of it."""
+    copy_velocities(X, E)
+    solve_from_zero(pace.door[ADDRESS_IMPACTS], R, E, W, O, F, pace)
+    if impulse_energy(R, bias, E, E, C, now) <= 0.0:
+        copy_velocities(E, X)
+        for c in range(C.count[FOUND]):
+            add_impulses(Z, 0.0, E, 1.0, c)
+        return
+    for c in range(C.count[FOUND]):
+        for i in range(3):
+            R.bias[c, i] = 0.0 if i == 0 and now[c, HISTORY_HIT] > 0.0 else bias[c, i]
+    solve_from_zero(pace.door[ADDRESS_IMPACTS], R, Z, W, O, F, pace)
+    for c in range(C.count[FOUND]):
+        add_impulses(E, 1.0, Z, -1.0, c)
+    add_expansion(R, bias, Z, E, X, C, pace, now)
+
+
+@formula
+def add_impulses(Z, z, E, e, c):
+    """z times the impulse of Z, and e times that of E, into Z."""
+    store3(Z.p, c, 0, add(scale(z, load3(Z.p, c, 0)), scale(e, load3(E.p, c, 0))))
+    if Z.torque.shape[0] > 0:
+        store3(Z.torque, c, 0, add(scale(z, load3(Z.torque, c, 0)), scale(e, load3(E.torque, c, 0))))
+
+
+@formula
+def copy_velocities(X, E):
+    """E's velocities become X's."""
+    for k in range(X.v.shape[0]):
+        for i in range(6):
+            E.v[k, i] = X.v[k, i]
+    for k in range(X.wide.shape[0]):
+        E.wide[k] = X.wide[k]
+
+
+@formula
+def find_impacts(G, C, at, bias, R, X, L, pace, now):
+    """Whether there are impacts; biases of the contacts that are hit, and their velocities before in ``now``."""
+    if pace.count[RESTITUTION_LAW] == NO_RESTITUTION:
+        return False
+    h = pace.real[STEP]
+    slowest = rest_speed(pace, h)
+    found = False
+    law = pace.count[RESTITUTION_LAW]
+    for c in range(C.count[FOUND]):
+        R.least[c] = 0.0
+        gives_way = pace.count[COMPLIANT] != 0 and contact_stiffness(G, C, L, c) > 0.0
+        for i in range(2):  # what gives way has no impulse in no time
+            R.at[c, i] = FIXED_SIDE if gives_way else at[c, i]
+        u = contact_velocity(R, X.v, X.wide, c)
+        store3(now, c, HISTORY_IMPACT_VELOCITY, u)
+        store3(R.bias, c, 0, load3(bias, c, 0))
+        if R.turn.shape[0] > 0:
+            store3(now, c, HISTORY_IMPACT_SPIN, contact_angular_velocity(R, X.v, X.wide, c))
+        e = restitution_of(G, C, L, c)
+        now[c, HISTORY_HIT] = 0.0
+        plain = pace.count[SEQUENTIAL] != 0 and C.x[c, GAP] <= pace.real[NO_OVERLAP_BELOW]
+        if gives_way:
+            R.bias[c, 0] = 0.0
+            continue
+        if (e > 0.0 or plain) and C.x[c, GAP] + h * u[0] <= pace.real[
+            NO_OVERLAP_BELOW
+        ]:  # what rests against what is hit, too
+            now[c, HISTORY_HIT] = 1.0
+            found = found or (e > 0.0 and u[0] < -slowest)
+            R.bias[c, 0] = 0.0
+            if law != POISSON and u[0] < 0.0:
+                R.bias[c, 0] = e * u[0]
+                for i in range(1, 3 if law == MOREAU else 1):
+                    R.bias[c, i] += e * u[i]
+        elif C.x[c, GAP] > NEAR_GAPS * pace.real[NO_OVERLAP_BELOW]:
+            for i in range(2):  # an impact takes no time in which it could close: it has its turn in the next round
+                R.at[c, i] = FIXED_SIDE
+    return found
+
+
+@formula
+def solve_from_zero(address, R, Z, W, O, F, pace):
+    """Solve from zero impulses."""
+    for c in range(R.size[0]):
+        for i in range(3):
+            Z.p[c, i] = 0.0
+        for i in range(3 if Z.torque.shape[0] > 0 else 0):
+            Z.torque[c, i] = 0.0
+    for k in range(R.size[3]):
+        Z.line[k] = 0.0
+    O.count.most = ITERATION_FACTOR * pace.count[VELOCITY_ITERATIONS]
+    O.real.enough = pace.real[VELOCITY_TOLERANCE]
+    call(address, R, Z, W, O, F.impacts, 0)
+    if O.count.ended != CONVERGED and O.real.residual > pace.real[REPORTED_RESIDUAL] * pace.real[STEP]:
+        pace.count[UNCONVERGED] += 1
+
+
+@formula
+def impulse_energy(R, bias, Z, X, C, now):
+    """Energy that impulses of ``Z`` gave, which led to the velocities of ``X``: p . (u- + u+) / 2 of every contact.
+
+    With the own motion of surfaces, ``bias`` along the tangents, from which they may give energy.
+    """
+    total = 0.0
+    for c in range(C.count[FOUND]):
+        u = contact_velocity(R, X.v, X.wide, c)
+        for i in range(3):
+            own = bias[c, i] if i > 0 else 0.0
+            total += Z.p[c, i] * (0.5 * (u[i] + now[c, HISTORY_IMPACT_VELOCITY + i]) + own)
+        total += torque_impulse_energy(R, Z, X, c, now)
+    return total
+
+
+@formula
+def torque_impulse_energy(R, Z, X, c, now):
+    """The same of the torque's impulse at contact c."""
+    if R.turn.shape[0] == 0:
+        return 0.0
+    return 0.5 * dot(
+        load3(Z.torque, c, 0), add(contact_angular_velocity(R, X.v, X.wide, c), load3(now, c, HISTORY_IMPACT_SPIN))
+    )
+
+
+@formula
+def add_expansion(R, bias, Z, E, X, C, pace, now):
+    """The impulses E.p are added to Z.p: X's velocities become those of ``E``, or what energy there is for on the way.
+
+    On the way s from X to E it grows by a s + b s^2, a = p . u, b = p . (u+ - u) / 2. All of the way is allowed by the
+    constraints, which are convex.
+    """
+    there = max(0.0, -impulse_energy(R, bias, Z, X, C, now))
+    a, b = 0.0, 0.0
+    for c in range(C.count[FOUND]):
+        u = contact_velocity(R, X.v, X.wide, c)
+        w = contact_velocity(R, E.v, E.wide, c)
+        for i in range(3):
+            own = bias[c, i] if i > 0 else 0.0
+            a += E.p[c, i] * (u[i] + own)
+            b += 0.5 * E.p[c, i] * (w[i] - u[i])
+        if R.turn.shape[0] > 0:
+            u, w, t = (
+                contact_angular_velocity(R, X.v, X.wide, c),
+                contact_angular_velocity(R, E.v, E.wide, c),
+                load3(E.torque, c, 0),
+            )
+            a, b = a + dot(t, u), b + 0.5 * dot(t, sub(w, u))
+    s = 1.0
+    if a + b > there and b > 0.0:
+        s = (sqrt(a * a + 4.0 * b * there) - a) / (2.0 * b)
+        s = min(1.0, max(0.0, s))
+        if s < REDUCED_BELOW:
+            pace.count[REDUCED_EXPANSIONS] += 1
+    for k in range(X.v.shape[0]):
+        for i in range(6):
+            X.v[k, i] += s * (E.v[k, i] - X.v[k, i])
+    for k in range(X.wide.shape[0]):
+        X.wide[k] += s * (E.wide[k] - X.wide[k])
+    for c in range(C.count[FOUND]):
+        add_impulses(Z, 1.0, E, s, c)
+
+
+@formula
+def account_impacts(R, bias, Z, X, C, pace, now):
+    """Impulses of the impacts, and what was lost in them."""
+    for c in range(C.count[FOUND]):
+        u = contact_velocity(R, X.v, X.wide, c)
+        worn = -torque_impulse_energy(R, Z, X, c, now)
+        for i in range(3):
+            mean = 0.5 * (u[i] + now[c, HISTORY_IMPACT_VELOCITY + i])
+            if i == 0:
+                pace.real[LOST_IMPACT] -= Z.p[c, 0] * mean
+            else:  # of a surface that moves the bias is its own motion
+                worn -= Z.p[c, i] * (mean + bias[c, i])
+                pace.real[GIVEN_BY_SURFACES] -= Z.p[c, i] * bias[c, i]
+        # the mean of an impact in which the slip reverses: friction gives no energy, the impact's sum is exact
+        pace.real[LOST_FRICTION if worn >= 0.0 else LOST_IMPACT] += worn
+        store3(
+            now,
+            c,
+            HISTORY_IMPACT_IMPULSE,
+            add(load3(now, c, HISTORY_IMPACT_IMPULSE), to_world_frame(R, c, Z.p[c, 0], Z.p[c, 1], Z.p[c, 2])),
+        )
+    pace.count[IMPACTS] += 1

@@ -1,0 +1,482 @@
+"""Setup of impulse time stepping: free bodies and jointed mechanism, where they start, the stepper."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...assembly.assemble import assemble
+from ...assembly.assembled_state import Assembly
+from ...assembly.compiled_mechanism import compile_mechanism
+from ...collision.tables import RADIUS, Movers
+from ...engine.calls import OutputBuffer
+from ...engine.projection import STEPS
+from ...engine.residual import DIRECTIONS, SLOPE_WIDTH
+from ...errors import ModelError
+from ...forces.coordinate_spring import measuring_spring
+from ...forces.limit import Limit
+from ...math.vec import quaternion_matrix
+from ...model.force import CoordinateForce, TwoPointForce
+from ...model.geometry import matrix_to_quaternion
+from ...model.model import Model
+from ...numerics.integrators.butcher_tableaux import tableau
+from ...numerics.integrators.time_loop import STATE_ROWS, StepCounts, StepReals, StepState
+from ...results.phases import cumulative_exchanges, energies_at_end
+from ...results.result import Result
+from ...tables import table_definitions as su
+from ...tables.contact_places import rigid_stops
+from ...tables.contact_tables import ContactTables
+from ...tables.reference_configuration import BodyState
+from ...tables.structure_definition import Structure
+from ...tables.table_definitions import BETWEEN, System
+from ...tables.values import Values
+from ..initial_state import InitialState, find_initial_state, initial_state_at
+from ..integration_intervals import Segment
+from ..integration_options import RESTITUTION_LAWS, Stepping
+from .mechanism_step import MIXED_GUESSES, MIXING_ROWS
+from .stepper import Stepper, free_bodies
+from .stepping_tables import (
+    COMPLIANT,
+    COUNTS,
+    DIVIDES_STEPS,
+    GRAVITY,
+    LINE_FRICTION,
+    LINE_LOWER,
+    LINE_RESTITUTION,
+    LINE_ROPE,
+    LINE_STOP,
+    LINE_UPPER,
+    NO_BOUNCE_BELOW,
+    NO_OVERLAP_BELOW,
+    NO_RESTITUTION,
+    POSITION_ITERATIONS,
+    POSITION_TOLERANCE,
+    REALS,
+    REPORTED_RESIDUAL,
+    RESTITUTION_LAW,
+    ROPE_C,
+    ROPE_K,
+    ROPE_LENGTH,
+    SEQUENTIAL,
+    V_AFTER,
+    V_BEFORE,
+    VELOCITY_ITERATIONS,
+    VELOCITY_TOLERANCE,
+    MechanismCounts,
+    MechanismReals,
+    MechanismTables,
+    RunState,
+)
+
+
+@dataclass(frozen=True)
+class BodyPartition:
+    """Names of what moves.
+
+    Attributes
+    ----------
+    free : tuple of str
+        Bodies and sets of bodies on which nothing acts but gravity and contact.
+    held : tuple of str
+        The other bodies.
+    """
+
+    free: tuple[str, ...]
+    held: tuple[str, ...]
+
+
+def partition_bodies(model: Model, values: Values) -> BodyPartition:
+    """Tell free bodies from those of the mechanism, by what the tables of absolute coordinates say acts on them."""
+    S = values.system
+    between = S.forces.family == BETWEEN
+    frames = np.concatenate([S.terms.F, S.terms.M, S.forces.F[between], S.forces.M[between]])
+    used = set(S.frame_body[frames[frames >= 0]].tolist())
+    place = values.structure.place
+    free = tuple(b.name for b in model.bodies if place[b.name] not in used)
+    return BodyPartition(
+        (*free, *(b.name for b in model.bulk)), tuple(b.name for b in model.bodies if place[b.name] in used)
+    )
+
+
+StopBounds = tuple[float, float, float]
+
+
+def mechanism_tables(
+    start: InitialState, bodies: Sequence[str], first: int, h: float, stops: Mapping[str, StopBounds] | None = None
+) -> MechanismTables:
+    """The mechanism's tables for steps of h seconds, at its start.
+
+    Parameters
+    ----------
+    start : Start
+        Of the mechanism alone.
+    bodies : sequence of str
+        Those that are movers, in the order of the movers from number ``first`` on.
+    first : int
+    h : float [s]
+    stops : mapping, optional
+        Forces without any effect that stand for a stop of the coordinate that they act along: name to (lower end, upper
+        end, restitution).
+    """
+    c = start.assembly.compiled
+    s, S = c.structure, c.values.system
+    of, group = velocity_groups(S, s.nv)
+    rows = [s.place[name] for name in bodies]
+    y = np.zeros((STATE_ROWS, len(start.y)))
+    y[0] = start.y
+    width = max(len(start.y) + 1, s.nv, len(S.rows.law), 1)
+    clock = StepState(
+        StepReals.blank(), StepCounts.blank(), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, np.int64)
+    )
+    slopes = np.zeros((len(s.forces), SLOPE_WIDTH))
+    slopes[:, DIRECTIONS] = [force_directions(f) for f in s.forces]
+    springs = int(slopes[:, DIRECTIONS].sum())
+    c.work.options.stabilization, c.work.options.deferred = STEPS, 0.0
+    S = S._replace(force_parameters=S.force_parameters.copy())
+    line, line_x = single_rows(s, S, stops or {})
+    A = MechanismTables(
+        S, c.work, tableau("rk45"), clock, OutputBuffer(np.zeros((4, width))), OutputBuffer(slopes), np.zeros(1, np.int64),
+        real=MechanismReals.blank(), count=MechanismCounts.blank(),
+        mover=np.array([(b, of[b]) for b in rows], np.int64).reshape(-1, 2),
+        group=group, wide=np.zeros((8, s.nv)), lam=np.zeros((3, len(S.rows.law))),
+        spring_x=np.zeros((springs, 10)), spring_J=np.zeros((springs, s.nv)), spring_Y=np.zeros((springs, s.nv)),
+        stiff=np.zeros((springs, springs)), mixing=np.zeros((MIXING_ROWS, s.nv)), weight=np.zeros((MIXED_GUESSES + 1, MIXED_GUESSES + 1)),
+        line=line, line_x=line_x, active=np.zeros((2 * len(line), 3), np.int64),
+        job=np.zeros((0, 3), np.int64), queue=np.zeros(len(group) - 1, np.int64),
+        pose=np.zeros((len(rows), 12)),
+    )  # fmt: skip
+    A.count.first = first
+    A.real.time, A.real.step = start.assembly.t, h
+    return A
+
+
+def single_rows(s: Structure, S: System, stops: Mapping[str, StopBounds]) -> tuple[np.ndarray, np.ndarray]:
+    """What is a single row of the step: stops, ropes, friction in joints. As forces the tables lose them."""
+    line, line_x = [], []
+    for k, e in enumerate(s.forces):
+        x = np.zeros(8)
+        if e.name in stops:
+            kind = LINE_STOP
+            x[[LINE_LOWER, LINE_UPPER, LINE_RESTITUTION]] = stops[e.name]
+        elif e.single == "rope":
+            kind = LINE_ROPE
+            x[[ROPE_K, ROPE_C, ROPE_LENGTH]] = S.force_parameters[k, :3]
+            S.force_parameters[k, :2] = 0.0
+        elif e.single == "friction":
+            kind = LINE_FRICTION
+            x[LINE_LOWER] = S.force_parameters[k, 0]
+            S.force_parameters[k, 0] = 0.0
+        else:
+            continue
+        line.append((kind, S.forces.F[k], k))
+        line_x.append(x)
+    return np.array(line, np.int64).reshape(-1, 3), np.array(line_x).reshape(-1, 8)
+
+
+def force_directions(force) -> int:
+    """How many directions a force changes along: see `equations.slopes`."""
+    return 1 if isinstance(force, (CoordinateForce, TwoPointForce)) else 6
+
+
+def velocity_groups(S: System, nv: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which group each row of the body table is in (-1: it cannot move), and where the velocities of each begin.
+
+    Groups are what rows, measured quantities and forces connect; all is one group where velocities of one are no
+    neighbours.
+    """
+    part = np.arange(nv)
+
+    def root(d: int) -> int:
+        while part[d] != d:
+            part[d] = d = part[part[d]]
+        return d
+
+    def join(several) -> None:
+        several = list(several)
+        for d in several[1:]:
+            a, b = sorted((root(several[0]), root(d)))
+            part[b] = a
+
+    movers = [_moving_velocities(S, b) for b in range(len(S.tree.parent))]
+    for own in movers:
+        join(own)
+    for r in range(len(S.row_start) - 1):
+        join(S.column[S.row_start[r] : S.row_start[r + 1]])
+    for k in np.flatnonzero(S.forces.family == BETWEEN):
+        ends = [S.frame_body[S.forces.F[k]], S.frame_body[S.forces.M[k]]]
+        join(d for b in ends if b >= 0 for d in movers[b])
+    of = np.array([root(d) for d in range(nv)], np.int64)
+    first = np.flatnonzero(np.r_[True, of[1:] != of[:-1]]) if nv else np.zeros(0, np.int64)
+    if len(first) != len(np.unique(of)):
+        of, first = np.zeros(nv, np.int64), np.zeros(1, np.int64)
+    number = np.searchsorted(first, np.arange(nv), side="right") - 1
+    return np.array([number[m[0]] if m else -1 for m in movers], np.int64), np.r_[first, nv].astype(np.int64)
+
+
+def _moving_velocities(S: System, b: int) -> list[int]:
+    """Velocities that move a body."""
+    out: list[int] = []
+    while b >= 0:
+        out += range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b])
+        b = S.tree.parent[b]
+    return out
+
+
+def assembled_start(model: Model, t: float, parameters: Mapping[str, float] | None, before: Result | None) -> Assembly:
+    """All single bodies at the start, in absolute coordinates.
+
+    Raises
+    ------
+    ModelError
+        If the earlier result is of another mechanism.
+    """
+    if before is None:
+        return assemble(model, t=t, parameters=parameters)
+    return find_initial_state(model, t, parameters, before, "absolute").base
+
+
+def with_earlier_energy(result: Result, before: Result | None, part: Segment) -> Result:
+    """A result that counts on what an earlier one exchanged, but for that of a part of a motion."""
+    if before is not None and not part.later:
+        result.begun.done = energies_at_end(before)
+        result.exchanged = cumulative_exchanges(result)
+    return result
+
+
+def start_of_submodel(base: Assembly, model: Model, parameters: Mapping[str, float] | None) -> InitialState:
+    """The start of a model of some of the bodies, where ``base`` has them."""
+    c, whole = compile_mechanism(model, parameters=parameters), base.compiled.structure
+    s = c.structure
+    q, v, z = np.zeros(s.nq), np.zeros(s.nv), c.z.copy()
+    for name, b in s.place.items():
+        if b >= 0:
+            here, there, k = s.tables["tree"], whole.tables["tree"], whole.place[name]
+            q[here.coordinates(b)] = base.q[there.coordinates(k)]
+            v[here.velocities(b)] = base.v[there.velocities(k)]
+    for name, k in s.state_at.items():
+        if name in whole.state_at:
+            z[k] = base.compiled.z[whole.state_at[name]]
+    c.z = z
+    return initial_state_at(Assembly(c, base.t, q, v), parameters, "absolute")
+
+
+def place_body_sets(scene: ContactTables, M: Movers, before: Result) -> None:
+    """Put sets of bodies where the earlier result left them.
+
+    Raises
+    ------
+    ModelError
+        If it has other ones.
+    """
+    names = [n for n in scene.carriers.names if n not in scene.carriers.single]
+    for name in names:
+        at, b = scene.carriers.slices[name], before.bulk.get(name)
+        if b is None or len(b) != at.stop - at.start:
+            raise ModelError(f"the result cannot be gone on with: it has no bodies {name!r}, or another number of them")
+        M.pose[at, :3] = b.position[-1]
+        M.pose[at, 3:] = np.stack(quaternion_matrix(*b.quaternion[-1].T), axis=1)
+        M.twist[at, :3], M.twist[at, 3:] = b.velocity[-1], b.angular_velocity[-1]
+
+
+@dataclass
+class MechanismMotion:
+    """The mechanism of a motion with contact.
+
+    Attributes
+    ----------
+    start : Start
+        Its own, of a model without the free bodies.
+    joints : Joined
+        Its tables in the step.
+    """
+
+    start: InitialState
+    joints: MechanismTables
+    y: list[np.ndarray] = field(default_factory=list)
+    vdot: list[np.ndarray] = field(default_factory=list)
+    lam: list[np.ndarray] = field(default_factory=list)
+    gaps: list[float] = field(default_factory=list)
+    slips: list[float] = field(default_factory=list)
+
+    def add(self, A: MechanismTables, moved: bool) -> None:
+        """Keep where it is now, and mean accelerations and multipliers of the step that led there, if one did."""
+        h = float(A.real.step) if moved else 1.0
+        self.y.append(A.clock.y[0].copy())
+        self.vdot.append((A.wide[V_AFTER] - A.wide[V_BEFORE]) / h)
+        self.lam.append(A.lam[0] + (A.lam[1] + A.lam[2]) / h)
+        s = self.start.assembly.compiled.structure
+        W = self.start.assembly.compiled.work
+        lost = self.start.assembly.compiled.jacobian() @ A.clock.y[0, s.nq : s.nq + s.nv] - W.rows.nu
+        self.gaps.append(float(np.abs(W.rows.value).max(initial=0.0)))
+        self.slips.append(float(np.abs(lost).max(initial=0.0)))
+
+    def into(self, whole: Values, q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Put its coordinates, velocities and accelerations into the whole's; returns the whole's states, multipliers.
+
+        All in absolute coordinates.
+        """
+        own, s = self.start.assembly.compiled.structure, whole.structure
+        y, lam = np.array(self.y), np.array(self.lam)
+        for name, b in own.place.items():
+            if b >= 0:
+                here, there, k = own.tables["tree"], s.tables["tree"], s.place[name]
+                q[:, there.coordinates(k)] = y[:, here.coordinates(b)]
+                v[:, there.velocities(k)] = y[:, own.nq :][:, here.velocities(b)]
+                vdot[:, there.velocities(k)] = np.array(self.vdot)[:, here.velocities(b)]
+        states = np.zeros((len(y), len(s.states)))
+        for name, k in s.state_at.items():
+            if name in own.state_at:
+                states[:, k] = y[:, own.nq + own.nv + own.state_at[name]]
+        out = np.zeros((len(y), len(whole.system.rows.law)))
+        for name, rows in s.slices.items():
+            out[:, rows] = lam[:, own.slices[name]]
+        return states, out
+
+
+def separate_mechanism(
+    whole: Values,
+    t: float,
+    parameters: Mapping[str, float] | None,
+    found: BodyPartition,
+    first: int,
+    base: Assembly | None = None,
+) -> MechanismMotion | None:
+    """The mechanism of a model, if joints, forces or stops hold any of its bodies; ``first`` is its first mover.
+
+    It begins where ``base`` is, or else as described.
+    """
+    if not found.held:
+        return None
+    model = whole.structure.model
+    own = mechanism_model(stops_as_springs(model), found.held)
+    start = (
+        start_of_submodel(base, own, parameters) if base else find_initial_state(own, t, parameters, None, "absolute")
+    )
+    return MechanismMotion(start, mechanism_tables(start, found.held, first, 1.0, stop_bounds(model, whole)))
+
+
+def values_with_stops(model: Model, values: Values, parameters: Mapping[str, float] | None) -> Values:
+    """Tables in which stops are forces, so that what they stop counts as held."""
+    if all(e.acts() for e in model.limits):
+        return values
+    from ...assembly.compiled_mechanism import compile_mechanism
+
+    return compile_mechanism(stops_as_springs(model), parameters=parameters).values
+
+
+# The mechanism without the free bodies and without contact: a model of its own, whose stops are forces of no effect.
+#
+# A stop of a coordinate needs its value and its gradient; a spring of no stiffness along it has them made.
+
+
+def stops_as_springs(model: Model) -> Model:
+    """A copy in which springs of no stiffness stand for stops."""
+    out = model.copy()
+    rigid = [e for e in out.limits if isinstance(e, Limit) and not e.acts()]
+    out.limits = [e for e in out.limits if e.acts()]
+    for e in rigid:
+        del out.by_name[e.name]
+        out.add(measuring_spring(e.name, e.coordinate))
+    return out.snapshot()
+
+
+def stop_bounds(model: Model, values: Values) -> dict[str, StopBounds]:
+    """Stops by name."""
+    return {s.element.name: (s.lower, s.upper, s.restitution) for s in rigid_stops(model, values.given)}
+
+
+def mechanism_model(model: Model, held: Sequence[str]) -> Model:
+    """What of a model with its stops as springs concerns the bodies ``held``, without shapes that touch."""
+    out = model.copy()
+    gone = {b.name for b in out.bodies} - set(held)
+    gone |= {f.name for f in out.frames if f.body in gone}
+    for name in ("contacts", "bulk", "ground", "materials", "material_pairs"):
+        gone |= {e.name for e in getattr(out, name)}
+        setattr(out, name, [])
+    out.bodies = [b for b in out.bodies if b.name not in gone]
+    out.frames = [f for f in out.frames if f.name not in gone]
+    out.initial = [e for e in out.initial if e.name.partition(".")[0] not in gone]
+    lost = [s for s in out.sensors if any(body in gone for body in _sensor_bodies(s))]
+    out.sensors = [s for s in out.sensors if s not in lost]
+    for name in (*gone, *(s.name for s in lost)):
+        out.by_name.pop(name, None)
+    return out.snapshot()
+
+
+def _sensor_bodies(sensor) -> list[str]:
+    """Names that a sensor measures something of."""
+    texts = [getattr(sensor, k, None) for k in ("of", "frame")]
+    return [t.partition(".")[0] for t in texts if isinstance(t, str)]
+
+
+CONTACT_MARGIN = 0.01  # gap up to which what does not approach is a contact, in parts of the smallest shape
+NO_OVERLAP = 1e-9  # overlap that is none, in parts of the smallest shape
+SLOW_CONTACT = 1e-6  # speed [m/s] below which nothing bounces, whatever gravity is
+DEFAULT_ITERATIONS = {"auto": 30, "newton": 100, "gauss-seidel": 50, "admm": 200}
+"""Most iterations by solver, where nobody says how many; of the others `OTHER_ITERATIONS`."""
+COARSE_FACTOR = (
+    100.0  # times the tolerance that a solve which is cut may leave without a word; or what a body falls faster
+)
+OTHER_ITERATIONS, DEFAULT_POSITION_ITERATIONS, DEFAULT_SOLVER_STEPS = 150, 25, 100
+
+
+def smallest_radius(scene: ContactTables, values: Values) -> float:
+    """Radius [m] of the smallest shape; the mechanism's length where all are without end."""
+    sizes = scene.geometry.shape_x[:, RADIUS]
+    bounded = sizes[np.isfinite(sizes)]
+    return float(bounded.min() if len(bounded) else values.length)
+
+
+def movers_of_assembly(scene: ContactTables, base: Assembly) -> Movers:
+    """Movers where the assembled mechanism has them; sets of bodies are as described."""
+    return place_movers(scene, base.compiled.moving(base.t, base.q, base.v))
+
+
+def place_movers(scene: ContactTables, bodies: Mapping[str, BodyState]) -> Movers:
+    """Movers where the single bodies are; sets of bodies are as described."""
+    M = Movers(scene.carriers.movers.pose.copy(), scene.carriers.movers.twist.copy())
+    for name, b in bodies.items():
+        k = scene.carriers.slices[name].start
+        M.pose[k] = np.r_[b.p, b.R.ravel()]
+        M.twist[k] = np.r_[b.v, b.w]
+    return M
+
+
+def make_stepper(
+    scene: ContactTables, M: Movers, values: Values, o: Stepping, held: MechanismMotion | None = None
+) -> Stepper:
+    """The stepper at the start."""
+    planar = values.structure.model.planar
+    real, count = np.zeros(REALS), np.zeros(COUNTS, np.int64)
+    real[GRAVITY : GRAVITY + 3] = values.system.gravity
+    size = smallest_radius(scene, values)
+    real[NO_BOUNCE_BELOW], real[NO_OVERLAP_BELOW] = SLOW_CONTACT, NO_OVERLAP * size
+    real[VELOCITY_TOLERANCE], real[POSITION_TOLERANCE] = o.tolerance, o.tolerance
+    real[REPORTED_RESIDUAL] = max(
+        float(np.sqrt((real[GRAVITY : GRAVITY + 3] ** 2).sum())), COARSE_FACTOR * o.tolerance / o.longest
+    )
+    usual = DEFAULT_ITERATIONS.get(o.solver, OTHER_ITERATIONS)
+    count[VELOCITY_ITERATIONS], count[POSITION_ITERATIONS] = (
+        o.iterations or usual,
+        o.position_iterations or max(DEFAULT_POSITION_ITERATIONS, usual // 2),
+    )
+    law = RESTITUTION_LAWS.index(o.restitution) + 1
+    count[RESTITUTION_LAW] = (
+        law if (np.nan_to_num(scene.surfaces.pair[..., su.RESTITUTION]) > 0.0).any() else NO_RESTITUTION
+    )
+    n = len(M.pose) - (len(held.joints.mover) if held else 0)
+    turn = matrix_to_quaternion(M.pose[:n, 3:].reshape(-1, 3, 3))
+    free = free_bodies(scene.carriers.mass[:n], scene.carriers.inertia[:n], turn, planar)
+    count[DIVIDES_STEPS] = o.step is None
+    count[SEQUENTIAL] = o.impacts == "sequential"
+    count[COMPLIANT] = (np.nan_to_num(scene.surfaces.pair[..., [su.STIFFNESS, su.MODULUS]]) > 0.0).any()
+    pace = RunState(real, count, np.zeros(8, np.int64))
+    joints = held.joints if held else None
+    at, twist, margin = M.pose[:n, :3], M.twist[:n], CONTACT_MARGIN * size
+    stepper = Stepper(scene.geometry, free, at, twist, scene.surfaces, pace, margin, o.solver, joints)
+    choices = stepper.workspaces.O.count
+    choices.coulomb = o.coulomb
+    choices.most_steps = DEFAULT_SOLVER_STEPS if o.iterations is None else 0
+    return stepper

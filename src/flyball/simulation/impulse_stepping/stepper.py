@@ -1,0 +1,322 @@
+"""The stepper: calls the compiled loop of steps, and makes, enlarges and keeps its tables."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...collision.contact_finder import ContactFinder
+from ...collision.tables import DONE, Contacts, Geometry, Movers
+from ...engine.entry_point import engine
+from ...numerics.complementarity.contact_problem import (
+    ContactProblem,
+    ContactState,
+    ContactWorkspace,
+    SolverSettings,
+    allocate_solver,
+    empty_problem,
+)
+from ...tables.table_definitions import Surfaces
+from .free_bodies import rotation_matrices
+from .mechanism_step import mechanism_kernel
+from .step_loop import StepSolvers, bind_solvers, solver_counts, step_loop_kernel
+from .stepping_tables import (
+    ADDRESS_MECHANISM,
+    ADDRESS_SEARCH,
+    DIVIDES_STEPS,
+    FREE_INERTIA,
+    FREE_INVERSE,
+    FREE_MASS,
+    FREE_PER_MASS,
+    FREE_ROUND,
+    GRAVITY,
+    HISTORY_COLUMNS,
+    LONGEST_STEP,
+    NO_SOLUTION,
+    STEP,
+    STEP_TOO_LONG,
+    STEPS_LEFT,
+    STEPS_TAKEN,
+    TABLES_FULL,
+    TASK_START,
+    VELOCITY_TOLERANCE,
+    ContactHistory,
+    FreeBodies,
+    MechanismTables,
+    RunState,
+    no_mechanism,
+)
+
+CALL_SECONDS = 0.05  # seconds that a call of the loop should take
+
+
+MOST_STEPS_PER_CALL = 100_000  # steps of a call at most
+MOST_HALVINGS = 6  # of a step that cannot be taken whole
+MOST_IMPACT_HALVINGS = 12  # halvings of a step that is too long for the impacts of contacts that give way
+REST_SHARE = 1e-2  # of the velocity that gravity makes in a step: a larger residual is not enough
+GROWTH_FACTOR = 1.5  # times as much room as was needed, when there is none
+
+
+class NoSolution(Exception):
+    """The mechanism cannot go on: its equations have no solution, or its joints cannot be closed."""
+
+
+class StepTooLong(Exception):
+    """The step does not resolve an impact of contacts that give way."""
+
+
+@dataclass
+class StepWorkspaces:
+    """What is as large as the number of contacts."""
+
+    P: ContactProblem
+    Q: ContactProblem
+    R: ContactProblem
+    X: ContactState
+    Y: ContactState
+    Z: ContactState
+    E: ContactState
+    W: ContactWorkspace
+    O: SolverSettings
+    F: StepSolvers
+    T: ContactHistory
+    U: ContactHistory
+
+
+def make_workspaces(
+    contacts: int,
+    node: np.ndarray,
+    turning: bool,
+    A: MechanismTables,
+    pace: RunState,
+    solver: str,
+    old: StepWorkspaces | None = None,
+) -> StepWorkspaces:
+    """Rooms for as many contacts; what is remembered of contacts, and velocities, are taken over from ``old``."""
+    groups, lines = len(A.group) - 1, len(A.active)
+    P = empty_problem(contacts, len(node), groups, lines, int(A.count.needed), turning)._replace(node=node)
+    P.group[:] = A.group
+    hard = {"mu": np.zeros(contacts), "soft": np.zeros(contacts), "turn": np.zeros((0, 2))}
+    Q = P._replace(bias=np.zeros((contacts, 3)), **hard)
+    R = P._replace(at=np.zeros((contacts, 2), np.int64), bias=np.zeros((contacts, 3)), least=np.zeros(contacts))
+    X, W, O, _ = allocate_solver(P)
+    Y, E = allocate_solver(Q)[0], allocate_solver(P)[0]
+    if old is not None:
+        X.v[:], X.wide[:] = old.X.v, old.X.wide
+        O = old.O
+    Z = allocate_solver(P)[0]._replace(v=X.v, wide=X.wide)
+    F = bind_solvers(solver, (P, Q, R), X, W, O, pace)
+    kept = [np.zeros((contacts, HISTORY_COLUMNS)) for _ in range(2)]
+    if old is not None:
+        for a, b in zip(kept, (old.T.kept, old.U.kept), strict=True):
+            a[: len(b)] = b
+        solver_counts(F)[:] += solver_counts(old.F)
+    return StepWorkspaces(P, Q, R, X, Y, Z, E, W, O, F, ContactHistory(kept[0]), ContactHistory(kept[1]))
+
+
+def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar: bool) -> FreeBodies:
+    """Tables of free bodies.
+
+    Parameters
+    ----------
+    mass : (n,) [kg]
+    inertia : (n, 3, 3) [kg m^2]
+        About the mass centre, in body axes; in the plane its last entry counts.
+    turn : (n, 4)
+        Unit quaternions, body axes to the world.
+    planar : bool
+    """
+    n = len(mass)
+    body = np.zeros((n, 16))
+    body[:, FREE_MASS], body[:, FREE_PER_MASS] = mass, 1.0 / mass
+    if planar:  # torques are about z only: as if it were round
+        inertia = inertia[:, 2, 2, None, None] * np.eye(3)
+    inverse = np.linalg.inv(inertia)
+    for first, J in ((FREE_INERTIA, inertia), (FREE_INVERSE, inverse)):
+        for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
+            body[:, first + k] = J[:, i, j]
+    size = np.trace(inertia, axis1=1, axis2=2) / 3.0
+    odd = np.abs(inertia - size[:, None, None] * np.eye(3)).max(axis=(1, 2), initial=0.0)
+    body[:, FREE_ROUND] = odd <= 1e-12 * size
+    return FreeBodies(body, turn.copy(), np.zeros((n, 8)), np.zeros((n, 8)), np.zeros((n, 18)))
+
+
+def problem_nodes(free: FreeBodies) -> np.ndarray:
+    """Nodes of the cone problem; those of bodies that are not round are filled in every step."""
+    out = np.zeros((len(free.body), 8))
+    out[:, 0] = free.body[:, FREE_PER_MASS]
+    out[:, 1:7] = free.body[:, FREE_INVERSE : FREE_INVERSE + 6]
+    out[:, 7] = free.body[:, FREE_ROUND]
+    return out
+
+
+class Stepper:
+    """Free bodies, shapes and laws on the way through time.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    free : Free
+        Movers 0 to n - 1.
+    position : (n, 3) [m]
+        Of the mass centres.
+    velocity : (n, 6) [m/s, rad/s]
+        Of the mass centres, and angular velocities, along the world's axes.
+    laws : Surfaces
+    pace : Pace
+        With time, choices and the solvers' addresses; that of the search is put in here.
+    margin : float [m]
+        Gap up to which what does not approach is a contact.
+    solver : str
+        Of the cone problems, by its name in ``numerics/complementarity/solver_choice.py``.
+    joints : Joined, optional
+        What joints hold together: the movers behind the free bodies.
+    """
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        free: FreeBodies,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        laws: Surfaces,
+        pace: RunState,
+        margin: float,
+        solver: str = "auto",
+        joints: MechanismTables | None = None,
+    ) -> None:
+        n = len(free.body)
+        self.geometry, self.laws, self.pace = geometry, laws, pace
+        self.joints = no_mechanism() if joints is None else joints
+        count = n + len(self.joints.mover)
+        self.free = free._replace(start=np.zeros((count, 18)))
+        self.movers = Movers(np.zeros((count, 12)), np.zeros((count, 6)))
+        self.movers.pose[:n, :3] = position
+        self.movers.pose[:n, 3:] = rotation_matrices(free.turn)
+        self.movers.twist[:n] = velocity
+        self.finder = ContactFinder(geometry, margin=margin)
+        turning = bool((laws.pair[..., 3:5] > 0.0).any())
+        self.solver = solver
+        self.workspaces = make_workspaces(
+            len(self.finder.now.at), problem_nodes(free), turning, self.joints, pace, solver
+        )
+        self.workspaces.X.v[:, :6] = velocity
+        self.turning = turning
+        self.quota = 1
+        self.enough = float(
+            pace.real[VELOCITY_TOLERANCE]
+        )  # residual of velocities [m/s] in a step that is not very short
+        self.halved = 0  # steps that were taken in shorter ones
+        if joints is not None:
+            self._start_joints()
+
+    def _start_joints(self) -> None:
+        """The mechanism at its start."""
+        self.joints.door[0] = engine.address
+        self.pace.door[ADDRESS_MECHANISM] = mechanism_kernel.address
+        if (
+            mechanism_kernel(
+                self.joints, self.movers, self.finder.now, self.workspaces.P, self.workspaces.X, TASK_START
+            )
+            != 0
+        ):
+            raise NoSolution
+
+    def run(self, steps: int, h: float) -> None:
+        """Take as many steps of h seconds, in calls that take so long that an interrupt comes through.
+
+        A step that the mechanism cannot take is taken in shorter ones; ``pace.real[STEP]`` is the last one's length.
+
+        Raises
+        ------
+        ModelError
+            What the search cannot go on with.
+        NoWay
+            If no shorter steps can be taken either.
+        """
+        count = self.pace.count
+        while steps > 0:
+            began = time.perf_counter()
+            asked = count[STEPS_LEFT] = min(steps, self.quota)
+            self.pace.real[LONGEST_STEP] = h
+            self._next(h)
+            try:
+                self._call_loop()
+            except (NoSolution, StepTooLong) as reason:
+                left = int(count[STEPS_LEFT])
+                stuck = isinstance(reason, NoSolution)
+                self._in_halves(h, MOST_HALVINGS if stuck else MOST_IMPACT_HALVINGS)
+                self.halved += stuck
+                count[STEPS_LEFT] = left - 1
+            steps -= int(asked - count[STEPS_LEFT])
+            took = max(time.perf_counter() - began, 1e-6)
+            self.quota = int(max(1, min(4 * self.quota, self.quota * CALL_SECONDS / took, MOST_STEPS_PER_CALL)))
+
+    def _next(self, h: float) -> None:
+        """Length of the steps that follow, and the residual of their velocities that is enough.
+
+        In a step so short that gravity makes no more velocity than that, what rests would not be held.
+        """
+        real = self.pace.real
+        falls = REST_SHARE * h * float(np.linalg.norm(real[GRAVITY : GRAVITY + 3]))
+        real[STEP], real[VELOCITY_TOLERANCE] = h, min(self.enough, falls) if falls > 0.0 else self.enough
+
+    def _in_halves(self, h: float, depth: int) -> None:
+        """Take a step of h, which cannot be taken, as two; at the last depth as best as it can be."""
+        if depth == 0:
+            raise NoSolution
+        divides = int(self.pace.count[DIVIDES_STEPS])
+        for _ in range(2):
+            self._next(0.5 * h)
+            self.pace.count[STEPS_LEFT] = 1
+            self.joints.count.accept_unsettled = depth == 1
+            self.pace.count[DIVIDES_STEPS] = divides and depth > 1
+            try:
+                self._call_loop()
+            except (NoSolution, StepTooLong):
+                self._in_halves(0.5 * h, depth - 1)
+        self.joints.count.accept_unsettled = 0
+        self.pace.count[DIVIDES_STEPS] = divides
+
+    def _call_loop(self) -> None:
+        """Take ``pace.count[LEFT]`` steps, enlarging tables that are full."""
+        self.pace.door[ADDRESS_SEARCH] = self.finder.address
+        while True:
+            r, f = self.workspaces, self.finder
+            a, b = f.now, f.before
+            status = step_loop_kernel(
+                self.geometry, self.joints, self.movers, a, b, f.midway, f.search, r.P, r.Q, r.R, r.X, r.Y, r.Z, r.E,
+                r.W, r.O, r.F, self.free, self.laws, self.pace, r.T, r.U,
+            )  # fmt: skip
+            if status == DONE:
+                return
+            if status == NO_SOLUTION:
+                raise NoSolution
+            if status == STEP_TOO_LONG:
+                raise StepTooLong
+            if status == TABLES_FULL:
+                self._enlarge_row_tables()
+                continue
+            f.enlarge(status, (a if self.pace.count[STEPS_TAKEN] % 2 == 0 else b).count)
+            if len(f.now.at) > len(r.P.mu):
+                self.workspaces = self._enlarged_workspaces(len(f.now.at))
+
+    def _enlarge_row_tables(self) -> None:
+        """More room for rows of contacts on the mechanism."""
+        A = self.joints
+        A.count.needed = int(GROWTH_FACTOR * A.count.needed)
+        self.joints = A._replace(job=np.zeros((int(GROWTH_FACTOR * A.count.jobs) + 1, 3), np.int64))
+        self.workspaces = self._enlarged_workspaces(len(self.workspaces.P.mu))
+
+    def _enlarged_workspaces(self, contacts: int) -> StepWorkspaces:
+        """Rooms for as many contacts, which go on from those that are there."""
+        r = self.workspaces
+        return make_workspaces(contacts, r.P.node, self.turning, self.joints, self.pace, self.solver, r)
+
+    def last(self) -> tuple[Contacts, np.ndarray]:
+        """Contacts of the last step, and what is remembered of them."""
+        if self.pace.count[STEPS_TAKEN] % 2 == 1:
+            return self.finder.now, self.workspaces.T.kept
+        return self.finder.before, self.workspaces.U.kept

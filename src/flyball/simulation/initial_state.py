@@ -1,0 +1,554 @@
+"""Initial state: consistent positions and velocities at the start, and the coordinates of the motion.
+
+The start is assembled as described, or is where an earlier result ended. Absolute or joint coordinates are chosen
+by estimated cost. For coordinate partitioning the independent coordinates are chosen here first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..assembly.assemble import assemble
+from ..assembly.assembled_state import Assembly
+from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from ..engine.entry_point import MOTION
+from ..engine.kinematics import turned_angles
+from ..errors import AnalysisError, ModelError
+from ..mobility.mobility import mobility
+from ..model.event import Set
+from ..model.model import Model
+from ..results.diagnostics import undetermined_event_forces, undetermined_loads
+from ..results.phases import MotionStart, energies_at_end
+from ..results.recorded_kinematics import extra_turns
+from ..results.result import Result
+from ..tables.constraint_rows import declared_switches
+from ..tables.coordinate_choice import least_cost, right_hand_side_cost, spanning_joints
+from ..tables.element_numbers import shape_files
+from ..tables.law_inputs import forces_in_events, nonsmooth_elements
+from ..tables.reference_configuration import BodyState
+from ..tables.structure import is_outdated
+from ..tables.structure_definition import Structure, velocity_names
+from ..tables.table_definitions import COUPLED, POINT, VALUE
+from ..tables.values import values_of
+from .integration_intervals import Segment, whole_motion
+from .solver_switching import CodeSelection, StiffnessMonitor
+
+COORDINATES = ("auto", "absolute", "joint")
+THIN_INERTIA = 1e-7  # inertia of a coordinate, as part of that of the mechanism's mass at its length, that is none
+SINGULAR_MASS = 1e-13  # least eigenvalue of the mass matrix with a unit diagonal: below it lie rounding errors
+MOST_AVOIDED = 8  # joints that are taken out of the forest, one after the other, before it is given up
+UNSOLVED = 1e-9  # what the solve may leave of the equations at the start
+
+
+def choose_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | None) -> tuple[Assembly, str]:
+    """The assembled start in the coordinates to be used, and what they are and why.
+
+    Parameters
+    ----------
+    a : Assembly
+        In absolute coordinates.
+    wish : str
+        One of `COORDINATES`.
+    parameters : mapping, optional
+        As for assembly.
+
+    Raises
+    ------
+    ModelError
+        For an unknown wish.
+    AnalysisError
+        If friction or an event follows reactions that redundancy leaves undetermined, for joint coordinates: there a
+        tree joint would carry all, here what redundant joints carry is chosen by the size of their rows.
+    """
+    refuse_unknown_coordinates(wish)
+    if wish == "absolute":
+        return a, "absolute: as asked for"
+    if why := _indeterminate_loads(a):
+        if wish == "joint":
+            raise AnalysisError(
+                f"{a.compiled.structure.model.name!r} has no motion of its own in joint coordinates: {why}"
+            )
+        return a, f"absolute: {why}"
+    here = _evaluation_cost(a.compiled.structure)
+    c, why = _sound_forest(a, parameters, here if wish == "auto" else np.inf)
+    if c is None:
+        return a, f"absolute: {why}"
+    if wish == "auto":
+        there = _evaluation_cost(c.structure)
+        if here <= there:
+            return a, f"absolute: {_size_in_words(a.compiled)} cost less than {_size_in_words(c)} in joint coordinates"
+        why = f"{_size_in_words(c)} cost less than {_size_in_words(a.compiled)} in absolute coordinates"
+    else:
+        why = "as asked for"
+    q, v = c.take(a.compiled, a.t, a.q, a.v)
+    return replace(a, compiled=c, q=q, v=v), f"joint: {why}{_cut_joints(c)}"
+
+
+def _evaluation_cost(s: Structure) -> float:
+    return s.kept.get("cost", None, 1, partial(right_hand_side_cost, s))
+
+
+def _indeterminate_loads(a: Assembly) -> str:
+    """Why friction, or an event that names what a joint carries, needs absolute coordinates, if it does."""
+    s = a.compiled.structure
+    if not s.loads and not forces_in_events(s.model):
+        return ""
+    m = mobility(s.model, a)
+    found = [f.title for f, _ in undetermined_loads(s.loads, m.undetermined)]
+    found += [f"an event on {name!r}" for name, _ in undetermined_event_forces(s.model, m.undetermined)]
+    if not found:
+        return ""
+    titles = ", ".join(found)
+    names = ", ".join(m.redundant[:8])
+    return (
+        f"{titles} follow{'s' if len(found) == 1 else ''} reactions that the constraints of {names} leave open; "
+        f"what each carries is then a choice (the least for its size), which is made for rows"
+    )
+
+
+def refuse_unknown_coordinates(wish: str) -> None:
+    """Refuse unknown coordinates."""
+    if wish not in COORDINATES:
+        raise ModelError(f"unknown coordinates {wish!r}; choose one of {', '.join(COORDINATES)}")
+
+
+def _size_in_words(c: CompiledMechanism) -> str:
+    return f"{c.structure.nv} velocities with {len(c.structure.rows)} rows"
+
+
+def _cut_joints(c: CompiledMechanism) -> str:
+    """Joints that close loops."""
+    s = c.structure
+    cut = [j.name for j in s.model.joints if j.name not in s.tree_joints]
+    if not cut:
+        return ""
+    return f"; rows remain for {', '.join(cut[:8])}" + (f" and {len(cut) - 8} more" if len(cut) > 8 else "")
+
+
+def _sound_forest(
+    a: Assembly, parameters: Mapping[str, float] | None, most: float = np.inf
+) -> tuple[CompiledMechanism | None, str]:
+    """A forest that is sound where the mechanism starts and may cost less than ``most``; else none, and why."""
+    model = a.compiled.structure.model
+    avoided: list[str] = []
+    for _ in range(MOST_AVOIDED):
+        tree = spanning_joints(model, avoided)
+        if not tree:
+            what = " that has inertia along its coordinates" if avoided else ""
+            return None, f"no joint{what} can be a tree joint"
+        if model.kept.get("least", tree, MOST_AVOIDED, partial(least_cost, model, tree)) > most:
+            return None, f"{_size_in_words(a.compiled)} cost less than the mass matrix alone in joint coordinates"
+        c = compile_mechanism(model, parameters=parameters, tree=tree)
+        bad = _massless_tree_joint(c, a)
+        if bad is None:
+            return c, ""
+        if bad not in c.structure.tree_joints:
+            return None, (
+                f"{bad} has no inertia, or less than {THIN_INERTIA:g} of that of the whole mass at the mechanism's length, "
+                f"and no joint that could be a tree joint"
+            )
+        avoided.append(bad)
+    return None, f"along {', '.join(avoided)} hardly any inertia moves"
+
+
+def _massless_tree_joint(c: CompiledMechanism, a: Assembly) -> str | None:
+    """A tree joint along whose coordinates hardly any inertia moves, or a body that hangs by none and has none.
+
+    Each may move inertia alone and several together none, as a body without inertia that turns about its mass centre
+    while its neighbour keeps its place. The factorisation then divides by rounding errors, or by zero.
+    """
+    s, S = c.structure, c.values.system
+    if S.scales.semidefinite == 0.0 or S.sizes.solver != COUPLED or not s.nv:
+        return None
+    q, v = c.take(a.compiled, a.t, a.q, a.v)
+    c.at(a.t, q, v, MOTION)
+    names = [*s.tree_joints, *s.place]
+    roots = [(b,) if b >= 0 and S.tree.joint[b] <= POINT else () for b in s.place.values()]
+    of = np.full(s.nv, -1)
+    for k, links in enumerate([*(t.links for t in s.tree_joints.values()), *roots]):
+        for b in links:
+            of[S.tree.v[b] : S.tree.v[b] + S.tree.nv[b]] = k
+    row, column, _ = S.mass_entries
+    own = of[row] == of[column]
+    M: dict[int, dict[tuple[int, int], float]] = {}
+    for i, j, x in zip(
+        row[own].tolist(),
+        column[own].tolist(),
+        (c.work.M[own] * c.sizes[row[own]] * c.sizes[column[own]]).tolist(),
+        strict=True,
+    ):
+        M.setdefault(int(of[i]), {})[i, j] = x
+    size = S.bodies.mass.sum() * c.values.length**2
+    for k in sorted(M):
+        first = min(i for i, _ in M[k])
+        block = np.zeros((max(i for i, _ in M[k]) - first + 1,) * 2)
+        for (i, j), x in M[k].items():
+            block[i - first, j - first] = block[j - first, i - first] = x
+        if np.linalg.eigvalsh(block)[0] < THIN_INERTIA * size:
+            return names[k]
+    whole = np.zeros((s.nv, s.nv))
+    whole[row, column] = whole[column, row] = c.work.M
+    scale = 1.0 / np.sqrt(whole.diagonal())
+    least, moves = np.linalg.eigh(scale[:, None] * whole * scale)
+    return names[of[np.argmax(np.abs(moves[:, 0]))]] if least[0] < SINGULAR_MASS else None
+
+
+MOST_STARTS = 4  # starts of the same numbers whose coordinates are kept
+
+
+@dataclass
+class InitialState:
+    """A consistent start in the coordinates of the motion."""
+
+    base: Assembly  # in absolute coordinates
+    assembly: Assembly
+    y: np.ndarray
+    coordinates: str  # which they are, and why
+    wound: dict[str, float]  # body -> whole turns that its coordinates count and its angle does not (`Result.wound`)
+    engine: CodeSelection | None = None  # what the motion is computed by; table-driven if none
+    before: Result | None = None  # what it goes on from
+    pace: StiffnessMonitor | None = None  # whether it goes on by another method; none: it does not
+    since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
+    part: Segment = field(default_factory=whole_motion)  # of the motion
+
+    def again(self, part: Segment) -> InitialState:
+        """The same with arrays and scratch of its own; it is of a mechanism as described, with nothing before it."""
+        base = self.base.again()
+        a = base if self.assembly is self.base else self.assembly.again()
+        return InitialState(base, a, self.y.copy(), self.coordinates, dict(self.wound), part=part)
+
+    @property
+    def carried(self) -> Mapping[str, Any]:
+        """What the part of the motion before this one hands on; nothing where there is none."""
+        return self.before.carried if self.part.later and self.before is not None else {}
+
+
+def start_time(t_start: float | None, before: Result | None) -> float:
+    """When a motion begins.
+
+    Raises
+    ------
+    ModelError
+        If an earlier result and a time both say when, or that is no result.
+    """
+    if before is None:
+        return 0.0 if t_start is None else t_start
+    if not isinstance(before, Result):
+        raise ModelError(f"start is a result of simulate, not {type(before).__name__}")
+    if t_start is not None:
+        raise ModelError("a motion that goes on from a result starts where that ended: leave out t_start, or start")
+    return before.final[0]
+
+
+def find_initial_state(
+    model: Model,
+    t: float,
+    parameters: Mapping[str, float] | None,
+    before: Result | None,
+    coordinates: str,
+    *,
+    switches: bool = False,
+    part: Segment | None = None,
+) -> InitialState:
+    """Assemble, or go on from an earlier result; choose coordinates.
+
+    With ``switches`` there are rows for what holds at times (`tables.switches`), all off; else nothing holds, and
+    friction goes by the sign of the rate. ``part`` says which part of a motion it is: a later one has the coordinates,
+    and the parameters, of the one before it.
+
+    Raises
+    ------
+    AssemblyError
+        If the start cannot be made consistent.
+    ModelError
+        If a body can move without inertia, or the earlier result is of another mechanism.
+    """
+    part = part or whole_motion()
+    if before is not None or parameters or not model.frozen:
+        return _computed_state(model, t, parameters, before, coordinates, switches, part)
+    key = float(t).hex(), coordinates, switches
+    known: InitialState | None = model.kept.known("begun", key)
+    if known is not None and is_outdated(known.base.compiled.structure):
+        model.kept.drop("begun", key)
+        known = None
+    if known is None:
+        found = _computed_state(model, t, None, None, coordinates, switches, part)
+        if _reproducible(found.base.compiled.structure):
+            model.kept.get("begun", key, MOST_STARTS, lambda: found.again(whole_motion()))
+        return found
+    return known.again(part)
+
+
+def _computed_state(
+    model: Model,
+    t: float,
+    parameters: Mapping[str, float] | None,
+    before: Result | None,
+    coordinates: str,
+    switches: bool,
+    part: Segment,
+) -> InitialState:
+    """Where it begins, found from the description."""
+    if before is not None and before.phases is not None:
+        set_by_events = _set_by_events(model, before)
+        parameters = {**(parameters or {}), **set_by_events} if part.later else {**set_by_events, **(parameters or {})}
+    base = _absolute_state(model, t, parameters, before)
+    if part.later and before is not None:
+        return replace(_in_same_coordinates(base, parameters, before, switches), part=part)
+    if base.compiled.values.system.scales.semidefinite > 0.0:
+        mobility(model, base, inertia=True)
+    return replace(initial_state_at(base, parameters, coordinates, before, switches=switches), part=part)
+
+
+def _reproducible(s: Structure) -> bool:
+    """Whether what is made of it is what would be made of it now: no file is read, no Python function called."""
+    return not s.functions and not shape_files(s.model)
+
+
+def _in_same_coordinates(
+    base: Assembly, parameters: Mapping[str, float] | None, before: Result, switches: bool
+) -> InitialState:
+    """Go on in the coordinates that an earlier part has."""
+    model, tree = base.compiled.structure.model, before.values.structure.tree
+    c = compile_mechanism(model, parameters=parameters, tree=tree) if tree else base.compiled.again()
+    nq, nv = c.structure.nq, c.structure.nv
+    y = before.final[1]
+    a = Assembly(c, base.t, y[:nq].copy(), y[nq : nq + nv].copy())
+    if switches:
+        a = add_switches(a, parameters)
+    y = _final_state(before, a)
+    _restore_modes(before, a)
+    return InitialState(base, a, y, before.health.coordinates, _whole_turns(base, a, y), before=before)
+
+
+def _set_by_events(model: Model, before: Result) -> dict[str, float]:
+    """Parameters that events set in an earlier motion, or in one that it went on from, as they were at its end.
+
+    States of controllers that events set are part of the state that it ended in.
+    """
+    assert before.phases is not None
+    names = {a.parameter for e in model.events for a in e.do if isinstance(a, Set)} & model.parameters.keys()
+    if not names:
+        return {}
+    env, last = compile_mechanism(model).values.env, before.phases.all[-1].values.env
+    return {k: float(last[k]) for k in sorted(names) if last.get(k, env[k]) != env[k]}
+
+
+def initial_state_at(
+    base: Assembly,
+    parameters: Mapping[str, float] | None,
+    coordinates: str,
+    before: Result | None = None,
+    *,
+    switches: bool = False,
+) -> InitialState:
+    """Begin where the mechanism is assembled already; choose coordinates."""
+    refuse_unknown_coordinates(coordinates)
+    x = base.compiled.values
+    key = coordinates, float(base.t).hex(), base.y.tobytes(), switches
+    found = x.unforced.kept.get(
+        "begun", key, MOST_STARTS, lambda: _initial_state_of(base, coordinates, parameters, switches)
+    )
+    if found.assembly.compiled.values is found.base.compiled.values:
+        a = base
+    elif found.base.compiled.values is x:
+        a = found.assembly.again()
+    else:
+        c = found.assembly.compiled
+        own = CompiledMechanism(values_of(c.structure, x.given), c.z, dict(parameters or {}))
+        a = replace(found.assembly.again(), compiled=own.again())
+    if before is None:
+        return InitialState(base, a, a.y, found.coordinates, dict(found.wound))
+    y = _final_state(before, a)
+    _restore_modes(before, a)
+    return InitialState(base, a, y, found.coordinates, _whole_turns(base, a, y), before=before)
+
+
+def _initial_state_of(
+    base: Assembly, wish: str, parameters: Mapping[str, float] | None, switches: bool
+) -> InitialState:
+    a, why = choose_coordinates(base, wish, parameters)
+    if switches:
+        a = add_switches(a, parameters)
+    found = InitialState(base, a, a.y, why, _whole_turns(base, a, a.y))
+    return replace(found, base=base.again(), assembly=a.again())  # without the scratch
+
+
+def _restore_modes(before: Result, a: Assembly) -> None:
+    """What held where an earlier result ended holds on."""
+    s, W = a.compiled.structure, a.compiled.work
+    old = before.values.structure
+    if before.phases is None or [x.element.name for x in s.switches] != [x.element.name for x in old.switches]:
+        return
+    last = before.phases.all[-1]
+    W.modes.mode[:], W.modes.hold[:] = last.modes.mode, last.modes.hold
+    W.sensed[VALUE, W.sensed.shape[1] - len(s.switches) :] = last.sigma if last.sigma.ndim == 1 else last.sigma[:, -1]
+
+
+def add_switches(a: Assembly, parameters: Mapping[str, float] | None) -> Assembly:
+    """The same with the rows that have modes, all off, if there are any."""
+    s = a.compiled.structure
+    if not declared_switches(s.model) and not s.model.events and not nonsmooth_elements(s.model):
+        return a
+    c = compile_mechanism(s.model, parameters=parameters, tree=s.tree, switches=True)
+    c.follow(a.compiled.hints)
+    return replace(a, compiled=c)
+
+
+def _whole_turns(base: Assembly, a: Assembly, y: np.ndarray) -> dict[str, float]:
+    s = a.compiled.structure
+    if not s.tree or not s.model.planar or (base.compiled.drawn(base.q) and a.compiled.drawn(y[: s.nq])):
+        return {}
+    q, c = y[: s.nq], a.compiled
+    c.at(a.t, q, np.zeros(s.nv))
+    base.compiled.at(base.t, base.q, base.v)
+    angles = turned_angles(base.compiled.values, base.compiled.work, base.q)
+    return extra_turns(turned_angles(c.values, c.work, q), angles)
+
+
+def _absolute_state(model: Model, t: float, parameters: Mapping[str, float] | None, before: Result | None) -> Assembly:
+    """Where to start from, in absolute coordinates: assembled as described, or where an earlier result ended."""
+    if before is None:
+        return assemble(model, t=t, parameters=parameters)
+    old = before.values.structure
+    c = compile_mechanism(model, parameters=parameters, tree=old.tree, switches=before.phases is not None)
+    y = before.state_at_end(c)
+    nq, nv = c.structure.nq, c.structure.nv
+    q, v, c.z = y[:nq], y[nq : nq + nv], y[nq + nv :].copy()
+    refuse_jump(before, c, t, q, v)
+    c.at(t, q, v)
+    if not c.structure.tree and before.phases is None:
+        return Assembly(c, t, q.copy(), v.copy())
+    plain = compile_mechanism(model, parameters=parameters)
+    q, v = plain.take(c, t, q, v)
+    for name, more in before.wound.items():
+        q[plain.values.system.tree.q[plain.structure.place[name]] + 2] -= more
+    return Assembly(plain, t, q, v)
+
+
+def start_record(start: InitialState) -> MotionStart:
+    """How its motion begins; a later part of one counts its own only."""
+    return MotionStart(
+        start.y.copy(), energies_at_end(start.before) if start.before is not None and not start.part.later else {}
+    )
+
+
+def _final_state(before: Result, a: Assembly) -> np.ndarray:
+    """The state that an earlier result ended in: to the bit in its own coordinates, works and turns included."""
+    s, old = a.compiled.structure, before.values.structure
+    y = before.final[1].copy()
+    if s.tree == old.tree and s.states == old.states:
+        a.compiled.z = y[s.nq + s.nv :].copy()
+        return y
+    states = dict(zip(old.states, y[old.nq + old.nv :].tolist(), strict=True))
+    z = [states.get(name, known) for name, known in a.compiled.hints.items()]
+    return np.r_[a.q, a.v, z]
+
+
+# Whether a motion may go on where an earlier result ended: edits since then must leave all where and as it was.
+
+
+POSITION_CHANGE = 1e-6  # of the mechanism's length, or radians, that a motion may go on from
+VELOCITY_CHANGE_SHARE = 1e-4  # of the largest velocity
+VELOCITY_CHANGE = 1e-5  # velocities [m/s, rad/s] that a motion may leave in its constraints
+
+
+def refuse_jump(before: Result, c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> None:
+    """Refuse a state that constraints do not allow, or that joint coordinates would put elsewhere.
+
+    Raises
+    ------
+    ModelError
+        Naming what is off, and how far.
+    """
+    if c.values is before.values:
+        return
+    now = _body_states(c, t, q, v)
+    size = c.values.length
+    off = dict(zip(_row_titles(c), np.abs(c.work.rows.value) / size, strict=True))
+    fast = {name: abs(x) for name, x in zip(_row_titles(c), c.jacobian() @ v - c.work.rows.nu, strict=True)}
+    most = max(np.abs(v).max(initial=0.0), np.abs(c.work.rows.nu).max(initial=0.0))
+    if c.structure.tree:
+        then = _body_states(CompiledMechanism(before.values, before.final[1][len(q) + len(v) :].copy()), t, q, v)
+        off |= {
+            f"body {k!r}": max(_largest_size(x.p - then[k].p) / size, _largest_size(x.R - then[k].R))
+            for k, x in now.items()
+        }
+        fast |= {f"body {k!r}": _velocity_difference(x, then[k]) for k, x in now.items()}
+        most = max([most, *(_largest_size(np.r_[x.v, x.w]) for x in (*now.values(), *then.values()))])
+    _refuse_difference(before, c, off, POSITION_CHANGE, "", size)
+    _refuse_difference(before, c, fast, max(VELOCITY_CHANGE, VELOCITY_CHANGE_SHARE * most), " in velocity", 1.0)
+
+
+def _body_states(c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, BodyState]:
+    """How every body moves, where prescribed coordinates are what drivers want then."""
+    c.at(t, q, v, MOTION)
+    K = c.work.BK.copy()
+    return {
+        name: BodyState(K[b, :3], K[b, 3:12], K[b, 15:18], K[b, 12:15])
+        for name, b in c.structure.place.items()
+        if b >= 0
+    }
+
+
+def _row_titles(c: CompiledMechanism) -> list[str]:
+    return [f"{r.element.title} ({r.label}, row {k})" for k, r in enumerate(c.structure.rows)]
+
+
+def _largest_size(x: np.ndarray) -> float:
+    return float(np.abs(x).max(initial=0.0))
+
+
+def _velocity_difference(a: BodyState, b: BodyState) -> float:
+    return max(_largest_size(a.v - b.v), _largest_size(a.w - b.w))
+
+
+def _refuse_difference(
+    before: Result, c: CompiledMechanism, off: dict[str, float], most: float, what: str, size: float
+) -> None:
+    if not off:
+        return
+    worst = max(off, key=lambda name: off[name] if off[name] == off[name] else np.inf)
+    if not off[worst] <= most:
+        raise ModelError(
+            f"the result of {before.model.name!r} cannot be gone on with: {worst} of {c.structure.model.name!r} is "
+            f"{off[worst] * size:.3g}{what} from where the result ended. Were parameters or parts changed? A change "
+            "must leave every body where it is, and as fast"
+        )
+
+
+def choose_independent(model: Model, start: InitialState) -> None:
+    """Tell the compiled loop which coordinates depend on the others, and their sizes.
+
+    As many as the rank at the start: those that QR with column pivoting takes first, lengths measured by the
+    mechanism's and rows made unit vectors (Businger and Golub 1965).
+    """
+    from scipy.linalg import qr
+
+    a = start.assembly
+    c = a.compiled
+    c.at(a.t, a.q, a.v)
+    size = start.assembly.compiled.sizes
+    tree = c.structure.tables["tree"]
+    given = tree.v[tree.law >= 0]
+    size[given] = 0.0
+    G = c.jacobian() * size
+    length = np.sqrt((G * G).sum(axis=1))
+    G = G[length > 0.0] / length[length > 0.0, None]
+    order = qr(G, mode="r", pivoting=True)[1] if len(G) else np.arange(len(size))
+    dependent = order[: len(size) - len(given) - mobility(model, start.base).freedoms]
+    c.work.velocities.partition[:] = -size
+    c.work.velocities.partition[dependent] *= -1.0
+
+
+def independent_names(start: InitialState) -> tuple[str, ...]:
+    """Names of the coordinates that are independent now."""
+    c = start.assembly.compiled
+    return tuple(
+        n.name for n, p in zip(velocity_names(c.structure), c.work.velocities.partition, strict=True) if p < 0.0
+    )

@@ -1,0 +1,299 @@
+"""Options of a simulation: integrator and tolerances, impulse time stepping (`Stepping`), output times."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ..analysis_options import Options, names_of, require_count, require_positive, seconds
+from ..engine import projection
+from ..errors import ModelError
+from ..numerics.complementarity.solver_choice import solver_names
+from ..numerics.integrators.butcher_tableaux import tableau
+from .initial_state import refuse_unknown_coordinates as known_coordinates
+
+STABILIZATION = {
+    "projection": projection.STAGES,
+    "projection-steps": projection.STEPS,
+    "baumgarte": projection.BAUMGARTE,
+    "none": projection.NONE,
+    "positions": projection.POSITIONS,
+    "velocities": projection.VELOCITIES,
+    "partitioning": projection.PARTITIONING,
+}
+MOST_STEPS = 10_000_000  # steps
+COPIES_IN_MEMORY = 2  # copies of a motion in memory while its parts are put together
+LEAST_ROW_WIDTH = 4  # numbers kept of each time: of one hinge
+SMALL_MEMORY = 2**18  # [bytes] that every machine has
+DOUBLE = np.dtype(float).itemsize
+DEFAULT_MEMORY = 2**36  # [bytes] of a machine that does not say how much it has
+BAUMGARTE_RATE = 10.0  # [1/s] of Baumgarte's method, where none is given
+FINEST_RTOL = 1e-13  # relative tolerance below which rounding decides
+ATOL_PER_RTOL = 1e-2  # part of a coordinate's size below which its error is held to atol, where that is not given
+COARSEST_RTOL = 0.1  # tolerance above which what comes out is no motion of the mechanism
+LEAST_ATOL = 1e-14  # part of the mechanism's length [m], or of a radian, that rounding leaves
+
+
+@dataclass(frozen=True, kw_only=True)
+class Integration(Options):
+    """How a motion is integrated, as kept in the result; the meanings stand with `Mechanism.simulate`."""
+
+    coordinates: str
+    method: str
+    rtol: float
+    atol: float | None
+    max_step: float
+    max_steps: int
+    stabilization: str
+    alpha: float | None
+    beta: float | None
+    step: float | None
+    rho_inf: float | None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        own = vars(self)
+        for name in ("max_step", "step"):
+            if isinstance(own[name], str):
+                own[name] = seconds(own[name], name)
+        for name in ("rtol", "atol", "max_step", "step"):
+            if own[name] is not None or name in ("rtol", "max_step"):
+                require_positive(own[name], name)
+        if self.step is not None and self.max_step != np.inf:
+            raise ModelError("max_step does nothing with steps of fixed width (step=); leave one of the two out")
+        require_count(self.max_steps, "max_steps")
+        if self.rtol < FINEST_RTOL:
+            raise ModelError(
+                f"rtol must not be smaller than {FINEST_RTOL:g}, got {self.rtol!r}: rounding is larger than that"
+            )
+        if self.rtol > COARSEST_RTOL:
+            raise ModelError(
+                f"rtol must not be larger than {COARSEST_RTOL:g}, got {self.rtol!r}: every step might be off by that "
+                f"part of the motion"
+            )
+        known_coordinates(self.coordinates)
+        if self.stabilization not in STABILIZATION:
+            known = ", ".join(STABILIZATION)
+            raise ModelError(f"unknown stabilization {self.stabilization!r}; choose one of {known}")
+        self._rates()
+        self.check_method()
+
+    def check_method(self) -> None:
+        """Refuse integrators that there are not."""
+        try:
+            tableau(self.method)
+        except ValueError as error:
+            raise ModelError(
+                f"{error}; simulate knows implicit ones too (radau for stiff mechanisms), and impulse, for contact"
+            ) from None
+        self.refuse_without_step()
+
+    def refuse_without_step(self) -> None:
+        """Refuse a method that has no estimate of its error, if no width of its steps is given."""
+        if self.step is None and not tableau(self.method).E.any():
+            raise ModelError(f"method={self.method!r} has no estimate of its error: give the width of its steps, step=")
+
+    def _rates(self) -> None:
+        """Baumgarte's rates have their usual values, or are refused where nothing asks for them."""
+        for name in ("alpha", "beta"):
+            value = getattr(self, name)
+            if self.stabilization == "baumgarte":
+                value = BAUMGARTE_RATE if value is None else value
+                require_positive(value, name)
+                object.__setattr__(self, name, value)
+            elif value is not None:
+                raise ModelError(f"{name} is a rate of stabilization='baumgarte'; with {self.stabilization!r} it does "
+                                 f"nothing")  # fmt: skip
+
+    def sized(self, length: float) -> Self:
+        """With its `tolerance` as ``atol``."""
+        return self.known(atol=self.tolerance(length))
+
+    def tolerance(self, length: float) -> float:
+        """The ``atol`` given, or that of a mechanism of that length [m]."""
+        return default_atol(self.rtol, length) if self.atol is None else self.atol
+
+    def choices(self) -> dict[str, Any]:
+        """The choices of the integration by name, without what else was asked."""
+        own = vars(self)
+        return {name: own[name] for name in names_of(Integration)}
+
+
+def default_atol(rtol: float, length: float) -> float:
+    """The tolerance where the state is small, of a mechanism of that length [m]."""
+    return max(ATOL_PER_RTOL * rtol, LEAST_ATOL) * min(1.0, length)
+
+
+def default_integration(coordinates: str, rtol: float, atol: float, max_steps: int = MOST_STEPS) -> Integration:
+    """An integration as other analyses want it: by the usual method, kept on the constraints."""
+    return Integration(
+        coordinates=coordinates,
+        method="dop853",
+        rtol=rtol,
+        atol=atol,
+        max_step=np.inf,
+        max_steps=max_steps,
+        stabilization="projection",
+        alpha=None,
+        beta=None,
+        step=None,
+        rho_inf=None,
+    )
+
+
+def refuse_beyond_memory(outputs: int, width: int) -> None:
+    """Refuse more output times, of ``width`` numbers each, than the memory of this machine holds.
+
+    Raises
+    ------
+    ModelError
+        With how many bytes they take, and how many times would fit.
+    """
+    each = COPIES_IN_MEMORY * width * DOUBLE
+    if outputs * each > SMALL_MEMORY and outputs * each > (there := _memory_of_machine()):
+        raise ModelError(
+            f"outputs: {outputs:,} times take {outputs * each // 2**20:,} MiB of memory or more, and this machine has "
+            f"{there // 2**20:,} MiB. Ask for fewer ({there // each:,} would fill it), or simulate in parts (start=)"
+        )
+
+
+def _memory_of_machine() -> int:
+    """What this machine has [bytes]."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # Windows does not tell
+        return DEFAULT_MEMORY
+
+
+def _evenly_spaced(t_start: float, t_end: float, n: int) -> np.ndarray:
+    """Evenly spaced times: those of ``np.linspace``, in a third of its time."""
+    times = np.arange(n, dtype=float)
+    times *= (t_end - t_start) / (n - 1)
+    times += t_start
+    times[-1] = t_end
+    return times
+
+
+def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -> np.ndarray:
+    """Ascending output times within the interval.
+
+    Raises
+    ------
+    ModelError
+        If the interval is empty or not finite, or the times are not ascending within it.
+    """
+    if not (math.isfinite(t_start) and math.isfinite(t_end)):
+        raise ModelError(f"start and end time must be finite, got {t_start} and {t_end}")
+    if not t_end > t_start:
+        raise ModelError(f"the end time {t_end:g} s must be later than the start time {t_start:g} s")
+    if isinstance(outputs, (int, np.integer)):
+        if outputs < 2:
+            raise ModelError(f"outputs must be at least 2 (start and end), got {outputs}")
+        refuse_beyond_memory(int(outputs), LEAST_ROW_WIDTH)
+        return _evenly_spaced(t_start, t_end, int(outputs))
+    try:
+        times = np.asarray(outputs, float)
+    except (TypeError, ValueError):
+        raise ModelError(f"outputs must be a number of times, or the times [s] themselves, not {outputs!r}") from None
+    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
+        raise ModelError("outputs must be a number of times, or times in ascending order")
+    if times[0] < t_start or times[-1] > t_end:
+        raise ModelError(f"output times must lie between {t_start:g} s and {t_end:g} s")
+    return times
+
+
+RESTITUTION_LAWS = ("poisson", "newton", "moreau")
+CONVEX_ONLY_SOLVERS = ("barzilai-borwein",)
+IMPACT_ORDERS = ("simultaneous", "sequential")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stepping:
+    """How a motion with contact is stepped: ``simulate(..., method=fb.Stepping(step="2 ms"))``.
+
+    Every step solves for the velocities at its end, with all contacts and joints at once, and then moves bodies out of
+    what overlap is left without giving them velocity.
+
+    Parameters
+    ----------
+    step : float or str [s], optional
+        Longest step; steps are shortened so that they end at the output times. If not given it is 5 ms, or
+        ``max_step`` if that is less, and where compliant contacts collide steps are divided until they resolve the
+        impact.
+    solver : str
+        Of the cone problem: ``auto`` (chosen for each island of bodies that touch), or one by name: see
+        ``docs/contact_solvers.md``.
+    iterations : int, optional
+        Most iterations of the solve for velocities; a number that suits the solver if not given.
+    position_iterations : int, optional
+        Most iterations of the solve for positions; the same.
+    tolerance : float [m/s]
+        Residual of the velocities at which iterations stop. In very short steps it is a hundredth of the velocity that
+        gravity adds in the step, where that is less.
+    coulomb : bool
+        Coulomb's law. If not, the convex problem that approximates it, in which what slides floats up by friction
+        coefficient times sliding speed times step.
+    restitution : {"poisson", "newton", "moreau"}
+        Law of impacts that come together; one after the other they go by Poisson's.
+    impacts : {"simultaneous", "sequential"}
+        Whether what is hit at once is solved at once, or one contact after the other, the fastest first, as in Newton's
+        cradle.
+    """
+
+    step: float | str | None = None
+    solver: str = "auto"
+    iterations: int | None = None
+    position_iterations: int | None = None
+    tolerance: float = 1e-5
+    coulomb: bool = True
+    restitution: str = "poisson"
+    impacts: str = "simultaneous"
+
+    usual: ClassVar[float] = 5e-3  # longest step [s] where none is given
+
+    def __post_init__(self) -> None:
+        if isinstance(self.step, str):
+            object.__setattr__(self, "step", seconds(self.step, "step"))
+        for name in ("step", "tolerance"):
+            if getattr(self, name) is None:
+                continue
+            require_positive(getattr(self, name), name)
+            if not math.isfinite(getattr(self, name)):
+                raise ModelError(f"{name} of Stepping must be finite")
+        for name in ("iterations", "position_iterations"):
+            if getattr(self, name) is not None:
+                require_count(getattr(self, name), name)
+        for name, known in (("solver", solver_names()), ("restitution", RESTITUTION_LAWS), ("impacts", IMPACT_ORDERS)):
+            if getattr(self, name) not in known:
+                raise ModelError(
+                    f"unknown {name} {getattr(self, name)!r} of Stepping; choose one of {', '.join(known)}"
+                )
+        if self.impacts == "sequential" and self.restitution != "poisson":
+            raise ModelError(
+                f"impacts='sequential' of Stepping go by Poisson's law, so restitution={self.restitution!r} would do "
+                f"nothing; leave one of the two out"
+            )
+
+        if self.solver in CONVEX_ONLY_SOLVERS and self.coulomb:
+            raise ModelError(
+                f"solver {self.solver!r} of Stepping solves the convex problem only: give coulomb=False with it"
+            )
+
+    @property
+    def longest(self) -> float:
+        """The longest step [s]."""
+        return self.usual if self.step is None else float(self.step)
+
+    def bounded(self, longest: float) -> Stepping:
+        """With steps of at most ``longest`` seconds; where no step is given they may still be divided."""
+        if longest >= self.longest:
+            return self
+        made = dataclasses.replace(self, step=None if self.step is None else longest)
+        object.__setattr__(made, "usual", longest)
+        return made

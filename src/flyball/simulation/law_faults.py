@@ -1,0 +1,384 @@
+"""Faults of laws: table arguments out of range, undefined values, motions that grow without bound."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..assembly.assembled_state import Assembly
+from ..assembly.compiled_mechanism import CompiledMechanism
+from ..engine.entry_point import MOTION, evaluate_state
+from ..engine.kinematics import load_record
+from ..engine.loads import force_row
+from ..engine.rows import count_measured
+from ..errors import ModelError
+from ..laws.bytecode import evaluate as evaluate_law
+from ..laws.python_functions import TableFault, clear_faults
+from ..model.contact_point import Touch
+from ..model.element import Element
+from ..model.element_laws import force_and_driver_laws
+from ..model.expression_parser import SyntaxNode, tree_text
+from ..model.expressions import Expression
+from ..model.force import CoordinateForce, Force
+from ..model.messages import abbreviated, shortened_list
+from ..model.table import Table
+from ..numerics.integrators import time_loop as ex
+from ..numerics.integrators.butcher_tableaux import TABLEAUX, Tableau, tableau
+from ..tables.law_inputs import element_laws
+from ..tables.table_definitions import RATE, VALUE, assign
+
+LAW_SAMPLES = 257  # times at which the arguments of tables are looked at
+
+
+def refuse_out_of_table(a: Assembly, until: float) -> None:
+    """Refuse a motion from an assembled start up to ``until`` [s] on the way of which a table has no value.
+
+    Arguments that depend on time alone are looked at over the whole time; the others at the start.
+
+    Raises
+    ------
+    ModelError
+        Naming the element, the table, the time and the value.
+    """
+    c = a.compiled
+    model = c.structure.model
+    tables = {x.name: x for x in model.tables}
+    if all(x.beyond != "refuse" for x in tables.values()):
+        return
+    env = model.environment(c.parameters)
+    for title, law in force_and_driver_laws(model):
+        if law.tables and (found := _first_out_of_table(law, env, tables, a.t, until)):
+            t, table, x = found
+            span = f"the motion is to go from {a.t:.6g} s to {until:.6g} s"
+            raise ModelError(f"{title}: at t = {t:.6g} s {table.out_of_range_message(x)}. Here {span}")
+    if missed := out_of_table_at_start(a):
+        raise ModelError(f"{model.name!r}: {missed.message}")
+
+
+def out_of_table_at_start(a: Assembly) -> TableFault | None:
+    """A law that has no value at an assembled start, since it asks a table beyond its ends."""
+    c = a.compiled
+    clear_faults(c.work.stack)
+    c.at(a.t, a.q, a.v, MOTION)
+    return c.structure.missed(c.work.stack)
+
+
+def _first_out_of_table(
+    law: Expression, env: Mapping[str, Any], tables: Mapping[str, Table], start: float, end: float
+) -> tuple[float, Table, float] | None:
+    """The first time at which a table that is called has no value, the table, and the argument then."""
+    times = np.linspace(start, end, LAW_SAMPLES)
+    found = []
+    for table, x, live in _table_arguments(law.tree, law, {**env, "t": times}, tables, np.full(LAW_SAMPLES, True)):
+        missing = np.flatnonzero(live & _out_of_range(table, x))
+        if len(missing):
+            found.append((float(times[missing[0]]), table, float(x[missing[0]])))
+    if not found:
+        return None
+    late = min(found, key=lambda f: f[0])
+    early = late[0] - (end - start) / (LAW_SAMPLES - 1)
+    if early < start:
+        return late
+    for _ in range(60):  # nearer to where it leaves the table
+        middle = 0.5 * (early + late[0])
+        at = [
+            (middle, table, float(x[0]))
+            for table, x, live in _table_arguments(
+                law.tree, law, {**env, "t": np.array([middle])}, tables, np.full(1, True)
+            )
+            if (live & _out_of_range(table, x))[0]
+        ]
+        early, late = (early, at[0]) if at else (middle, late)
+    return late
+
+
+def _out_of_range(table: Table, x: np.ndarray) -> np.ndarray:
+    first, last = table.ends()
+    return (x < first) | (x > last)
+
+
+def _table_arguments(
+    node: SyntaxNode, law: Expression, env: Mapping[str, Any], tables: Mapping[str, Table], live: np.ndarray
+) -> Iterator[tuple[Table, np.ndarray, np.ndarray]]:
+    """Tables that a law calls, their arguments where these depend on time alone, and when the law needs them."""
+
+    def value(part: SyntaxNode) -> Any:
+        names = {n.value for n in part.walk() if n.kind == "name"}
+        return Expression(law.text, part).evaluate(env, tables) if names <= env.keys() else None
+
+    if node.kind == "where":
+        condition = value(node.args[0])
+        yield from _table_arguments(node.args[0], law, env, tables, live)
+        if condition is not None:
+            condition = np.broadcast_to(condition, live.shape)
+            yield from _table_arguments(node.args[1], law, env, tables, live & condition)
+            yield from _table_arguments(node.args[2], law, env, tables, live & ~condition)
+        return
+    if node.kind == "table" and (x := value(node.args[0])) is not None:
+        yield tables[node.value], np.broadcast_to(np.real(x), live.shape), live
+    for arg in node.args:
+        yield from _table_arguments(arg, law, env, tables, live)
+
+
+LONGEST_TEXT = 100  # characters of a part of a law in a message
+
+
+def law_inputs(c: CompiledMechanism, k: int) -> tuple[float, float]:
+    """What the laws of force k may depend on besides time, at the kinematics in the scratch."""
+    S, W, e = c.values.system, c.work, c.structure.forces[k]
+    F, M = S.forces.F[k], S.forces.M[k]
+    if isinstance(e, CoordinateForce):
+        return float(W.sensed[VALUE, F]), float(W.sensed[RATE, F])
+    x, y = e.inputs(force_row(S.force_parameters, k), load_record(W.FK, F), load_record(W.FK, M))
+    return float(x), float(y)
+
+
+def undefined_law_part(c: CompiledMechanism, element: Element, t: float, given: tuple[float, ...] = ()) -> str:
+    """The part without a finite value of a law of an element, at what sensors measured last; nothing if all have one.
+
+    Parameters
+    ----------
+    c : Compiled
+        Its scratch holds what is measured, and the states of controllers.
+    element : Element
+        A force, a driver or a controller.
+    t : float
+        Time [s].
+    given : tuple of float
+        Values of the inputs of a force's laws.
+    """
+    s = c.structure
+    values = {name: float(c.work.sensed[VALUE, at]) for name, at in s.slots.items()}
+    values |= dict(zip(s.model.parameters, c.values.system.const.tolist(), strict=False)) | {"t": t}
+    tables = {x.name: x for x in s.model.tables}
+    for owner, law, inputs in element_laws(s.model):
+        if owner.name == element.name:
+            known = values | dict(zip(inputs, given, strict=False))
+            if text := undefined_part(law, known, tables):
+                return text
+    return ""
+
+
+def undefined_part(law: Expression, values: Mapping[str, Any], tables: Mapping[str, Table]) -> str:
+    """The part of a law that has no finite value though its arguments have, and these; nothing if there is none."""
+    if law.function is not None or not law.names <= values.keys():
+        return ""
+
+    def value(node: SyntaxNode) -> Any:
+        try:
+            with np.errstate(all="ignore"):
+                return Expression(law.text, node).evaluate(values, tables)
+        except (ModelError, ArithmeticError):
+            return np.nan
+
+    node = law.tree
+    if np.isfinite(value(node)):
+        return ""
+    while True:
+        read = node.args if node.kind != "where" else (node.args[0], node.args[1 if value(node.args[0]) else 2])
+        part = next((arg for arg in read if not np.isfinite(value(arg))), None)
+        if part is None:
+            break
+        node = part
+    arguments = {tree_text(x): value(x) for x in node.args if x.kind != "number"}
+    for name in sorted({x.value for arg in node.args for x in arg.walk() if x.kind == "name"}):
+        arguments.setdefault(name, values[name])
+    shown = ", ".join(f"{abbreviated(name, LONGEST_TEXT)} = {x:.6g}" for name, x in arguments.items())
+    at = f" for {shown}" if shown else ""
+    return f"{abbreviated(tree_text(node), LONGEST_TEXT)} is {value(node):g}{at}"
+
+
+UNBOUNDED_GROWTH = 1e30  # times what it began with, or a unit, that nothing comes to that is meant
+LARGE_GROWTH = 1e3  # the same, of a motion that a fixed step may have led astray
+ESCAPING = 1e-4  # part of itself by which a state changes within a step that is as narrow as times can be told apart
+NARROW_STEP = 1e-13  # part of the largest time: such steps
+MOST_EIGENVALUES = 400  # coordinates, velocities and states whose eigenvalues are looked for
+DIFFERENCE_STEP = 1e-7  # differences, as part of the state
+LARGEST_STRETCH, STRETCH_POINTS = (
+    15.0,
+    3000,
+)  # h |lambda| up to which steps may be stable, and how finely that is looked at
+GROWTH_TOLERANCE = 1e-3  # part by which a step may make a mode grow that is still called stable
+UNSTABLE_SHARE = 0.1  # a mode grows by itself whose real part is more than this part of its size
+
+ComponentNames = Callable[[Assembly, int], str]
+
+
+def step_too_long(a: Assembly, clock: ex.StepState, method: str) -> str:
+    """That a fixed step is too long, and which would do; nothing if that is not the matter."""
+    step = float(clock.real.step)
+    if not step > 0.0 or method not in TABLEAUX:
+        return ""
+    grown = np.r_[_growth(a, clock.y[ex.CURRENT]), _growth(a, clock.y[ex.PROPOSED])]
+    if not len(grown) or not grown.max() > LARGE_GROWTH:
+        return ""
+    longest, rate = longest_stable(a, tableau(method))
+    if not step > longest:
+        return ""
+    return (
+        f"a step of {step:g} s is too long for {method}: what changes fastest where it begins does so at {rate:.3g} "
+        f"1/s, which this method follows stably in steps of up to {longest:.2g} s. Give such a step, or leave step "
+        f"out, and its width is chosen; or take method='radau'"
+    )
+
+
+def unbounded_motion(a: Assembly, clock: ex.StepState, named: ComponentNames) -> str:
+    """What has grown beyond all bounds, if something has."""
+    y, grown = clock.y[ex.CURRENT], _growth(a, clock.y[ex.CURRENT])
+    if not len(grown) or not grown.max() > UNBOUNDED_GROWTH:
+        return ""
+    i = int(np.argmax(grown))
+    return (
+        f"the motion grows without bound: by t = {clock.real.t:.6g} s {_component_in_words(a, i, float(y[i]), named)}. "
+        f"Look for what drives it: a gain, a damping or a stiffness of the wrong sign, a controller that is unstable"
+    )
+
+
+def finite_time_escape(a: Assembly, clock: ex.StepState, named: ComponentNames) -> str:
+    """What runs off to infinity, or faster and faster, within a finite time, if something does.
+
+    A force whose law does, the state of a controller, and where there are no rows, so that nothing can lock, a
+    coordinate or velocity.
+    """
+    s, t = a.compiled.structure, float(clock.real.t)
+    if not clock.real.h < NARROW_STEP * max(abs(t), clock.real.largest):
+        return ""
+    if text := _unbounded_law(a, clock):
+        return text
+    y, rate, n = clock.y[ex.CURRENT], clock.K[0], _state_length(a)
+    first = s.nq + s.nv if s.rows else 0
+    with np.errstate(all="ignore"):
+        part = np.nan_to_num(np.abs(rate[first:n]) * clock.real.h / np.abs(y[first:n]))
+    if not len(part) or not part.max() > ESCAPING:
+        return ""
+    i = first + int(np.argmax(part))
+    return (
+        f"at t = {t:.6g} s {_component_in_words(a, i, float(y[i]), named)} and changes by {rate[i]:.3g} in a second, faster and "
+        f"faster: it has no value from there on. {_likely_cause(a, i)}"
+    )
+
+
+def _unbounded_law(a: Assembly, clock: ex.StepState) -> str:
+    """A force whose law has grown, and grows by more than `ESCAPING` of itself within such a step; else nothing."""
+    c, t, h, y = a.compiled, float(clock.real.t), float(clock.real.h), clock.y[ex.CURRENT]
+    if not np.isfinite(y).all():
+        return ""
+    s, S, begun, now = c.structure, c.values.system, c.again(), c.again()
+    for other, at, state in ((begun, a.t, a.y), (now, t, y)):
+        assign(other.work.modes, c.work.modes)
+        other.z = state[s.nq + s.nv :].copy()
+        other.at(at, state[: s.nq].copy(), state[s.nq : s.nq + s.nv].copy(), MOTION)
+    W, stack, n = now.work, np.zeros_like(c.work.stack), count_measured(S)
+    later = W.sensed.copy()
+    later[VALUE, :n] += h * W.sensed[RATE, :n]
+    for k, e in enumerate(s.forces):
+        if isinstance(e, Touch):
+            continue
+        x, rate = law_inputs(now, k)
+        for law in filter(lambda at: at >= 0, S.forces.laws[k].tolist()):
+            before, here, then = (
+                abs(evaluate_law(S.code, S.const, law, stack, *of))
+                for of in (
+                    ((a.t, *law_inputs(begun, k)), begun.work.sensed),
+                    ((t, x, rate), W.sensed),
+                    ((t, x + h * rate, rate), later),
+                )
+            )
+            if here > LARGE_GROWTH * before and abs(then - here) > ESCAPING * here:
+                given = ", ".join(f"{name} = {z:.3g}" for name, z in zip(e.outputs, (x, rate), strict=False))
+                given = f" for {given}" if given else ""
+                return (
+                    f"at t = {t:.6g} s the law of {e.title} gives {here:.3g}{given} and grows without bound: the "
+                    f"motion has no continuation. Where parts meet that attract each other as 1/r**2, give the law a "
+                    f"bound, 1/(r**2 + a**2), or keep the parts apart by a stop (Limit, Touch)"
+                )
+    return ""
+
+
+def _likely_cause(a: Assembly, i: int) -> str:
+    """Where to look for what makes component i run off."""
+    s = a.compiled.structure
+    if i >= s.nq + s.nv:
+        x = s.controls[i - s.nq - s.nv]
+        return f"Look at the law of its rate, {abbreviated(tree_text(x.law.tree))}"
+    pushing = dict.fromkeys(e.title for e, _, _ in element_laws(s.model) if isinstance(e, Force))
+    known = f"Look at the laws of {shortened_list(pushing)}, or for" if pushing else "Look for"
+    return f"{known} a force that grows without bound where the motion ended, as 1/r**2 does towards r = 0"
+
+
+def longest_stable(a: Assembly, R: Tableau) -> tuple[float, float]:
+    """The longest step [s] in which a method follows stably all that does not grow by itself, where a motion begins.
+
+    And the rate [1/s] that decides; infinite and 0 if nothing does, or there is too much to look at.
+
+    By the stability function of the method (Hairer and Wanner 1996, section IV.2) at the eigenvalues of the derivatives
+    of (q, v, x)' by these, x being states of controllers; modes of what holds at times are those of now.
+    """
+    n = _state_length(a)
+    J = _difference_jacobian(a, n) if 0 < n <= MOST_EIGENVALUES else np.zeros((1, 1))
+    if not np.isfinite(J).all():
+        return np.inf, 0.0
+    modes = np.linalg.eigvals(J)
+    size = np.abs(modes)
+    modes = modes[(size > DIFFERENCE_STEP * size.max(initial=0.0)) & (modes.real <= UNSTABLE_SHARE * size)]
+    z = np.linspace(0.0, LARGEST_STRETCH, STRETCH_POINTS)
+    powers = _stability_polynomial(R)
+    longest, rate = np.inf, 0.0
+    for w in modes:
+        grows = np.abs(np.polynomial.polynomial.polyval(z * w / abs(w), powers)) > 1.0 + GROWTH_TOLERANCE
+        edge = float(z[np.argmax(grows)]) if grows.any() else LARGEST_STRETCH
+        if edge / abs(w) < longest:
+            longest, rate = edge / abs(w), float(abs(w))
+    return longest, rate
+
+
+def _stability_polynomial(R: Tableau) -> np.ndarray:
+    """Coefficients of the stability function: 1 + z b.(1 + z A 1 + z^2 A^2 1 + ...)."""
+    s = int(R.order_i[1])
+    A, b, x, out = R.A[:s, :s], R.A[s, :s], np.ones(s), [1.0]
+    for _ in range(s):
+        out.append(float(b @ x))
+        x = A @ x
+    return np.array(out)
+
+
+def _difference_jacobian(a: Assembly, n: int) -> np.ndarray:
+    """Derivatives of the first ``n`` rates by what they are the rates of, by differences; the run's scratch is left."""
+    c, y = a.compiled, a.y
+    other = c.again()
+    assign(other.work.modes, c.work.modes)
+    assign(other.work.options, c.work.options)
+    other.work.sensed[VALUE] = c.work.sensed[VALUE]
+
+    def rates(x: np.ndarray) -> np.ndarray:
+        status, dy = evaluate_state(other.values.system, other.work, a.t, x, MOTION)
+        return dy[:n].copy() if status == 0 else np.full(n, np.nan)
+
+    here, out = rates(y.copy()), np.zeros((n, n))
+    for k in range(n):
+        x = y.copy()
+        x[k] += DIFFERENCE_STEP * max(abs(x[k]), 1.0)
+        out[:, k] = (rates(x) - here) / (x[k] - y[k])
+    return out
+
+
+def _growth(a: Assembly, y: np.ndarray) -> np.ndarray:
+    """Coordinates, velocities and states over what they began with, or a unit; 0 for what is no number."""
+    n = _state_length(a)
+    return np.nan_to_num(np.abs(y[:n]), nan=0.0) / np.maximum(np.abs(a.y[:n]), 1.0)
+
+
+def _state_length(a: Assembly) -> int:
+    """How many coordinates, velocities and states of continuous controllers there are."""
+    s = a.compiled.structure
+    return s.nq + s.nv + len(s.controls) - len(s.sampled)
+
+
+def _component_in_words(a: Assembly, i: int, value: float, named: ComponentNames) -> str:
+    """A component and what it is."""
+    s = a.compiled.structure
+    if i >= s.nq + s.nv:
+        return f"{named(a, i)} is {value:.3g}"
+    return f"{'a coordinate' if i < s.nq else 'a velocity'} of {named(a, i)} is {value:.3g}"

@@ -1,0 +1,427 @@
+"""Choice of the method: an explicit or implicit integrator, or impulse time stepping; and why.
+
+Here too: contact points added to a copy of the model for event-driven integration, and what implicit integrators
+support.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any, NamedTuple
+
+from ..derivatives.equation_derivatives import refuse_function_laws
+from ..errors import ModelError
+from ..mobility.mobility import mobility
+from ..model.contact import not_for_impulse_stepping
+from ..model.contact_point import Touch
+from ..model.messages import suggest
+from ..model.model import Model
+from ..numerics.integrators.butcher_tableaux import TABLEAUX
+from ..results.diagnostics import undetermined_loads
+from ..results.result import Result
+from ..tables.contact_places import ContactPlaces, contact_places
+from ..tables.element_numbers import element_numbers
+from .diagnosis import InitialOverlap, UnresolvedInstant
+from .implicit.jacobian_pattern import jacobian_layout
+from .initial_state import InitialState, initial_state_at
+from .integration_options import MOST_STEPS, Integration, Stepping
+from .solver_switching import AUTO_CODE as EITHER
+from .solver_switching import EXPLICIT_METHOD, check_specialize
+
+FEW = 16  # places; with more, steps with all their rows cost far more than steps by impulses
+MOST_CORNERS = 3  # of two bodies in space, by whose friction no two ways of sharing it are told apart
+MOST_COPIES = 4  # copies of one model at other values of the parameters
+IMPULSE_REMEDY = "leave method out, or give method='impulse'"
+
+
+def contact_points(model: Model, parameters: Mapping[str, float] | None) -> ContactPlaces:
+    """The places of a model at the values of the parameters."""
+    given = element_numbers(model, parameters)
+    return model.kept.get("places", given.key, MOST_COPIES, lambda: contact_places(model, given))
+
+
+def unsupported_contacts(model: Model, parameters: Mapping[str, float] | None) -> str:
+    """What of its contacts rows of constraint do not know; empty if they know all."""
+    if not (model.contacts or model.bulk):
+        return ""
+    p = contact_points(model, parameters)
+    return f"{_first_of_several(p.why_not)}, which only steps by impulses know" if p.why_not else ""
+
+
+def too_many_contacts(model: Model, parameters: Mapping[str, float] | None) -> str:
+    """Whether there are so many places that steps by impulses are better; empty if not."""
+    places = contact_points(model, parameters).touches
+    if len(places) > FEW:
+        return f"bodies may touch at {len(places)} places, too many to go from touch to touch (most {FEW})"
+    return "" if model.planar else _indeterminate_friction(places)
+
+
+def _indeterminate_friction(places: Sequence[Touch]) -> str:
+    """Bodies in space whose friction at many corners rigid bodies leave open; empty if there are none."""
+    pairs = Counter((e.body_i, e.body_j) for e in places if e.slips)
+    for (a, b), n in pairs.items():
+        if n > MOST_CORNERS:
+            return f"how {a!r} and {b!r} share friction among {n} corners is not determined"
+    return ""
+
+
+def with_contact_points(model: Model, parameters: Mapping[str, float] | None) -> Model:
+    """A copy of the model in which places of contact are parts.
+
+    Raises
+    ------
+    ModelError
+        If rows do not know all of them.
+    """
+    if not model.contacts or any(isinstance(e, Touch) for e in model.forces):
+        return model
+    p = contact_points(model, parameters)
+    if p.why_not:
+        raise ModelError(
+            f"{model.contacts[0].title}: a motion that is integrated knows contact of balls, corners and rounded ends "
+            f"with planes, of balls with balls, boxes and capsules, and in the plane of rectangles and segments. Here "
+            f"{_first_of_several(p.why_not)}; {IMPULSE_REMEDY}"
+        )
+    key = element_numbers(model, parameters).key
+    return model.kept.get("with places", key, MOST_COPIES, lambda: _with_touches(model, p.touches))
+
+
+def _with_touches(model: Model, touches: tuple[Touch, ...]) -> Model:
+    out = model.copy()
+    for e in touches:
+        out.add(e)
+    return out.snapshot()
+
+
+def _first_of_several(texts: tuple[str, ...]) -> str:
+    """The first, and how many there are."""
+    return texts[0] + (f" (and {len(texts) - 1} more)" if len(texts) > 1 else "")
+
+
+RADAU, GENERALISED_ALPHA, VARIATIONAL = "radau", "generalised-alpha", "variational"
+IMPLICIT_METHODS = (RADAU, GENERALISED_ALPHA, VARIATIONAL)
+"""Integrators with loops of their own, by name."""
+FIXED_STEP_METHODS = (GENERALISED_ALPHA, VARIATIONAL)
+"""Those of them whose steps are of one width, which has to be given."""
+DEFAULT_RHO_INF = 0.8  # spectral radius at infinity of generalised-alpha, where none is given
+MOST_JOINT_GROUPS = (
+    40  # groups of joint coordinates that no equation sees together, up to which these cost less than absolute ones
+)
+
+
+def explicit_substitute(method: str) -> str:
+    """The explicit integrator that computes what an implicit one does not know."""
+    return EXPLICIT_METHOD if method in IMPLICIT_METHODS else method
+
+
+def refuse_idle_options(o: Any) -> None:
+    """Refuse options that implicit integrators do nothing with.
+
+    Raises
+    ------
+    ModelError
+        Naming the option.
+    """
+    if o.method in FIXED_STEP_METHODS and o.step is None:
+        raise ModelError(f"method={o.method!r} takes steps of fixed width: give one, for instance step='1 ms'")
+    alone = o.method != VARIATIONAL  # whether it can keep positions alone
+    if o.stabilization not in (("projection", "none") if alone else ("projection",)):
+        other = ", or give 'none', and it keeps positions alone (index 3)" if alone else ""
+        raise ModelError(
+            f"stabilization={o.stabilization!r} does nothing with method={o.method!r}, which keeps positions and "
+            f"velocities on the constraints itself; leave it out{other}"
+        )
+    if o.specialize is True:
+        raise ModelError(
+            f"specialize=True does nothing with method={o.method!r}, which is computed by the tables; leave it out"
+        )
+
+
+def in_suitable_coordinates(
+    start: InitialState, method: str, wish: str, parameters: Mapping[str, float] | None
+) -> InitialState:
+    """The start in coordinates that implicit integrators are good at.
+
+    Joint coordinates of long chains have full matrices, and drivers prescribe some; such mechanisms go to absolute
+    ones.
+
+    Raises
+    ------
+    ModelError
+        For what implicit integrators do not know.
+    """
+    s = start.assembly.compiled.structure
+    if method != RADAU:
+        _refuse_open_loads(start, method)
+    if method == VARIATIONAL and wish == "joint":
+        raise ModelError(f"method={VARIATIONAL!r} takes absolute coordinates, in which masses do not change: leave "
+                         f"coordinates out")  # fmt: skip
+    if not s.tree or wish == "absolute":
+        return start
+    if method == VARIATIONAL:
+        why = "masses do not change in these, as the variational method needs it"
+    elif s.prescribed:
+        if wish == "joint":
+            raise ModelError(
+                f"method={method!r} does not know coordinates that drivers prescribe ({', '.join(s.prescribed)}), as "
+                f"they are in joint coordinates: leave coordinates out"
+            )
+        why = "drivers' coordinates are rows in an implicit method"
+    elif wish == "auto" and (groups := _jacobian_groups(start)) > MOST_JOINT_GROUPS:
+        why = f"matrices of {groups} joint coordinates, which follow each other, are full"
+    else:
+        return start
+    out = initial_state_at(start.base, parameters, "absolute", start.before, switches=True)
+    out.since, out.part, out.coordinates = start.since, start.part, f"absolute: {why}"
+    return out
+
+
+def reason_against_implicit(start: InitialState) -> str:
+    """Why a motion in those coordinates cannot go on by an implicit method, in words; empty: it can."""
+    s = start.assembly.compiled.structure
+    try:
+        refuse_function_laws(s)
+        _refuse_open_loads(start, RADAU)
+    except ModelError as error:
+        return str(error).removesuffix("; leave method out, or take the redundancy out")
+    if start.assembly.compiled.values.system.scales.semidefinite > 0.0:
+        return "a body has no inertia about some axis, which method='radau' does not know"
+    if not s.tree:
+        return ""
+    if s.prescribed:
+        return f"drivers prescribe coordinates ({', '.join(s.prescribed)}); method='radau' takes absolute ones"
+    return (
+        ""
+        if _jacobian_groups(start) <= MOST_JOINT_GROUPS
+        else "its chains are long; method='radau' takes absolute coordinates"
+    )
+
+
+def _refuse_open_loads(start: InitialState, method: str) -> None:
+    """Friction under reactions that redundancy leaves open takes them from Newton's method, where they are any."""
+    s = start.base.compiled.structure
+    found = undetermined_loads(s.loads, mobility(s.model, start.base).undetermined) if s.loads else []
+    if found:
+        names = ", ".join(f.title for f, _ in found)
+        raise ModelError(
+            f"method={method!r} cannot have {names}: it follows reactions that redundant constraints leave open "
+            f"(m.mobility() names them); leave method out, or take the redundancy out"
+        )
+
+
+def _jacobian_groups(start: InitialState) -> int:
+    """How many evaluations a Jacobian takes in joint coordinates."""
+    c = start.assembly.compiled
+    return jacobian_layout(c.structure, c.system).groups
+
+
+AUTO_METHOD, IMPULSE_METHOD, DEFAULT_INTEGRATOR = (
+    "auto",
+    "impulse",
+    "dop853",
+)  # methods beside the integrators by name; what auto is
+METHOD_SYNONYMS = {
+    "impulses": IMPULSE_METHOD,
+    "stepping": IMPULSE_METHOD,
+    "steps": IMPULSE_METHOD,
+    "adaptive": DEFAULT_INTEGRATOR,
+    "rk": "rk45",
+    "stiff": "radau",
+    "implicit": "radau",
+    "generalized-alpha": GENERALISED_ALPHA,
+    "alpha": GENERALISED_ALPHA,
+    "newmark": GENERALISED_ALPHA,
+    "hht": GENERALISED_ALPHA,
+    "symplectic": VARIATIONAL,
+    "verlet": VARIATIONAL,
+    "rattle": VARIATIONAL,
+    "energy-momentum": VARIATIONAL,
+}
+"""What methods are called in words."""
+INTEGRATOR_DEFAULTS = {
+    "rtol": 1e-7, "atol": None, "stabilization": "projection", "alpha": None, "beta": None, "specialize": EITHER,
+    "max_steps": MOST_STEPS, "step": None,
+    "rho_inf": None,
+}  # fmt: skip
+"""Options of an integration that mean nothing to steps by impulses, and what they are when they are not given."""
+IMPULSE_STEPPING = "steps by impulses"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulateOptions(Integration):
+    """What `Mechanism.simulate` is asked."""
+
+    method: str | Stepping  # type: ignore[assignment]
+    t_end: float
+    t_start: float | None
+    outputs: int | Sequence[float]
+    parameters: Mapping[str, float] | None
+    start: Result | None
+    specialize: bool | str
+    progress: bool | Callable[[float], None]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_specialize(self.specialize)
+        if self.method in IMPLICIT_METHODS:
+            refuse_idle_options(self)
+        self._check_damping()
+
+    def _check_damping(self) -> None:
+        """The spectral radius at infinity is one, and has something to do."""
+        if self.rho_inf is None:
+            return
+        if self.method != GENERALISED_ALPHA:
+            raise ModelError(
+                f"rho_inf is a number of method={GENERALISED_ALPHA!r}; with method={self.method!r} it does nothing"
+            )
+        if isinstance(self.rho_inf, bool) or not isinstance(self.rho_inf, Real) or not 0.0 <= self.rho_inf <= 1.0:
+            raise ModelError(f"rho_inf is a number from 0 (swings too fast for a step go at once) to 1 (no swing is "
+                             f"damped), got {self.rho_inf!r}")  # fmt: skip
+
+    def check_method(self) -> None:
+        """An integrator, steps by impulses, or what suits the model."""
+        if isinstance(self.method, Stepping):
+            return
+        if isinstance(self.method, str) and self.method in (AUTO_METHOD, IMPULSE_METHOD, *IMPLICIT_METHODS):
+            return
+        known = [*sorted(TABLEAUX), *IMPLICIT_METHODS, IMPULSE_METHOD, AUTO_METHOD]
+        meant = METHOD_SYNONYMS.get(str(self.method).lower())
+        if not isinstance(self.method, str) or self.method not in TABLEAUX:
+            hint = f" (did you mean {meant!r}?)" if meant else suggest(self.method, known)
+            raise ModelError(
+                f"unknown method {self.method!r}{hint}; choose one of {', '.join(known)}, or a Stepping, for contact"
+            )
+        self.refuse_without_step()
+
+
+class MethodChoice(NamedTuple):
+    """By what a motion is computed.
+
+    Attributes
+    ----------
+    options : SimulateOptions
+        With an integrator by name, or a `Stepping`.
+    why : str
+        For the health, where there was something to choose.
+    instead : SimulateOptions, optional
+        Steps by impulses, where the integration turns out not to be possible.
+    """
+
+    options: SimulateOptions
+    why: str = ""
+    instead: SimulateOptions | None = None
+
+
+def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
+    """The method that is meant.
+
+    Raises
+    ------
+    ModelError
+        If the method does not know what the model has, or options have no effect on it; where none is asked for, if
+        there is none for all that is there.
+    """
+    if o.method == AUTO_METHOD:
+        return _choose_automatically(model, o)
+    touch = bool(model.contacts or model.bulk)
+    if o.method == VARIATIONAL and model.controllers:
+        raise ModelError(
+            f"method={o.method!r} is for motions that keep their energy, with works of second order at most, and does "
+            f"not know {model.controllers[0].title}: leave method out, or give method='radau'"
+        )
+    if not isinstance(o.method, Stepping) and o.method != IMPULSE_METHOD:
+        if model.bulk:
+            raise ModelError(
+                f"method={o.method!r} integrates from event to event, which does not know {model.bulk[0].title}: leave "
+                f"method out, or give method={IMPULSE_METHOD!r}"
+            )
+        return MethodChoice(o, _remark_on_requested(o, touch))
+    given = [f"{name}={getattr(o, name)!r}" for name in _given_options(o)]
+    if unknown := _unknown_to_impulse_stepping(model):
+        raise ModelError(
+            f"{IMPULSE_STEPPING} do not know {', '.join(unknown)}; the adaptive integrators do: leave method out, or give "
+            f"method={DEFAULT_INTEGRATOR!r}"
+        )
+    if given:
+        instead = "; Stepping(step=...) is theirs" if o.step is not None else ""
+        raise ModelError(f"{given[0]} does nothing with {IMPULSE_STEPPING}; leave it out{instead}")
+    if o.coordinates == "joint":
+        raise ModelError(
+            f"{IMPULSE_STEPPING} are taken in absolute coordinates, where joints close to rounding; leave coordinates out"
+        )
+    return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}, as asked")
+
+
+def _remark_on_requested(o: SimulateOptions, touch: bool) -> str:
+    """What is said of an integrator that was asked for, where there is something to say."""
+    parts = [f"steps of {o.step:g} s"] if o.step is not None else []
+    if o.method == GENERALISED_ALPHA:
+        parts.append(f"rho_inf = {DEFAULT_RHO_INF if o.rho_inf is None else o.rho_inf:g}")
+    if o.method in IMPLICIT_METHODS and o.stabilization == "none":
+        parts.append("index 3: velocities are not held to the constraints")
+    if not (touch or parts or o.method in IMPLICIT_METHODS):
+        return ""
+    return ", ".join([f"{o.method}, as asked", *parts]) + (": from touch to touch" if touch else "")
+
+
+def _choose_automatically(model: Model, o: SimulateOptions) -> MethodChoice:
+    """The method where none is asked for."""
+    adaptive = o.known(method=DEFAULT_INTEGRATOR)
+    if not (model.contacts or model.bulk):
+        return MethodChoice(adaptive)
+    asking = [*_unknown_to_impulse_stepping(model), *(f"{name}=" for name in _given_options(o))]
+    if o.coordinates == "joint":
+        asking.append("coordinates='joint'")
+    cannot = unsupported_contacts(model, o.parameters)
+    if cannot and asking:
+        raise ModelError(
+            f"{model.name!r} can be moved by no method with all that is asked: {cannot}; and {asking[0]} is not known "
+            f"to {IMPULSE_STEPPING}. Leave one of the two out"
+        )
+    if cannot:
+        return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}: {cannot}")
+    if asking:
+        return MethodChoice(
+            adaptive, f"{DEFAULT_INTEGRATOR}, from touch to touch: {asking[0]} is not known to {IMPULSE_STEPPING}"
+        )
+    why = too_many_contacts(model, o.parameters) or _continues_impulse_stepping(o.start)
+    if why:
+        return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}: {why}")
+    return MethodChoice(adaptive, f"{DEFAULT_INTEGRATOR}, from touch to touch", _impulse_options(o))
+
+
+def _unknown_to_impulse_stepping(model: Model) -> list[str]:
+    """What steps by impulses do not know."""
+    return [e.title for e in (*model.events, *model.controllers, *not_for_impulse_stepping(model))]
+
+
+def _given_options(o: SimulateOptions) -> list[str]:
+    """Options that are given and that only an integration takes."""
+    return [name for name, usual in INTEGRATOR_DEFAULTS.items() if getattr(o, name) != usual]
+
+
+def _impulse_options(o: SimulateOptions) -> SimulateOptions:
+    method = o.method if isinstance(o.method, Stepping) else Stepping()
+    return o.known(method=method.bounded(o.max_step))
+
+
+def _continues_impulse_stepping(start: Result | None) -> str:
+    """A motion goes on as it came."""
+    if start is None or not isinstance(start.health.options.get("method"), Mapping):
+        return ""
+    return "so went the motion that this one goes on from"
+
+
+def is_unresolved(error: BaseException) -> bool:
+    """Whether a motion failed by what rigid bodies that touch leave without an answer, or an end; or by an overlap."""
+    return isinstance(error, InitialOverlap | UnresolvedInstant) or isinstance(error.__cause__, UnresolvedInstant)
+
+
+def reason_for_impulses(error: BaseException) -> str:
+    """Why steps by impulses were taken after all, for the health."""
+    found = error.__cause__ if isinstance(error.__cause__, UnresolvedInstant) else error
+    return f"{IMPULSE_STEPPING}, since from touch to touch it does not go: {found}"

@@ -1,0 +1,375 @@
+"""Simulation: the motion in time, by the chosen method, as a `Result`.
+
+The compiled loop is called in chunks, so that progress can be reported and an interrupt comes through.
+"""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+
+import numpy as np
+
+from ..assembly.assembled_state import Assembly
+from ..assembly.compiled_mechanism import CompiledMechanism
+from ..constraints.switch_kinds import BRANCH, FRICTION
+from ..engine.entry_point import FOLLOW, INTEGRATE
+from ..engine.projection import TIGHT_G, TIGHT_V
+from ..engine.pulse_detection import INSPECTION_ROWS, any_formula_breaks, inspection_buffer
+from ..errors import FlyballError, Interrupted, ModelError, SimulationError, StartWarning, warn_user
+from ..laws.breakpoints import NO_BREAKPOINTS
+from ..laws.python_functions import clear_faults, deferred_interrupts
+from ..model.model import Model
+from ..numerics.integrators import time_loop as ex
+from ..numerics.integrators.butcher_tableaux import Tableau, tableau
+from ..progress import ReportProgress, progress_bar
+from ..results.health import changed_velocities, velocity_not_allowed
+from ..results.result import Result
+from ..tables.table_definitions import System
+from . import initial_state
+from .events.context import EventContext
+from .events.event_loop import integrate_events
+from .implicit.integrators import refuse_for_variational
+from .impulse_stepping.impulse_motion import simulate_by_impulses
+from .initial_state import InitialState, find_initial_state, start_time
+from .integration_intervals import Segment, known_breaks, laws_checked_in_steps, remark_on_checked_laws, whole_motion
+from .integration_options import STABILIZATION, Integration, Stepping, output_times, refuse_beyond_memory
+from .law_faults import refuse_out_of_table
+from .method_choice import (
+    AUTO_METHOD,
+    IMPLICIT_METHODS,
+    VARIATIONAL,
+    SimulateOptions,
+    choose_method,
+    explicit_substitute,
+    in_suitable_coordinates,
+    is_unresolved,
+    reason_against_implicit,
+    reason_for_impulses,
+    with_contact_points,
+)
+from .motion_result import can_defer_accelerations, make_result, solve_accelerations
+from .prescribed_motion import at_outputs, deferred_works, leaves_no_freedom, remark_friction
+from .sampling_instants import refuse_too_often
+from .solver_switching import EXPLICIT_METHOD, GENERAL_ENGINE, CodeSelection, StiffnessMonitor
+
+TIGHT_TOLERANCE = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
+UNSUPPORTED_BY_GENERATED = {
+    "partitioning": "partitioning chooses coordinates on the way, which made code does not know"
+}
+"""Stabilizations that code made for a mechanism does nothing for, and why."""
+SLICE = 0.05  # seconds that a call of the compiled loop should take
+
+
+def simulate(model: Model, o: SimulateOptions) -> Result:
+    """The motion by the method asked for, or by the one that suits the model: see `Mechanism.simulate`."""
+    model = model.snapshot()
+    t_start = start_time(o.t_start, o.start)
+    span = (t_start, o.t_end, output_times(t_start, o.t_end, o.outputs))
+    way = choose_method(model, o)
+    try:
+        return simulate_with_reason(model, way.options, span, way.why, o.method == AUTO_METHOD)
+    except (ModelError, SimulationError) as error:
+        if way.instead is None or not is_unresolved(error):
+            raise
+        try:
+            return simulate_with_reason(model, way.instead, span, reason_for_impulses(error), False)
+        except FlyballError:
+            raise error from None
+
+
+Span = tuple[float, float, np.ndarray]
+"""Start and end of a motion [s], and its output times."""
+
+
+def simulate_with_reason(
+    model: Model, o: SimulateOptions, span: Span, why: str, auto: bool, part: Segment | None = None
+) -> Result:
+    """The motion, or a part of it, which says by what it was computed, and why; ``auto``: methods may change.
+
+    Raises
+    ------
+    Interrupted
+        If the user ends it.
+    """
+    part = part or whole_motion()
+    try:
+        result = _simulated(model, o, span, auto, part)
+    except SimulationError as error:
+        if isinstance(error.result, Result):
+            _add_reason(error.result, why)
+        raise
+    _add_reason(result, why)
+    if not result.health.success and not part.paused:
+        raise Interrupted(result.health.message, result)
+    return result
+
+
+def _add_reason(result: Result, why: str) -> None:
+    result.health.method = "; ".join(x for x in (why, result.health.method) if x)
+
+
+def _simulated(model: Model, o: SimulateOptions, span: Span, auto: bool, part: Segment) -> Result:
+    """The motion, or a part of it, by a method that is chosen."""
+    started = time.perf_counter()
+    t_start, _, times = span
+    if isinstance(o.method, Stepping):
+        with progress_bar(o.progress, "simulating") as tell:
+            return simulate_by_impulses(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start, part)
+    model = with_contact_points(model, o.parameters)
+    begun = find_initial_state(model, t_start, o.parameters, o.start, o.coordinates, switches=True, part=part)
+    slides = _no_stops(begun) and _fully_driven(begun)  # what drivers prescribe follows no force
+    if slides:
+        begun = find_initial_state(model, t_start, o.parameters, o.start, o.coordinates, part=part)
+    begun.since = started
+    if o.method in IMPLICIT_METHODS and (has_guards(begun) or not _fully_driven(begun)):
+        begun = in_suitable_coordinates(begun, str(o.method), o.coordinates, o.parameters)
+        if o.method == VARIATIONAL:
+            refuse_for_variational(begun)
+    if o.stabilization != "projection":
+        _refuse_idle_stabilization(begun, o.stabilization)
+    for d in changed_velocities(begun.base.departures):
+        warn_user(velocity_not_allowed(d), StartWarning)
+    made = False if o.method in IMPLICIT_METHODS else o.specialize
+    begun.engine = CodeSelection(begun.assembly.compiled, made, UNSUPPORTED_BY_GENERATED.get(o.stabilization, ""))
+    if o.method in IMPLICIT_METHODS:
+        begun.engine.told = f"{GENERAL_ENGINE}: {o.method} goes through the tables"
+    mixed = auto and o.stabilization == "projection" and o.step is None
+    begun.pace = StiffnessMonitor(
+        float(o.t_end), AUTO_METHOD if mixed else str(o.method), partial(reason_against_implicit, begun)
+    )
+    begun.pace.goes_on(begun.carried.get("by", ""))
+    follow = o.stabilization == "projection" and not has_guards(begun) and _fully_driven(begun)
+    with progress_bar(o.progress, "simulating") as tell:
+        result = integrate_motion(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
+    if slides:
+        remark_friction(result)
+    return result
+
+
+def integrate_motion(
+    start: InitialState,
+    t_end: float,
+    times: np.ndarray,
+    o: Integration,
+    task: int,
+    report: ReportProgress,
+) -> Result:
+    """The motion from where it begins, integrated (task INTEGRATE) or as drivers prescribe it (FOLLOW).
+
+    Raises
+    ------
+    ModelError
+        If a table of time ends before the motion does, or the start lies beyond the ends of a table.
+    SimulationError
+        If it cannot go on; its ``result`` holds the motion up to then.
+    """
+    refuse_out_of_table(start.base, float(t_end))
+    o = o.sized(start.base.compiled.values.length)
+    if o.stabilization == "partitioning":
+        initial_state.choose_independent(start.base.compiled.structure.model, start)
+    c, engine = start.assembly.compiled, start.engine or CodeSelection(start.assembly.compiled, False)
+    start.part.begin(c.structure)
+    if task == INTEGRATE:
+        refuse_too_often(c, (start.base.t, float(t_end)), o.max_steps)
+    known = known_breaks(c, start.base.t, float(t_end)) if task == INTEGRATE else NO_BREAKPOINTS
+    sampled = laws_checked_in_steps(c, known)
+    clock = clock_for(start, start.base.t, float(t_end), times, o, sampled)
+    later = not has_guards(start) and can_defer_accelerations(start, o, task)
+    c.array("options").deferred = float(later)
+    here = EventContext(start, clock)
+    if task == INTEGRATE and (
+        o.method in IMPLICIT_METHODS or has_guards(start) or len(known.times) or c.structure.sampled
+    ):
+        rows, interrupted = integrate_events(here, o, row_width(start.assembly), report, engine, known)
+    else:
+        method = tableau(explicit_substitute(o.method))
+        rows, interrupted = np.zeros((0, row_width(start.assembly))), False
+        if start.pace is None or not start.pace.asked:
+            rows, interrupted = run_clock(start.assembly, clock, method, report, task, engine, start.pace, start.part)
+        if start.pace is not None and start.pace.asked and not start.part.paused:
+            more, interrupted = integrate_events(here, o, row_width(start.assembly), report, engine, known)
+            rows = np.concatenate([rows, more])
+        elif start.pace is not None:
+            here.method = "; ".join(start.pace.told)
+    if task == INTEGRATE:
+        here.watched = "; ".join(x for x in (here.watched, remark_on_checked_laws(c, sampled)) if x)
+    owed = None
+    if task == FOLLOW:
+        owed = partial(deferred_works, start, clock, rows)
+        rows = at_outputs(clock, rows)
+    return make_result(here, rows, o, interrupted, owed, partial(solve_accelerations, start, rows) if later else None)
+
+
+def _no_stops(start: InitialState) -> bool:
+    """Whether nothing is watched but corners of laws and friction."""
+    s = start.assembly.compiled.structure
+    return bool(s.switches) and not s.model.events and all(x.switch.kind in (BRANCH, FRICTION) for x in s.switches)
+
+
+def _fully_driven(start: InitialState) -> bool:
+    """Whether drivers leave no freedom: as in the part before it, where there is one."""
+    return bool(start.carried["followed"]) if "followed" in start.carried else leaves_no_freedom(start)
+
+
+def has_guards(start: InitialState) -> bool:
+    """Whether something may happen at an instant: there are guards, or rows with modes."""
+    s = start.assembly.compiled.structure
+    return bool(s.guards or s.switches or s.model.events)
+
+
+def _refuse_idle_stabilization(start: InitialState, stabilization: str) -> None:
+    """Refuse to keep states on constraints where there are none."""
+    if not len(start.assembly.compiled.values.system.rows.law):
+        joint = len(start.base.compiled.values.system.rows.law) > 0
+        where, remedy = ("in joint coordinates ", ", or give coordinates='absolute'") if joint else ("", "")
+        raise ModelError(
+            f"stabilization={stabilization!r} does nothing: {where}no constraint is left to be kept; leave it out"
+            f"{remedy}"
+        )
+
+
+def clock_for(
+    start: InitialState,
+    t: float,
+    t_end: float,
+    times: np.ndarray,
+    o: Integration,
+    sampled: frozenset[int] | None = None,
+) -> ex.StepState:
+    """Everything the compiled loop needs to start, and the choices of the solve.
+
+    ``sampled`` are the laws that are looked at within steps; without it all that can act briefly are.
+    """
+    a, y = start.assembly, start.y
+    refuse_beyond_memory(len(times), row_width(a))
+    s, array = a.compiled.structure, a.compiled.array
+    real, count = ex.StepReals.blank(), ex.StepCounts.blank()
+    real.t, real.t_end, real.rtol = t, t_end, o.rtol
+    first = t if start.part.first is None else start.part.first
+    real.span = (t_end - first) or 1.0
+    real.step = o.step or 0.0
+    real.h = o.step or start.carried.get("width", 0.0)
+    real.h_max = min(o.step or o.max_step, t_end - t)
+    real.largest = max(abs(t), abs(t_end))
+    count.quota = 50
+    count.limit = o.max_steps
+    count.controlled, count.positions = s.nq + s.nv + len(s.controls) - len(s.sampled), s.nq
+    Y = np.zeros((ex.STATE_ROWS, len(y)))
+    Y[0] = y
+    array("options").stabilization = STABILIZATION[o.stabilization]
+    array("options").alpha, array("options").beta = o.alpha or 0.0, o.beta or 0.0
+    array("options").solve_tolerance = 1e-13
+    nothing = sampled is not None and not sampled and not any_formula_breaks(a.compiled.values.system)
+    seen = np.zeros((INSPECTION_ROWS, 0)) if nothing else inspection_buffer(a.compiled.values.system, sampled)
+    works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
+    K = np.zeros((len(tableau(explicit_substitute(o.method)).c) + 1, len(y)))
+    clock = ex.StepState(real, count, times, Y, K, np.array(works, np.int64), seen)
+    set_scales(clock, start.base, a.compiled, o.tolerance(a.compiled.values.length))
+    return clock
+
+
+def set_scales(clock: ex.StepState, base: Assembly, c: CompiledMechanism, atol: float) -> None:
+    """Write what follows from a mechanism's length and weight: tolerances, and what they are compared with."""
+    real = clock.real
+    energy = energy_scale(base, float(real.span))
+    found = scales_and_tolerances(c.values.length, atol, real.rtol, energy)
+    (real.atol, real.scale, real.energy_size), (near, slow) = found
+    c.array("options").position_tolerance, c.array("options").velocity_tolerance = near, slow
+
+
+def scales_and_tolerances(
+    length: float, atol: float, rtol: float, energy: float
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Entries ATOL, SCALE and LEDGER of the clock, TOL_G and TOL_V of the options."""
+    loose = atol + rtol * length
+    near = loose * min(1.0, loose / (TIGHT_TOLERANCE * length))
+    return (atol, length, energy), (
+        min(1e-6, max(TIGHT_G * length, 1e-2 * near)),
+        min(1e-5, max(TIGHT_V, 1e-1 * near)),
+    )
+
+
+def energy_scale(a: Assembly, span: float) -> float:
+    """An energy [J] that errors of works are small against: to lift the mechanism by its length, and to move it by as
+    much in the time there is, besides what it has.
+    """
+    x = a.compiled.values
+    weight = x.unforced.kept.get("weight", None, 1, lambda: _weight(x.system))
+    return rest_energy(weight, x.length, span) + a.compiled.kinetic_energy(a.v)
+
+
+def _weight(S: System) -> tuple[float, float]:
+    """Mass of all bodies [kg], and gravity [m/s^2]."""
+    return float(S.bodies.mass.sum()), float(np.sqrt((S.gravity**2).sum()))
+
+
+def rest_energy(weight: tuple[float, float], length: float, span: float) -> float:
+    """That of a mechanism at rest: of its mass [kg] and gravity [m/s^2], its length [m] and the time [s]."""
+    mass, g = weight
+    fast = min(length / span, 1e150)  # its square is a number, however short the span
+    return mass * (g * length + fast * fast)
+
+
+def row_width(a: Assembly) -> int:
+    """How many numbers are kept of each output time."""
+    s = a.compiled.structure
+    return 1 + s.nq + s.nv + len(a.compiled.z) + s.nv + len(a.compiled.values.system.rows.law) + len(s.prescribed)
+
+
+def run_clock(
+    a: Assembly,
+    clock: ex.StepState,
+    method: Tableau,
+    report: ReportProgress,
+    task: int,
+    engine: CodeSelection | None = None,
+    pace: StiffnessMonitor | None = None,
+    part: Segment | None = None,
+) -> tuple[np.ndarray, bool]:
+    """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted).
+
+    ``engine`` may choose another one on the way; without it the run is table-driven.
+    ``pace`` may ask for another method, and then this one goes no further. It ends early where ``part`` does.
+    """
+    c, engine, part = a.compiled, engine or CodeSelection(a.compiled, False), part or whole_motion()
+    s, wide = c.structure, row_width(a)
+    buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // wide + 1)), wide))
+    rows = []
+    first = clock.real.t
+    span, reached = clock.real.t_end - first or 1.0, 0.0
+    bound, on = None, (c.system, c.scratch)
+    clear_faults(c.array("stack"))
+    engine.begin(clock)
+    quota = engine.limited(clock, float(clock.count.quota))
+    if pace is not None:
+        quota = pace.limited(clock, quota)
+    try:
+        while True:
+            begin, clock.count.quota = time.perf_counter(), part.most(quota)
+            before = clock.count.accepted + clock.count.rejected
+            with deferred_interrupts(s.functions):
+                if bound is None or c.system is not on[0] or c.scratch is not on[1]:  # made code came, or went
+                    bound, on = c.bound(method, clock, buffer), (c.system, c.scratch)
+                used = bound(task)
+                rows.append(buffer[:used].copy())
+            reached = max(reached, (clock.real.t - first) / span)
+            report(reached)
+            if clock.count.status != ex.RUNNING and not engine.hands_over(clock):
+                return np.concatenate(rows), False
+            took = time.perf_counter() - begin
+            done = clock.count.accepted + clock.count.rejected - before
+            part.count_steps(done)
+            engine.choose_again(clock)
+            if part.over(clock if task == INTEGRATE else None):  # of what is followed every step is one
+                return np.concatenate(rows), False
+            quota = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
+            if pace is not None and task == INTEGRATE:
+                pace.asked = pace.turns(c, clock, EXPLICIT_METHOD)
+                if pace.asked:
+                    return np.concatenate(rows), False
+                quota = pace.limited(clock, quota)
+    except KeyboardInterrupt:
+        return np.concatenate(rows) if rows else np.zeros((0, wide)), True
+    finally:
+        engine.end()

@@ -1,0 +1,292 @@
+"""Continuation of a driven mechanism's curve by pseudo-arc length, and location of the singular points on it.
+
+Prediction by tangent and curvature, correction by Newton's method at right angles. No step turns the tangent by
+more than a few degrees. Between two nodes the cubics through the values and the exact slopes of what vanishes at
+singular points (the driver's part of the tangent, the smallest singular value of J) say whether one may lie there,
+also where nothing changes its sign.
+
+Where the driver turns back (its component of the tangent vanishes, J keeps its rank) the root of that component is
+the point. Where J loses rank, the derivatives of the bifurcation function phi(y) = U^T F(x + N y + ...) vanish
+(Lyapunov and Schmidt's reduction); Newton's method on these converges also where no determinant changes its sign.
+
+Source: H. B. Keller (1977); E. L. Allgower, K. Georg, Numerical Continuation Methods (1990), chapters 2, 6 and 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import NotConverged
+from .closure_equations import ClosureEquations, CurvePoint, JacobianRank
+
+LOST_RANK = 1e-7  # part of the largest singular value below which one counts as zero at a located point
+LOCATION_ITERATIONS = 60
+LOCATION_RADIUS = 0.5  # Newton's method may not lead farther away than this [1]
+
+
+def rank_limit(r: JacobianRank) -> float:
+    """What counts as zero among singular values."""
+    return LOST_RANK * float(r.values[0])
+
+
+def locate_branch_point(c: ClosureEquations, x: CurvePoint, dropped: int = 1) -> CurvePoint | None:
+    """The point near x where J loses as many more dimensions of rank as told; None if there is none."""
+    start = x
+    best: tuple[float, CurvePoint] | None = None
+    last = np.inf
+    for _ in range(LOCATION_ITERATIONS):
+        r = c.rank(x)
+        kept = c.columns - 1 - dropped
+        U, V = r.U[:, kept:], r.V[:, kept:]
+        if not U.shape[1]:  # fewer rows than that would leave: freedoms, no singular position
+            return None
+        F = c.residual(x)
+        aside = -r.V[:, :kept] @ ((r.U[:, :kept].T @ F) / r.values[:kept])
+        k = V.shape[1]
+        loss = np.zeros((k, U.shape[1]))  # [j]: U^T J V_j
+        np.fill_diagonal(loss, r.values[kept:])
+        slopes = np.zeros((k, k, U.shape[1]))  # [j, l]: U^T F''[V_j, V_l]
+        for j in range(k):
+            for l in range(j + 1):
+                slopes[j, l] = slopes[l, j] = U.T @ (c.second(x, V[:, j]) if j == l else c.mixed(x, V[:, j], V[:, l]))
+        given = np.array([U.T @ c.mixed(x, V[:, j], aside) for j in range(k)]) if np.any(aside) else 0.0
+        A = slopes.transpose(0, 2, 1).reshape(-1, k)
+        y = -np.linalg.lstsq(A, (loss + given).ravel(), rcond=1e-11)[0]
+        d = aside + V @ y
+        size = float(np.linalg.norm(d))
+        if not np.isfinite(size):
+            return None
+        d *= min(1.0, 0.1 / max(size, 1e-300))
+        measure = float(np.abs(loss).max() + np.abs(F).max())
+        if best is None or measure < best[0]:
+            best = measure, x
+        x = c.at(c.moved(x, d))
+        if np.linalg.norm(c.way(start, x)) > LOCATION_RADIUS:
+            return None
+        if size < 1e-13 or (size < 1e-8 and size > 0.3 * last):
+            break
+        last = size
+    x = x if best is None or _branch_point_residual(c, x, dropped) <= best[0] else best[1]
+    r = c.rank(x)
+    true = np.abs(c.residual(x)).max() < 1e-10 and r.below(rank_limit(r)) > dropped
+    return x if true else None
+
+
+def _branch_point_residual(c: ClosureEquations, x: CurvePoint, dropped: int) -> float:
+    r = c.rank(x)
+    return float(r.values[c.columns - 1 - dropped] + np.abs(c.residual(x)).max())
+
+
+def interior_minimum(f0: float, g0: float, f1: float, g1: float, ds: float) -> tuple[float, float] | None:
+    """Place (0 to 1) and value of the least of the cubic through two values and slopes, if it lies between them."""
+    a, b, c = 2 * (f0 - f1) + ds * (g0 + g1), 3 * (f1 - f0) - ds * (2 * g0 + g1), ds * g0
+    for u in np.roots([3 * a, 2 * b, c] if abs(a) > 1e-14 else [2 * b, c] if abs(b) > 1e-14 else [1.0, 9.0]):
+        if abs(u.imag) < 1e-12 and 0.0 < u.real < 1.0 and 6 * a * u.real + 2 * b > 0.0:
+            u = float(u.real)
+            return u, ((a * u + b) * u + c) * u + f0
+    return None
+
+
+MAX_TURN = 0.12  # the most that a step may turn the tangent [rad]
+SHORTEST_STEP = 1e-7  # the shortest step [1]
+SAME_POINT = 1e-5  # points nearer than this are one [1]
+SMALL_SINGULAR_VALUE = 0.1  # part of the largest singular value below which others may vanish together with the least
+HALF_TURN = 3.0  # of a driver's angle [rad]
+STATIONARY_DRIVER = 1e-8  # a driver's part of the tangent below this is none
+AVOIDED_SINGULAR_VALUE = 1e-6  # singular values below this are avoided by changing the step
+
+BRANCH_LOST = "the curve cannot be followed away from a singular position along the branch chosen"
+
+
+@dataclass(frozen=True)
+class CurveNode:
+    """A regular point of the curve."""
+
+    s: float
+    x: CurvePoint
+    t: np.ndarray  # unit tangent
+    bend: np.ndarray  # x'' by arc length
+    value: float  # smallest singular value of J that does not belong to the tangent
+    slope: float
+
+    @property
+    def drive(self) -> float:
+        """The driver's part of the tangent."""
+        return float(self.t[-1])
+
+
+@dataclass
+class TracedCurve:
+    """One direction of the curve from a point: nodes, singular points (arc length, place), and why it ends."""
+
+    nodes: list[CurveNode] = field(default_factory=list)
+    found: list[tuple[float, CurvePoint]] = field(default_factory=list)
+    end: str = ""
+
+
+class CurveTracer:
+    """Follows the curve of a closure."""
+
+    def __init__(self, c: ClosureEquations, step: float) -> None:
+        self.c, self.step = c, step
+
+    def node(self, s: float, x: CurvePoint, r: JacobianRank, along: np.ndarray) -> CurveNode:
+        """A node at a point with the rank r, its tangent in the direction ``along``."""
+        c = self.c
+        n = c.columns - 1
+        t = r.V[:, n] * (1.0 if r.V[:, n] @ along > 0.0 else -1.0)
+        usable = r.values[:n] > 1e-9 * r.values[0]
+        U, V = r.U[:, :n][:, usable[: r.U.shape[1]]], r.V[:, :n][:, usable]
+        bend = -V @ ((U.T @ c.second(x, t)) / r.values[:n][usable])
+        slope = float(r.U[:, n - 1] @ c.mixed(x, t, r.V[:, n - 1]))
+        return CurveNode(s, x, t, bend, float(r.values[n - 1]), slope)
+
+    def step_from(self, node: CurveNode, h: float) -> CurveNode | None:
+        """The node at a distance h (or -h, backwards) from one, if it can be reached in one step."""
+        predicted = self.c.at(self.c.moved(node.x, h * node.t + 0.5 * h * h * node.bend))
+        found = self.c.close(predicted)
+        if found is None or found[2] > 0.3 * abs(h) + 1e-9:
+            return None
+        new = self.node(node.s + h, found[0], found[1], node.t)
+        turned = float(
+            np.arccos(np.clip(new.t @ (node.t + h * node.bend) / np.linalg.norm(node.t + h * node.bend), -1, 1))
+        )
+        return None if turned > 0.5 * MAX_TURN + 0.5 * abs(h) * MAX_TURN else new
+
+    def off(self, x: CurvePoint, n: np.ndarray, bend: np.ndarray) -> CurveNode:
+        """A regular node a small step away from a point in the direction n of one of its branches."""
+        for h in (0.02, 0.01, 0.005, 0.002, 0.03, 5e-4):
+            found = self.c.close(self.c.at(self.c.moved(x, h * n + 0.5 * h * h * bend)))
+            if found is not None and found[2] < 0.2 * h and found[1].values[self.c.columns - 2] > 1e-5 * h:
+                return self.node(h, found[0], found[1], n + h * bend)
+        raise NotConverged(BRANCH_LOST)
+
+    def onto(self, x: CurvePoint, d: np.ndarray) -> CurveNode:
+        """A regular node a step d away from a point."""
+        found = self.c.close(self.c.at(self.c.moved(x, d)))
+        if found is None:
+            raise NotConverged(BRANCH_LOST)
+        return self.node(float(np.linalg.norm(d)), found[0], found[1], d)
+
+    def follow(
+        self, first: CurveNode, within: Callable[[float], bool], steps: int, home: CurveNode | None
+    ) -> TracedCurve:
+        """Go on from a node until the driver's coordinate leaves what it may be, or the curve closes."""
+        way = TracedCurve([first])
+        h = self._longest(first)
+        while True:
+            last = way.nodes[-1]
+            if len(way.nodes) > steps:
+                way.end = f"stopped after {steps} steps"
+                return way
+            new = self._next(last, h)
+            self._search(last, new, way)
+            way.nodes.append(new)
+            if not within(new.x.a):
+                way.end = "end of the range"
+                return way
+            again = home is not None and abs(new.x.a - home.x.a) < HALF_TURN  # a whole turn on is another value
+            if home is not None and again and new.s - first.s > 4.0 * self.step and self._home(new, home):
+                way.end = "closed"
+                return way
+            h = min(2.0 * (new.s - last.s), self._longest(new))
+
+    def _longest(self, node: CurveNode) -> float:
+        turning = float(np.linalg.norm(node.bend))
+        return min(self.step / float(np.abs(node.t).max()), MAX_TURN / max(turning, 1e-12))
+
+    def _next(self, last: CurveNode, h: float) -> CurveNode:
+        while h > SHORTEST_STEP:
+            new = self.step_from(last, h)
+            if new is not None:
+                if new.value > AVOIDED_SINGULAR_VALUE:
+                    return new
+                h *= 0.83
+            else:
+                h *= 0.5
+        raise NotConverged(
+            f"the curve cannot be followed beyond {last.x.a:.6g} of the driver's coordinate: no step, however short, "
+            f"leads to a neighbouring position"
+        )
+
+    def _home(self, node: CurveNode, home: CurveNode) -> bool:
+        d = self.c.way(node.x, home.x)
+        h = float(d @ node.t)
+        if abs(h) > 2.0 * self.step or np.linalg.norm(d - h * node.t) > 0.3 * self.step or node.t @ home.t < 0.7:
+            return False
+        there = self.step_from(node, h) if abs(h) > 1e-9 else node
+        return there is not None and h < 0.0 and float(np.linalg.norm(self.c.way(there.x, home.x))) < 0.05 * self.step
+
+    def _search(self, m: CurveNode, n: CurveNode, way: TracedCurve) -> None:
+        """Singular points between two nodes."""
+        ds = n.s - m.s
+        least = interior_minimum(m.value, m.slope, n.value, n.slope, ds)
+        if least is not None and least[1] < 0.8 * min(m.value, n.value):
+            self._lost(m, n, least[0], way)
+        if max(abs(m.drive), abs(n.drive)) < STATIONARY_DRIVER:
+            return
+        if m.drive * n.drive < 0.0:
+            self._turned(m, n, way)
+            return
+        sign = 1.0 if m.drive + n.drive > 0.0 else -1.0
+        least = interior_minimum(sign * m.drive, sign * m.bend[-1], sign * n.drive, sign * n.bend[-1], ds)
+        if least is not None and least[1] < 0.5 * min(abs(m.drive), abs(n.drive)):
+            self._touched(m, n, way)
+
+    def _lost(self, m: CurveNode, n: CurveNode, u: float, way: TracedCurve) -> None:
+        middle = self.step_from(m, u * (n.s - m.s)) or m
+        for near in (middle, m, n):
+            values = self.c.rank(near.x).values[: self.c.columns - 1]
+            for dropped in range(max(1, int((values < SMALL_SINGULAR_VALUE * values[0]).sum())), 0, -1):
+                x = locate_branch_point(self.c, near.x, dropped)
+                if x is not None and self._between(m, n, x):
+                    self._note(m.s + float(np.linalg.norm(self.c.way(m.x, x))), x, way)
+                    return
+
+    def _between(self, m: CurveNode, n: CurveNode, x: CurvePoint) -> bool:
+        ds = n.s - m.s
+        return bool(max(np.linalg.norm(self.c.way(k.x, x)) for k in (m, n)) < 1.2 * ds + 1e-9)
+
+    def _turned(self, m: CurveNode, n: CurveNode, way: TracedCurve) -> None:
+        """The root of the driver's part of the tangent, by secants that keep it between."""
+        from scipy.optimize import brentq
+
+        def drive(s: float) -> float:
+            at[0] = self.step_from(m, s - m.s) if s > m.s else m
+            if at[0] is None:
+                raise ArithmeticError
+            return at[0].drive
+
+        at: list[CurveNode | None] = [None]
+        try:
+            s = brentq(drive, m.s, n.s, xtol=1e-14, rtol=1e-14)
+            drive(s)
+        except (ArithmeticError, ValueError, RuntimeError):
+            return
+        if at[0] is not None:
+            self._note(s, at[0].x, way)
+
+    def _touched(self, m: CurveNode, n: CurveNode, way: TracedCurve) -> None:
+        """Where the driver's part of the tangent comes nearest to zero: two roots, a double one, or none."""
+        low, high = m, n
+        sign = 1.0 if m.drive > 0.0 else -1.0
+        for _ in range(60):
+            middle = self.step_from(m, 0.5 * (low.s + high.s) - m.s)
+            if middle is None:
+                return
+            if sign * middle.drive < 0.0:
+                self._turned(m, middle, way)
+                self._turned(middle, n, way)
+                return
+            low, high = (middle, high) if sign * middle.bend[-1] < 0.0 else (low, middle)
+            if high.s - low.s < 1e-14:
+                break
+        if abs(low.drive) < STATIONARY_DRIVER:
+            self._note(low.s, low.x, way)
+
+    def _note(self, s: float, x: CurvePoint, way: TracedCurve) -> None:
+        if all(np.linalg.norm(self.c.way(x, y)) > SAME_POINT or abs(x.a - y.a) > HALF_TURN for _, y in way.found):
+            way.found.append((s, x))

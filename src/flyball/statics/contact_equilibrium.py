@@ -1,0 +1,414 @@
+"""Equilibrium with contact: settling by impulse steps, the forces that carry the mechanism, and its stability.
+
+Whenever the kinetic energy has passed a peak all velocities are set to zero (kinetic damping: Cundall 1976), so
+that what swings settles in a few swings, and what sticks never moves. Laws see a constant time meanwhile.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ..assembly.assemble import assemble
+from ..assembly.assembled_state import Assembly
+from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism
+from ..derivatives.equation_derivatives import MechanismState
+from ..derivatives.output_derivatives import snapshot
+from ..errors import AnalysisError, ModelError, NotConverged
+from ..model.contact import not_for_impulse_stepping
+from ..model.model import Model
+from ..results.equilibrium import (
+    ABOUT_TO_PART,
+    AT_FRICTION_LIMIT,
+    FRICTIONLESS,
+    MARGINAL,
+    NOT_JUDGED,
+    STICKS,
+    Equilibrium,
+    Touch,
+)
+from ..simulation.impulse_stepping.impulse_motion import OutputRecorder, free_coordinates
+from ..simulation.impulse_stepping.setup import (
+    MechanismMotion,
+    make_stepper,
+    movers_of_assembly,
+    partition_bodies,
+    separate_mechanism,
+    smallest_radius,
+    values_with_stops,
+)
+from ..simulation.impulse_stepping.stepper import NoSolution, Stepper
+from ..simulation.impulse_stepping.stepping_tables import NO_RESTITUTION, RESTITUTION_LAW, TIME
+from ..simulation.integration_options import Stepping
+from ..tables.contact_tables import ContactTables, contact_tables
+from ..tables.structure_definition import velocity_names
+from .closed_contacts import FRICTION_LIMIT as NEAR
+from .closed_contacts import PARTING_LIMIT as NOTHING
+from .closed_contacts import ContactState, SupportForces, contact_table, find_closed_contacts, refuse_unknown_surfaces
+from .equilibrium_search import equilibrium_result, newton_search
+from .replacement_joints import (
+    ActiveConstraints,
+    missing_joints_text,
+    model_with_contact_joints,
+    model_without_contacts,
+    support_with_friction,
+)
+from .stability import RestState
+
+SETTLING_STEPS = 40_000
+SETTLING_TRAVEL = 20.0  # way in the mechanism's lengths after which nothing will hold it any more
+STEP_FRACTION = 0.04  # a step, in parts of the time in which the smallest shape would fall by its own size
+REST_ACCELERATION = 1e-7  # acceleration from rest, in parts of what it would be without contact
+SETTLING_ITERATIONS = 400
+
+
+def settled_assembly(model: Model, base: Assembly, parameters: Mapping[str, float] | None) -> Assembly:
+    """The mechanism where it has come to rest; absolute coordinates.
+
+    Parameters
+    ----------
+    model : Model
+        With its contacts.
+    base : Assembly
+        Where it begins: as assembled.
+    parameters : mapping, optional
+
+    Raises
+    ------
+    NotConverged
+        If it does not come to rest.
+    """
+    values = base.compiled.values
+    found = partition_bodies(model, values_with_stops(model, values, parameters))
+    scene = contact_tables(model, values.given, (*found.free, *found.held))
+    refuse_unknown_surfaces(scene)
+    free = len(scene.carriers.mass) - len(found.held)
+    held = separate_mechanism(values, base.t, parameters, found, free)
+    gravity = float(np.linalg.norm(values.system.gravity))
+    h = STEP_FRACTION * math.sqrt(smallest_radius(scene, values) / gravity) if gravity > 0.0 else 5e-3
+    o = Stepping(
+        step=h,
+        tolerance=1e-9 * (gravity or 1.0) * h,
+        iterations=SETTLING_ITERATIONS,
+        position_iterations=SETTLING_ITERATIONS,
+    )
+    still = Assembly(base.compiled, base.t, base.q, 0.0 * base.v)
+    if held:
+        own = held.start.assembly.compiled
+        held.joints.clock.y[0, : own.structure.nq] = own.take(base.compiled, base.t, still.q, still.v)[0]
+    try:
+        stepper = make_stepper(scene, movers_of_assembly(scene, still), values, o, held)
+        stepper.pace.count[RESTITUTION_LAW] = NO_RESTITUTION
+        _Settling(scene, stepper, held, h, base).walk(model.name)
+    except NoSolution:
+        raise AnalysisError(f"{model.name!r} cannot be settled: its equations have no solution on the way") from None
+    kept = OutputRecorder(stepper, held, np.zeros(len(scene.carriers.mass) + 1, np.int64))
+    kept.add(False)
+    q, v, vdot = free_coordinates(base, scene, kept)
+    if held:
+        held.into(values, q, v, vdot)
+    return Assembly(base.compiled, base.t, q[-1], 0.0 * base.v)
+
+
+class _Settling:
+    """The way to rest.
+
+    Parameters
+    ----------
+    scene : Touching
+    stepper : Stepper
+    held : Held, optional
+    h : float [s]
+    base : Assembly
+        Where it begins.
+    """
+
+    def __init__(
+        self, scene: ContactTables, stepper: Stepper, held: MechanismMotion | None, h: float, base: Assembly
+    ) -> None:
+        self.scene, self.stepper, self.held, self.t, self.h = scene, stepper, held, base.t, h
+        c = base.compiled
+        self.size = c.values.length
+        vdot = MechanismState.moving(c, base.t, base.q, 0.0 * base.v).vdot
+        self.usual = float(np.abs(vdot * self.size / c.sizes).max(initial=0.0))  # acceleration without contact
+
+    def walk(self, name: str) -> None:
+        """Step until nothing moves that begins at rest."""
+        before, rested, begun = 0.0, True, self.stepper.movers.pose[:, :3].copy()
+        self._stop()
+        for _ in range(SETTLING_STEPS):
+            self._step()
+            now = self._energy()
+            if rested:
+                acceleration = max(self._speeds().values(), default=0.0) / self.h
+                self.usual = max(self.usual, acceleration)
+                if acceleration <= REST_ACCELERATION * self.usual:
+                    return
+                if (
+                    float(np.abs(self.stepper.movers.pose[:, :3] - begun).max(initial=0.0))
+                    > SETTLING_TRAVEL * self.size
+                ):
+                    break
+            rested = now <= before
+            before = 0.0 if rested else now
+            if rested:
+                self._stop()
+        raise self._failure(name)
+
+    def _step(self) -> None:
+        s = self.stepper
+        s.pace.real[TIME] = self.t
+        s.joints.real.time = self.t
+        s.run(1, self.h)
+
+    def _stop(self) -> None:
+        """All velocities to zero."""
+        s = self.stepper
+        s.workspaces.X.v[:], s.workspaces.X.wide[:], s.movers.twist[:] = 0.0, 0.0, 0.0
+        if self.held:
+            self._mechanism_velocities()[:] = 0.0
+
+    def _energy(self) -> float:
+        s, at = self.stepper, self.scene.carriers
+        n = len(s.free.turn)
+        v = s.workspaces.X.v[:n]
+        w = np.einsum("kji,kj->ki", s.movers.pose[:n, 3:].reshape(-1, 3, 3), v[:, 3:6])
+        own = at.mass[:n] * (v[:, :3] ** 2).sum(axis=1) + np.einsum("ki,kij,kj->k", w, at.inertia[:n], w)
+        return 0.5 * float(own.sum()) + (
+            self._mechanism().kinetic_energy(self._mechanism_velocities()) if self.held else 0.0
+        )
+
+    def _mechanism(self) -> CompiledMechanism:
+        return self.held.start.assembly.compiled  # type: ignore[union-attr]
+
+    def _mechanism_velocities(self) -> np.ndarray:
+        """Velocities of the mechanism."""
+        own = self._mechanism().structure
+        return self.stepper.joints.clock.y[0, own.nq : own.nq + own.nv]
+
+    def _speeds(self) -> dict[str, float]:
+        """Of every body [m/s]: of its centre, and of turning at the radius of gyration."""
+        s, at = self.stepper, self.scene.carriers
+        n = len(s.free.turn)
+        v = s.workspaces.X.v[:n]
+        radius = np.sqrt(np.trace(at.inertia[:n], axis1=1, axis2=2) / np.where(at.mass[:n] > 0.0, at.mass[:n], 1.0))
+        free = np.hypot(np.linalg.norm(v[:, :3], axis=1), radius * np.linalg.norm(v[:, 3:6], axis=1))
+        out = {at.name(k): float(free[k]) for k in range(n)}
+        if self.held:
+            c = self._mechanism()
+            for own, x in zip(
+                velocity_names(c.structure), self._mechanism_velocities() * c.values.length / c.sizes, strict=True
+            ):
+                name = own.name.partition(".")[0]
+                out[name] = max(out.get(name, 0.0), abs(float(x)))
+        return out
+
+    def _failure(self, name: str) -> NotConverged:
+        speed = self._speeds()
+        who = max(speed, key=lambda k: speed[k])
+        return NotConverged(
+            f"{name!r} does not come to rest: after {SETTLING_STEPS * self.h:.3g} s {who!r} still moves at {speed[who]:.3g} "
+            f"m/s: it falls, slides or rolls away. Hold it by friction, a stop or a spring, or begin nearer to "
+            f"where it rests",
+            speed,
+        )
+
+
+HoldingParts = tuple[ActiveConstraints, Mapping[str, float]]
+"""What holds besides contacts, and the most that each part that sticks bears."""
+CORRECTION_LIMIT = 0.02  # a way in parts of the mechanism's length, or radians, that what rests is put right by
+REST_BALANCE = 1e-6  # forces left, of those that act, above which it does not rest
+
+
+def contact_equilibrium(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) -> Equilibrium:
+    """Where a mechanism comes to rest, and what carries it there.
+
+    Parameters
+    ----------
+    model : Model
+        With its contacts.
+    begin : Assembly
+        Where it begins.
+    parameters : mapping, optional
+
+    Raises
+    ------
+    ModelError
+        If it has many bodies, or surfaces that statics does not know.
+    NotConverged
+        If it does not come to rest.
+    """
+    refuse_bulk_and_events(model, "equilibrium")
+    model = model.snapshot()
+    place = _rest_contacts(model, begin, parameters)
+    bare, held = model_without_contacts(model, place.at)
+    place, judged, missing = _stability_with_joints(model, bare, place, parameters)
+    x = _rest_state(bare, place, parameters)
+    found, bears = support_with_friction(model, place, x, held)
+    if found.unbalanced > REST_BALANCE:
+        raise NotConverged(
+            f"{model.name!r} came to rest where contacts and joints leave {found.unbalanced:.2g} of what acts "
+            f"unbalanced; begin nearer to where it rests",
+            {},
+        )
+    return _contact_equilibrium_result(x, place, found, judged, missing, (held, bears))
+
+
+def _rest_contacts(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) -> ContactState:
+    """Where it comes to rest: where it is described, if what holds it bears that; else by steps of impulses.
+
+    Raises
+    ------
+    NotConverged
+        If it does not rest there, and has parts that steps by impulses do not know.
+    """
+    place = find_closed_contacts(model, begin)
+    bare, held = model_without_contacts(model, place.at)
+    left = support_with_friction(model, place, _rest_state(bare, place, parameters), held)[0].unbalanced
+    if left <= REST_BALANCE:
+        return place
+    if unknown := not_for_impulse_stepping(model):
+        raise NotConverged(
+            f"{model.name!r} does not rest where it is described: {left:.2g} of what acts is left unbalanced. The way "
+            f"to where it rests is found by steps of impulses, which do not know "
+            f"{', '.join(e.title for e in unknown)}: "
+            f"describe it where it rests, or simulate it with damping",
+            {},
+        )
+    return find_closed_contacts(model, settled_assembly(model, begin, parameters))
+
+
+def _rest_state(bare: Model, place: ContactState, parameters: Mapping[str, float] | None) -> RestState:
+    """The model with what holds as constraints, at rest at a place."""
+    c = compile_mechanism(bare, parameters=parameters)
+    q, _ = c.take(place.at.compiled, place.at.t, place.at.q, 0.0 * place.at.v)
+    return RestState(c, place.at.t, q, np.zeros(len(c.structure.rows)))
+
+
+def refuse_bulk_and_events(model: Model, analysis: str) -> None:
+    """Refuse many bodies, and events."""
+    if model.events:
+        without = ", ".join(f"{e.name!r}: None" for e in model.events)
+        raise ModelError(
+            f"{analysis} knows no events, and {model.name!r} has {', '.join(e.title for e in model.events)}; simulate "
+            f"does. Without them: m.changed({{{without}}}).{analysis}(...)"
+        )
+    if model.bulk:
+        names = ", ".join(e.title for e in model.bulk)
+        raise ModelError(f"{analysis} does not know {names}; describe what touches as single bodies, or simulate it")
+
+
+def contacts_as_described(model: Model, t: float, parameters: Mapping[str, float] | None) -> ContactState:
+    """What touches as described."""
+    return find_closed_contacts(model, assemble(model, t=t, parameters=parameters))
+
+
+def _stability_with_joints(
+    model: Model, bare: Model, place: ContactState, parameters: Mapping[str, float] | None
+) -> tuple[ContactState, Equilibrium | None, str]:
+    """The place put right to rounding by the closed contacts as joints, and what these say of its stability."""
+    joined, missing = model_with_contact_joints(bare, place)
+    if missing:
+        return place, None, missing_joints_text(missing)
+    c = compile_mechanism(joined, parameters=parameters)
+    q, _ = c.take(place.at.compiled, place.at.t, place.at.q, 0.0 * place.at.v)
+    start = RestState(c, place.at.t, q, np.zeros(len(c.structure.rows)))
+    try:
+        arrived = newton_search(start)
+        if arrived is None:
+            return place, None, "Newton's method does not settle with the closed contacts as joints"
+        far = c.values.length * CORRECTION_LIMIT
+        own, still = place.at.compiled, np.zeros(c.structure.nv)
+        moved = Assembly(own, place.at.t, own.take(c, place.at.t, arrived.q, still)[0], still)
+        now = own.moving(moved.t, moved.q, moved.v)
+        if max(float(np.abs(now[k].p - b.p).max()) for k, b in place.bodies.items()) > far:
+            return place, None, "the balance of forces is elsewhere with the closed contacts as joints"
+        again = find_closed_contacts(model, moved)
+        if [k.name for k in again.contacts] != [k.name for k in place.contacts]:
+            return place, None, "contacts open where forces balance"
+        return again, equilibrium_result(arrived, {}, ""), ""
+    except AnalysisError as error:
+        return place, None, str(error)
+
+
+def _contact_equilibrium_result(
+    x: RestState,
+    place: ContactState,
+    found: SupportForces,
+    smooth_result: Equilibrium | None,
+    missing: str,
+    held: HoldingParts,
+) -> Equilibrium:
+    c = x.c
+    touches = touch_states(place, found, x, *held)
+    result = snapshot(MechanismState.resting(c, x.t, x.q, found.lam))
+    result.contacts = contact_table(place, found.force)
+    notes = _equilibrium_notes(touches, found, missing)
+    kind = smooth_result.stability if smooth_result else NOT_JUDGED
+    if smooth_result and any(k.state in (AT_FRICTION_LIMIT, ABOUT_TO_PART) for k in touches) and kind != "unstable":
+        kind = MARGINAL
+    own = smooth_result or Equilibrium(
+        t=x.t, stability=NOT_JUDGED, freedoms=(), stiffness=np.zeros((0, 0)), weakest={}, least=float("nan"),
+        unbalanced=0.0, method="", parameters={}, result=result, assembly=None,
+    )  # fmt: skip
+    return replace(
+        own,
+        stability=kind,
+        unbalanced=found.unbalanced,
+        method="steps of impulses" + (", then Newton's method" if smooth_result else ""),
+        parameters=dict(c.parameters),
+        result=result,
+        assembly=Assembly(c, x.t, x.q, np.zeros(len(x.scale))),
+        touching=touches,
+        notes=notes,
+    )
+
+
+def touch_states(
+    place: ContactState, found: SupportForces, x: RestState, held: ActiveConstraints, bears: Mapping[str, float]
+) -> tuple[Touch, ...]:
+    """What every closed contact does, and all else that holds."""
+    out = []
+    lam = {name: float(found.lam[x.c.structure.slices[name]].sum()) for name in held.signs}
+    stops = {name: sign * lam[name] for name, sign in held.signs.items() if name not in bears}
+    most = max([*found.force[:, 0].tolist(), 0.0])
+    for c, f in zip(place.contacts, found.force, strict=True):
+        slides = float(np.hypot(f[1], f[2]))
+        most_of_it = c.friction * float(f[0])
+        used = slides / most_of_it if most_of_it > 0.0 else 0.0
+        state = ABOUT_TO_PART if f[0] <= NOTHING * most else FRICTIONLESS if c.friction == 0.0 else STICKS
+        state = AT_FRICTION_LIMIT if state == STICKS and used >= 1.0 - NEAR else state
+        out.append(Touch(c.name, state, float(f[0]), slides, used, c.gap))
+    for name, bound in bears.items():
+        used = abs(lam[name]) / bound if bound > 0.0 else 0.0
+        out.append(Touch(name, AT_FRICTION_LIMIT if used >= 1.0 - NEAR else STICKS, bound, abs(lam[name]), used))
+    for name, effort in stops.items():
+        out.append(
+            Touch(name, ABOUT_TO_PART if effort <= NOTHING * max(map(abs, stops.values())) else FRICTIONLESS, effort)
+        )
+    return tuple(out)
+
+
+def _equilibrium_notes(touches: tuple[Touch, ...], found: SupportForces, missing: str) -> tuple[str, ...]:
+    """What has to be said besides."""
+    out = []
+    for state, rule in (
+        (ABOUT_TO_PART, "nothing is carried there; what is said holds while it stays closed"),
+        (AT_FRICTION_LIMIT, "any more load along it would make it slide"),
+    ):
+        names = [k.name for k in touches if k.state == state]
+        if names:
+            out.append(f"{', '.join(names)} {state}: {rule}")
+    if any(k.state in (STICKS, AT_FRICTION_LIMIT) for k in touches):
+        out.append(
+            "friction holds it: positions nearby are equilibria too, and this is where it comes to rest from where it "
+            "begins; it is judged while its contacts stick"
+        )
+    if not found.unique:
+        out.append("contacts and joints share the load in more than one way: their forces are one of these")
+    if missing:
+        out.append(f"stability is not judged: {missing}")
+    return tuple(out)

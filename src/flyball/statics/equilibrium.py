@@ -1,0 +1,439 @@
+"""Static equilibrium from a guess, with controllers, preloads or steady rotation, and its stability.
+
+With controllers no state of theirs may change either: the auxiliary model of `linear.controllers` is searched. A
+preload is the force offset that makes the reference configuration an equilibrium.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..analysis_options import Options
+from ..assembly.assemble import assemble
+from ..assembly.assembled_state import Assembly
+from ..assembly.compiled_mechanism import CompiledMechanism, compile_mechanism, tangent_step
+from ..derivatives.eigenvalues import spectrum
+from ..derivatives.equation_derivatives import MechanismState
+from ..derivatives.output_derivatives import snapshot
+from ..derivatives.reduced_equations import free_coordinates
+from ..errors import AnalysisError, ModelError, NotConverged, SingularityError
+from ..model.contact import has_switching_elements
+from ..model.element_laws import with_inputs
+from ..model.model import Model
+from ..results.equilibrium import BY_EIGENVALUES, BY_MULTIPLIERS, STABLE, UNSTABLE, Equilibrium
+from ..results.result import Result
+from ..simulation.initial_state import find_initial_state as begin_motion
+from ..tables.structure_definition import velocity_names
+from .contact_equilibrium import contact_equilibrium
+from .controller_states import (
+    AuxiliaryModel,
+    StateScale,
+    auxiliary_model,
+    auxiliary_state,
+    controlled_search_failure,
+    errors_in_user_terms,
+    in_user_terms,
+    state_scales,
+    states_by_positions,
+)
+from .equilibrium_search import (
+    LONGEST_STEP,
+    descent,
+    equilibrium_result,
+    follow_forces,
+    newton_search,
+    newton_search_to,
+    pushed_off,
+    search_failure,
+)
+from .equilibrium_search import find_steady_motion as turn
+from .stability import RestState, stability, stability_by_eigenvalues
+
+SCALING_PASSES = 4  # searches, each in the natural sizes of where the one before ended
+SINGULAR_STIFFNESS = 1e-8  # singular values below this part of the largest are none
+NEWTON_METHOD, FOLLOWING_METHOD = "Newton's method", "following the forces and the controllers"
+SIMILAR_SCALES = 30.0  # times that natural sizes may differ from those that were searched in
+
+
+def auxiliary_rest(
+    model: Model, at: dict[str, float], x: MechanismState, scales: dict[str, StateScale], outputs: Sequence[str] = ()
+) -> tuple[AuxiliaryModel, RestState]:
+    """The copy in which places stand for states, with curves for signals that are asked for, and where it is.
+
+    Raises
+    ------
+    ModelError
+        If something holds at times, too.
+    """
+    other = auxiliary_model(model, {name: repr(z) for name, z in at.items()}, outputs, places=True, scales=scales)
+    if has_switching_elements(other.model):
+        raise ModelError(
+            f"{model.name!r} has controllers and parts that hold at times, and equilibrium knows only one of the two; "
+            f"leave what holds out, m.changed({{...: None}}), or simulate until it rests"
+        )
+    b = auxiliary_state(other, x, "absolute")
+    return other, RestState.at(b.c, b.t, b.q)
+
+
+def controlled_rest(
+    model: Model, c: CompiledMechanism, t: float, q: np.ndarray, at: dict[str, float]
+) -> tuple[np.ndarray, str]:
+    """Positions at rest near some, and what found them; the states there are left in ``c``.
+
+    A controller whose output is at a limit tells Newton's method nothing. Then limits are left out until it is where
+    they do not matter, and where they do the forces and the controllers lead.
+
+    Parameters
+    ----------
+    model : Model
+    c : Compiled
+        Of it, in absolute coordinates.
+    t, q : float, ndarray
+    at : dict
+        State -> its value where the search begins.
+
+    Raises
+    ------
+    NotConverged
+        With what is left.
+    """
+    begin = _SearchPoint(c, t, q, at)
+    try:
+        return _searched_rest(model, begin, newton_search_to).q, NEWTON_METHOD
+    except AnalysisError as error:
+        why = error
+    wide = without_limits(model)
+    if wide is not None:
+        try:
+            return _searched_rest(
+                model, _searched_rest(wide, begin, newton_search_to), newton_search_to
+            ).q, f"{NEWTON_METHOD}, at first without limits"
+        except AnalysisError:
+            pass
+    try:
+        return _searched_rest(model, _searched_rest(model, begin, follow_forces), newton_search_to).q, FOLLOWING_METHOD
+    except AnalysisError:
+        raise why from None
+
+
+def without_limits(model: Model) -> Model | None:
+    """A copy whose controllers have no limits; None if they have none anyway."""
+    freed = [(e, e.unlimited()) for e in model.controllers]
+    if all(a is b for a, b in freed):
+        return None
+    other = model.copy()
+    for a, b in freed:
+        if a is not b:
+            other.replace(b)
+    return other
+
+
+@dataclass(frozen=True)
+class _SearchPoint:
+    """Where a search begins or ends: positions, and states of controllers."""
+
+    c: CompiledMechanism
+    t: float
+    q: np.ndarray
+    at: dict[str, float]
+
+    def state(self) -> MechanismState:
+        """Of the model, the states written."""
+        self.c.z[: len(self.at)] = [*self.at.values()]
+        return MechanismState.resting(self.c, self.t, self.q)
+
+    def moved(self, other: AuxiliaryModel, x: RestState) -> _SearchPoint:
+        """Where a place of a copy with bodies for states is in the model."""
+        q, _ = self.c.take(x.c, x.t, x.q, np.zeros(x.c.structure.nv))
+        return _SearchPoint(self.c, self.t, q, dict(zip(self.at, states_by_positions(other, self.at, x), strict=True)))
+
+
+def _searched_rest(
+    model: Model, place: _SearchPoint, search: Callable[[RestState], tuple[RestState | None, RestState]]
+) -> _SearchPoint:
+    """Where a search ends, in the natural sizes of that place."""
+    scales = None
+    for _ in range(SCALING_PASSES):
+        x = place.state()
+        before, scales = scales, state_scales(model, place.at, x, places=True)
+        if before is not None and _are_similar(before, scales):
+            break
+        other, begin = auxiliary_rest(model, place.at, x, scales)
+        with errors_in_user_terms(other):
+            found, last = search(begin)
+        if found is None:
+            raise _with_saturation_note(controlled_search_failure(last, other), model, place.moved(other, last))
+        place = place.moved(other, found)
+    return place
+
+
+def _with_saturation_note(error: NotConverged, model: Model, place: _SearchPoint) -> NotConverged:
+    """The error, with whose output is at a limit where a search ended."""
+    shot = snapshot(place.state())
+    held = [
+        e.title
+        for e in model.controllers
+        if e.unlimited() is not e and shot.curve(f"{e.name}.output")[1][0] != shot.curve(f"{e.name}.unlimited")[1][0]
+    ]
+    if held:
+        error.args = (f"{error.args[0]}. There the output of {' and of '.join(held)} is at a limit", *error.args[1:])
+    return error
+
+
+def determined_auxiliary_rest(
+    model: Model, at_rest: Assembly, outputs: Sequence[str]
+) -> tuple[AuxiliaryModel, RestState]:
+    """The copy where a mechanism rests, its states at rest as unknowns beside the positions.
+
+    Raises
+    ------
+    SingularityError
+        If something may be elsewhere and rest there too.
+    """
+    c = at_rest.compiled
+    at = dict(zip((x.name for x in c.structure.controls), c.z.tolist(), strict=False))
+    x = MechanismState.resting(c, at_rest.t, at_rest.q)
+    scales = state_scales(model, at, x, places=True)
+    other, rest = auxiliary_rest(model, at, x, scales, outputs)
+    f = free_coordinates(rest.equations)
+    V = f.Zv / rest.scale[:, None] * rest.scale[f.chosen_v]
+    S = V.T @ (rest.K @ V)
+    for axis in (1, 0):
+        size = np.abs(S).max(axis=axis, keepdims=True, initial=0.0)
+        S = S / np.where(size > 0.0, size, 1.0)
+    _, d, Vt = np.linalg.svd(S)
+    if len(d) and not d[-1] > SINGULAR_STIFFNESS * d[0]:
+        weak = in_user_terms(f.names[f.chosen_v[int(np.argmax(np.abs(Vt[-1])))]].name, other)
+        raise SingularityError(
+            f"the equilibrium of {model.name!r} is not determined along {weak!r}: it may rest elsewhere too, so it has "
+            f"no derivatives; have a spring, a driver or a controller hold it there",
+            at_rest.t,
+            (weak,),
+        )
+    return other, rest
+
+
+def _are_similar(a: dict[str, StateScale], b: dict[str, StateScale]) -> bool:
+    """Whether states and rates are as large here as there."""
+    ratios = np.array([(a[k].stride / b[k].stride, a[k].push / b[k].push) for k in a])
+    return bool((np.abs(np.log(ratios)) <= np.log(SIMILAR_SCALES)).all())
+
+
+LINEARIZE_DEFAULTS: dict[str, Any] = {
+    "t": None, "parameters": None, "coordinates": "auto", "frozen": False, "inputs": (), "outputs": ()
+}  # fmt: skip
+"""What `linearize` is asked about an equilibrium, to judge it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EquilibriumOptions(Options):
+    """What `Mechanism.equilibrium` is asked."""
+
+    t: float
+    parameters: Mapping[str, float] | None
+    start: Equilibrium | Result | None
+    stable: bool
+    preload: tuple[str, ...]
+    turning: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.stable and self.turning:
+            raise ModelError(
+                "stable=True goes downhill from an unstable equilibrium; a steady motion has no hill to go down. Leave "
+                "stable= out and begin nearer to the motion that is wanted: by described positions, or start="
+            )
+        if self.stable and self.preload:
+            raise ModelError(
+                "preload= holds the mechanism where it is drawn, stable=True moves it elsewhere; give one of the two"
+            )
+        if self.preload and self.turning:
+            raise ModelError(
+                "preload= holds a mechanism at rest, turning= asks for a motion; give one of the two. The effort of a "
+                "driver tells what a steady motion needs along its coordinate"
+            )
+
+
+def rest_options(
+    t: float, parameters: Mapping[str, float] | None, start: Equilibrium | Result | None = None, stable: bool = False
+) -> EquilibriumOptions:
+    """What other analyses ask: where it rests."""
+    return EquilibriumOptions(t=t, parameters=parameters, start=start, stable=stable, preload=(), turning=())
+
+
+def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
+    """A static equilibrium near the mechanism as described, or a steady motion: see `Mechanism.equilibrium`."""
+    if model.controllers:
+        return _controlled_equilibrium(model, o)
+    a = assemble(model, t=o.t, parameters=o.parameters)
+    begin = _search_start(a, _initial_guess(model, o))
+    if has_switching_elements(model):
+        _refuse_with_contact(o)
+        return contact_equilibrium(model, begin, o.parameters)
+    if o.turning:
+        return _steady_motion(begin, a, o.turning)
+    if o.preload:
+        return equilibrium_result(*preloaded_rest(begin, o.preload), "preload")
+    return _searched_equilibrium(RestState.at(a.compiled, a.t, begin.q), o.stable)
+
+
+def _controlled_equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
+    """Where a mechanism rests with its controllers: no state of theirs changes. Its stability is that of the motion."""
+    for name in ("stable", "preload", "turning"):
+        if getattr(o, name):
+            raise ModelError(f"{name}= is for mechanisms without controllers; leave it out")
+    a = assemble(model, t=o.t, parameters=o.parameters)
+    guess, c = _initial_guess(model, o), a.compiled
+    begin = _search_start(a, guess)
+    z = (guess or begin).compiled.z.tolist()
+    at = dict(zip((x.name for x in c.structure.controls), z, strict=False))
+    q, way = controlled_rest(model.snapshot(), c, a.t, begin.q, at)
+    out = equilibrium_result(RestState.at(c, a.t, q), {}, way)
+    from ..linear.linearize import LinearizeOptions, controlled_linear_model  # linear models stand on statics
+
+    linear, out.stability = controlled_linear_model(model, LinearizeOptions(about=out, **LINEARIZE_DEFAULTS))
+    out.judged_by = BY_MULTIPLIERS if linear.period else BY_EIGENVALUES
+    return out
+
+
+def _refuse_with_contact(o: EquilibriumOptions) -> None:
+    """Refuse what has no meaning where a mechanism comes to rest by falling."""
+    for name in ("preload", "turning", "stable"):
+        if getattr(o, name):
+            raise ModelError(
+                f"{name}= is for mechanisms without contact; with contact it comes to rest by itself. Leave it out"
+            )
+
+
+def _initial_guess(model: Model, o: EquilibriumOptions) -> Assembly | None:
+    """The other equilibrium, or the end of the motion, that is to be begun at; controllers' states with it."""
+    if isinstance(o.start, Result):
+        start = begin_motion(model, o.start.final[0], o.parameters, o.start, "absolute")
+        s = start.assembly.compiled.structure
+        start.assembly.compiled.z = start.y[s.nq + s.nv :].copy()
+        return start.assembly
+    if o.start is None:
+        return None
+    if isinstance(o.start, Equilibrium):
+        at: Assembly = o.start.assembly
+        return at
+    raise ModelError(
+        f"start must be an equilibrium of {model.name!r}, or a result of simulate, not {type(o.start).__name__}"
+    )
+
+
+def _search_start(a: Assembly, guess: Assembly | None) -> Assembly:
+    """Where the search begins: as assembled, or where the guess is."""
+    if guess is None:
+        return a
+    s = a.compiled.structure
+    if list(guess.compiled.structure.place) != list(s.place):
+        raise ModelError(f"start must be an equilibrium of {s.model.name!r}, or of one with the same bodies")
+    q, _ = a.compiled.take(guess.compiled, guess.t, guess.q, guess.v)
+    return Assembly(a.compiled, a.t, q, np.zeros(s.nv))
+
+
+def _searched_equilibrium(x: RestState, stable: bool) -> Equilibrium:
+    """By Newton's method, and by descent where that does not lead on or a stable one is wanted."""
+    way, arrived, shaky = "Newton's method", None, None
+    try:
+        arrived = newton_search(x)
+    except SingularityError as error:  # the forces may lead elsewhere
+        shaky = error
+    unstable = arrived is not None and stability(arrived).kind == UNSTABLE
+    if arrived is not None and unstable and not stable and _differ_by_long_step(x, arrived):
+        downhill = descent(x)  # Newton has led up a hill that the guess is not on
+        below = None if downhill is None else newton_search(downhill)
+        if below is not None and stability(below).kind != UNSTABLE:
+            return equilibrium_result(below, {}, "descent")
+    if arrived is None or (stable and unstable):
+        way = "descent"
+        downhill = descent(x if arrived is None else pushed_off(arrived))
+        arrived = None if downhill is None else newton_search(downhill)
+        if arrived is None:
+            raise shaky or search_failure(downhill or x)
+    return equilibrium_result(arrived, {}, way)
+
+
+def _differ_by_long_step(x: RestState, y: RestState) -> bool:
+    """Whether two positions are more than a long step apart."""
+    return bool(np.abs(tangent_step(x.c, x.q, y.q) / x.scale).max(initial=0.0) > LONGEST_STEP)
+
+
+def _steady_motion(a: Assembly, described: Assembly, names: Sequence[str]) -> Equilibrium:
+    """A steady motion; its stability by its eigenvalues, of which those of the turning itself are zero."""
+    from ..linear.linearize import equations_without_inputs
+
+    c = a.compiled
+    found = turn(a, described, names, c.parameters)
+    x = found.state
+    f, _, r = equations_without_inputs(x)
+    grows = stability_by_eigenvalues(spectrum(r.A, r.uncertainty)) == UNSTABLE
+    q, v = c.take(x.c, x.t, x.q, x.v)
+    return Equilibrium(
+        t=x.t,
+        stability=UNSTABLE if grows else STABLE,
+        freedoms=tuple(f.labels),
+        stiffness=r.K if r.K is not None else np.zeros((0, 0)),
+        weakest={},
+        least=float("nan"),
+        unbalanced=found.unbalanced,
+        method="Newton's method",
+        parameters=dict(c.parameters),
+        result=snapshot(x),
+        assembly=Assembly(c, x.t, q, v),
+        speeds=found.speeds,
+    )
+
+
+# Preload: what has to be added to forces for a mechanism to be in equilibrium where it is drawn.
+
+
+PRELOAD_TOLERANCE = 1e-9  # forces left, of those that act
+PRELOAD_ROUNDING = 1e-13  # part of a force along the free motions that is none
+
+
+def preloaded_rest(a: Assembly, names: Sequence[str]) -> tuple[RestState, dict[str, float]]:
+    """The mechanism at rest with the smallest preloads that balance it, and those.
+
+    The forces along the free motions Z have to vanish: Z^T (f + sum b_k w_k) = 0.
+
+    Raises
+    ------
+    ModelError
+        If there is no such force, or it has no law.
+    NotConverged
+        If these forces cannot balance it.
+    """
+    names = [names] if isinstance(names, str) else list(dict.fromkeys(names))
+    model, inputs = with_inputs(a.compiled.structure.model, names)
+    for i in inputs:
+        if i.driver or i.name == i.parameter:
+            what = "driver" if i.driver else "parameter"
+            raise ModelError(f"{i.name!r} is a {what}; only forces and torques can be preloaded")
+    c = compile_mechanism(model, parameters=a.compiled.parameters)
+    c.follow(a.compiled.hints)
+    x = RestState.at(c, a.t, a.q)
+    e = x.equations
+    own = free_coordinates(e)
+    Z = own.Z
+    by = np.array([e.by_law(i.parameter)[e.at["r"]] for i in inputs]).T
+    along = Z.T @ by
+    most = (np.abs(by) * own.scale[:, None]).sum(axis=0) / own.scale[own.chosen, None]
+    along[np.abs(along) <= PRELOAD_ROUNDING * most] = 0.0  # what the constraints carry balances nothing
+    w = np.linalg.lstsq(along, -Z.T @ e.block("r"), rcond=1e-10)[0]
+    changed = c.parameters | {i.parameter: float(value) for i, value in zip(inputs, w, strict=True)}
+    loaded = compile_mechanism(model, parameters=changed)
+    loaded.follow(c.hints)
+    y = RestState.at(loaded, a.t, a.q)
+    if not y.settled(PRELOAD_TOLERANCE):
+        raise NotConverged(
+            f"{', '.join(names)} cannot balance {model.name!r} where it is drawn: {y.pushed()} all the same; preload "
+            f"other forces too",
+            {n.name: float(-v) for n, v in zip(velocity_names(c.structure), y.equations.block("r"), strict=True)},
+        )
+    return y, dict(zip(names, w.tolist(), strict=True))

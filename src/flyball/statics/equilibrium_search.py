@@ -1,0 +1,485 @@
+"""Searches for equilibria and steady motions: Newton's method and pseudo-transient continuation.
+
+Newton's method on r(q, lam) = -f - G^T lam = 0, g(q) = 0 with the exact stiffness K (reactions turn with the
+bodies). Where it does not converge, pseudo-transient continuation: a motion without inertia, evenly damped, whose
+steps grow as it comes to rest (Kelley and Keyes 1998). It follows the forces, so it ends in stable equilibria.
+Positions that only the closing tolerance keeps from being singular (infinitesimal mechanisms) are refused.
+
+A steady motion has some coordinates that turn evenly while all others stand still. In joint coordinates nothing
+then changes but those angles: r(q, v, 0, lam) = 0 and g(q) = 0 with v zero but for the speeds. A speed that no
+torque decides (a governor that turns freely) stays as described.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..assembly.assembled_state import Assembly
+from ..assembly.positions_and_velocities import row_scales
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
+from ..derivatives.nonsmooth_points import nonsmooth_points
+from ..derivatives.output_derivatives import snapshot
+from ..derivatives.reduced_equations import (
+    force_magnitudes,
+    free_coordinates,
+    is_balanced,
+    is_balanced_beyond_rounding,
+    prescribed_rows,
+    unbalanced_fraction,
+)
+from ..engine.kinematics import retract
+from ..errors import ModelError, NotConverged, SingularityError
+from ..model.joint import Joint
+from ..model.messages import listing, suggest
+from ..numerics.sparse_rank import clearly_independent
+from ..results.equilibrium import Equilibrium
+from ..simulation.initial_state import choose_coordinates
+from ..tables.forest import coordinate_row
+from ..tables.structure_definition import Structure, velocity_names
+from .stability import RestState, stability
+
+REPORTED_COORDINATES = 6  # coordinates of the direction of least stiffness
+
+
+def equilibrium_result(x: RestState, preload: dict[str, float], method: str) -> Equilibrium:
+    """The equilibrium there, judged.
+
+    Parameters
+    ----------
+    x : Rest
+    preload : dict
+        What was added to forces.
+    method : str
+        What found it.
+    """
+    s = stability(x)
+    names = velocity_names(x.c.structure)
+    large = np.argsort(-np.abs(s.direction))[:REPORTED_COORDINATES]
+    x.c.at(x.t, x.q, np.zeros(len(x.scale)))
+    return Equilibrium(
+        t=x.t,
+        stability=s.kind,
+        freedoms=tuple(s.free.labels),
+        stiffness=s.stiffness,
+        weakest={names[d].name: float(s.direction[d]) for d in large if abs(s.direction[d]) > 1e-3},
+        least=s.least,
+        unbalanced=x.unbalanced(),
+        method=method,
+        parameters=dict(x.c.parameters),
+        result=snapshot(MechanismState.resting(x.c, x.t, x.q, x.lam)),
+        assembly=Assembly(x.c, x.t, x.q, np.zeros(len(x.scale))),
+        preload=preload,
+        kinks=s.kinks,
+    )
+
+
+NEWTON_STEPS, DESCENT_STEPS = 40, 400  # steps
+MAX_TRAVEL = 15.0  # way in radians, or in the mechanism's lengths, after which nothing will hold it any more
+LAST_STEP = 1e-7  # Newton's last step: the next one would be its square
+LONGEST_STEP = 0.3  # a step in radians, or parts of the mechanism's length
+NEARLY_LINEAR = 1e-3  # of what is missing: less is left where everything on the way is nearly linear
+PUSH_STEP = 1e-2  # in the same
+FORCE_TOLERANCE = 1e-9  # forces left, of those that act
+GAP_TOLERANCE = 1e-10  # gaps that Newton's method leaves, of the mechanism's length
+LEAST_DAMPING, FIRST_DAMPING, MAX_DAMPING = (
+    1e-8,
+    1e2,
+    1e8,
+)  # dampings: where Newton takes over, where descent begins, where it gives up
+
+
+def newton_search(x: RestState) -> RestState | None:
+    """Newton's method with steps of limited length; None where it does not settle.
+
+    Raises
+    ------
+    SingularityError
+        If it ends in a position in which no finite reactions carry the load.
+    """
+    return newton_search_to(x)[0]
+
+
+def newton_search_to(x: RestState) -> tuple[RestState | None, RestState]:
+    """The same, and where it ended."""
+    for _ in range(NEWTON_STEPS):
+        step, lam = x.step()
+        longest = np.abs(step).max(initial=0.0)
+        if not np.isfinite(longest):
+            break
+        x = _after_long_step(x, step, lam) or x.moved(step * min(1.0, LONGEST_STEP / max(longest, 1e-300)), lam)
+        if longest < LAST_STEP and (best := equilibrium_there(x)):
+            return best, x
+    return None, x
+
+
+def _after_long_step(x: RestState, step: np.ndarray, lam: np.ndarray) -> RestState | None:
+    """Where a longer step than is taken blindly leads, if little turns on the way and nearly nothing is left there."""
+    size = np.abs(step)
+    if not size.max(initial=0.0) > LONGEST_STEP or (size > LONGEST_STEP)[x.turns].any():
+        return None
+    there = x.moved(step, lam)
+    return there if there.missing() < NEARLY_LINEAR * x.missing() else None
+
+
+def equilibrium_there(x: RestState) -> RestState | None:
+    """The place itself if it is closed and all is balanced there; None if not.
+
+    Raises
+    ------
+    SingularityError
+        If no finite reactions carry the load there.
+    """
+    if not x.open() <= GAP_TOLERANCE:
+        return None
+    best = RestState.at(x.c, x.t, x.q)  # the smallest reactions: self-stress would hide what is left
+    if not best.settled(FORCE_TOLERANCE) or _is_balanced_by_jump(best):
+        return None
+    refuse_infinitesimal_mechanism(best)
+    return best
+
+
+def _is_balanced_by_jump(x: RestState) -> bool:
+    """Whether other last digits alone balance it, because a force jumps there."""
+    return not is_balanced_beyond_rounding(x.equations, FORCE_TOLERANCE) and any(
+        k.jump for k in nonsmooth_points(x.equations)
+    )
+
+
+def pushed_off(x: RestState, changed: RestState | None = None) -> RestState:
+    """A little way along the direction of least stiffness.
+
+    Under later values, if given, to the side that the forces push to: just beyond a limit point they are too small to
+    lead out of its neighbourhood.
+
+    Raises
+    ------
+    NotConverged
+        If nothing is free: nothing can give way then, and no branch end.
+    """
+    direction = stability(x).direction
+    largest = np.abs(direction).max(initial=0.0)
+    if not largest:
+        raise search_failure(changed or x)
+    side = 1.0
+    if changed is not None:
+        x = changed.closed()
+        side = -1.0 if float(direction @ x.r) > 0.0 else 1.0
+    return x.moved(PUSH_STEP * side * direction / largest, 0.0 * x.lam).closed()
+
+
+def descent(x: RestState) -> RestState | None:
+    """Pseudo-transient continuation on the constraints; None where it gets no further."""
+    x = x.closed()
+    damping, left, way = FIRST_DAMPING, np.abs(x.r).max(initial=0.0), 0.0
+    for _ in range(DESCENT_STEPS):
+        if damping < LEAST_DAMPING or x.settled(FORCE_TOLERANCE):
+            return x
+        step, lam = x.step(damping)
+        longest = np.abs(step).max(initial=0.0)
+        along = float(step @ -x.r)
+        if not along > 0.0 or longest > LONGEST_STEP:  # against the forces, or too far
+            damping *= 4.0
+            if damping > MAX_DAMPING:
+                return None
+            continue
+        way += longest
+        if way > MAX_TRAVEL:
+            return None
+        x = x.moved(step, lam).closed()
+        before, left = left, np.abs(x.r).max(initial=0.0)
+        damping *= float(np.clip(left / max(before, 1e-300), 0.3, 1.5)) * 0.7
+    return None
+
+
+def follow_forces(x: RestState) -> tuple[RestState | None, RestState]:
+    """The same for what has no potential, as forces of controllers: (place or None, where it ended).
+
+    Implicit steps of a motion without inertia that lengthen as what is missing becomes less (switched evolution
+    relaxation); there is no hill to tell whether one leads down.
+    """
+    x = x.closed()
+    damping, left = FIRST_DAMPING, x.missing()
+    for _ in range(DESCENT_STEPS):
+        if damping < LEAST_DAMPING or x.settled(FORCE_TOLERANCE):
+            return x, x
+        step, lam = x.step(damping)
+        longest = np.abs(step).max(initial=0.0)
+        if not np.isfinite(longest):
+            break
+        if longest > LONGEST_STEP:
+            damping *= 4.0
+            if damping > MAX_DAMPING:
+                break
+            continue
+        x = x.moved(step, lam).closed()
+        before, left = left, x.missing()
+        damping *= float(np.clip(left / max(before, 1e-300), 0.3, 1.5)) * 0.7
+    return None, x
+
+
+def search_failure(x: RestState) -> NotConverged:
+    """What remains where the search ended."""
+    best = RestState.at(x.c, x.t, x.q)
+    names = velocity_names(x.c.structure)
+    left = best.equations.block("r")
+    residuals = {n.name: float(-value) for n, value in zip(names, left, strict=True)}
+    if not free_coordinates(best.equations).Zv.shape[1]:
+        what = "their forces do not balance it" if x.open() <= GAP_TOLERANCE else "they do not close any more"
+        return NotConverged(
+            f"no equilibrium of {x.c.structure.model.name!r} was found: joints and drivers leave nothing free, and "
+            f"where the search ended {what}. Check lengths and drivers: it may be past a dead centre, or locked",
+            residuals,
+        )
+    jumps = "; ".join(k.text for k in nonsmooth_points(best.equations) if k.jump)
+    if jumps:
+        return NotConverged(
+            f"no equilibrium of {x.c.structure.model.name!r} was found: the search ended where {jumps}, and a jumping "
+            f"force is not balanced. Write what is smooth, for instance tanh(x/w) for sign(x)",
+            residuals,
+        )
+    return NotConverged(
+        f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, {best.pushed()} and "
+        f"nothing holds against it. Give a better guess, or add what has to hold it: a spring, a stop, a driver",
+        residuals,
+    )
+
+
+# Loads that nothing carries: positions at rest that only the closing tolerance keeps from being singular.
+#
+# Where constraints lose rank without letting anything move, the structure can shake: w with G w = 0 for which the gaps
+# grow as kappa s^2 / 2 with the way s along it. Forces that do work along w are balanced by no finite reaction.
+# Newton's method ends beside the singular position, where G w = sigma u and the reaction is as large as the way
+# s = sigma / kappa is short. A way whose gaps are within the closing tolerance says nothing:
+# such reactions are made of it.
+
+
+DENSE_SIZE = 300  # rows or columns up to which all singular values are found
+WEAK_SINGULAR_VALUE, ZERO_SINGULAR_VALUE = (
+    1e-3,
+    1e-11,
+)  # singular values of rows of unit length that are looked at: smaller ones carry nothing
+PROBE_STEP = (
+    1e-3  # way along which it is seen how a singular value changes, in radians or parts of the mechanism's length
+)
+LOADED_FRACTION = 1e-4  # work of the forces along the shake, of what they could do: less is none
+PARTICIPATION = 1e-3  # of a dependency: elements with less have none in it
+
+
+def refuse_infinitesimal_mechanism(x: RestState) -> None:
+    """Refuse a position at rest whose reactions are made of the closing tolerance.
+
+    Raises
+    ------
+    SingularityError
+        Naming the elements whose constraints depend on each other there, and what they let shake.
+    """
+    if not len(x.g):
+        return
+    if min(x.G.shape) > DENSE_SIZE and clearly_independent(x.G):  # others bend too much to be shaky
+        return
+    U, d, Vt = np.linalg.svd(x.G.toarray(), full_matrices=False)
+    force = x.scale * EquationDerivatives(MechanismState.resting(x.c, x.t, x.q)).block("r")
+    for u, sigma, w in zip(U.T, d, Vt, strict=True):
+        if not ZERO_SINGULAR_VALUE * d[0] < sigma < WEAK_SINGULAR_VALUE * d[0]:
+            continue
+        there, back = (u @ x.moved(s * PROBE_STEP * w, 0.0 * x.lam).G @ w for s in (1.0, -1.0))
+        bends = abs(there - back) / (2.0 * PROBE_STEP)
+        if sigma**2 < 2.0 * GAP_TOLERANCE * bends and abs(w @ force) > LOADED_FRACTION * (np.abs(w) @ np.abs(force)):
+            raise _infinitesimal_mechanism_error(x, u, w)
+
+
+def _infinitesimal_mechanism_error(x: RestState, u: np.ndarray, w: np.ndarray) -> SingularityError:
+    """The error that names what is shaky."""
+    rows = x.c.structure.rows
+    names = tuple(dict.fromkeys(r.element.name for r, part in zip(rows, u, strict=True) if abs(part) > PARTICIPATION))
+    shakes = velocity_names(x.c.structure)[int(np.argmax(np.abs(w)))].name
+    return SingularityError(
+        f"{x.c.structure.model.name!r} has no equilibrium at t = {x.t:.6g} s: the constraints of {', '.join(names)} "
+        f"depend on each other there, so that it can shake along {shakes}, and no finite reaction carries the load "
+        f"along it. Move them out of this position, take one of them out, or give what yields: a spring, a bushing",
+        x.t,
+        names,
+    )
+
+
+STEADY_ITERATIONS = 60
+STEADY_LONGEST_STEP = 0.2  # a step in radians, parts of the mechanism's length, or parts of a speed
+STEADY_TOLERANCE = 1e-9  # what is left of an equation of motion, of what acts in it
+STEADY_LAST_STEP = 1e-7  # Newton's last step
+STEADY_SINGULAR_VALUE = 1e-11  # singular values below this part of the largest are none
+
+
+@dataclass
+class SteadyMotion:
+    """A steady motion: its state in joint coordinates, and the speeds by name [rad/s or m/s]."""
+
+    state: MechanismState
+    speeds: dict[str, float]
+    unbalanced: float  # the largest force left, of those that act in its equation
+
+
+def find_steady_motion(
+    a: Assembly, described: Assembly, names: Sequence[str], parameters: Mapping[str, float] | None
+) -> SteadyMotion:
+    """Find the steady motion near an assembly in absolute coordinates, with the speeds of the described one at first.
+
+    Raises
+    ------
+    ModelError
+        If a name is no coordinate of a joint, or of one that closes a loop.
+    NotConverged
+        If there is none nearby.
+    """
+    names = [names] if isinstance(names, str) else list(names)
+    b, _ = choose_coordinates(a, "joint", parameters)
+    at = [_velocity_of_coordinate(b, name) for name in names]
+    c, s = b.compiled, b.compiled.structure
+    v = np.zeros(c.structure.nv)
+    v[at] = choose_coordinates(described, "joint", parameters)[0].v[at]
+    start = MechanismState(c, b.t, b.q, v, c.z.copy(), 0.0 * v, np.zeros(len(c.structure.rows)), 0.0 * v)
+    found, _ = _steady_newton(start, at, [])  # with the speeds as they are, if anything balances at these
+    if found is None:
+        found, start = _steady_newton(start, at, [d for d in at if s.tables["tree"].law[_body_of_velocity(s, d)] < 0])
+    if found is None:
+        raise _steady_failure(start, names)
+    x = found
+    c.at(x.t, x.q, x.v)
+    speeds = {name: float(x.v[d]) for name, d in zip(names, at, strict=True)}
+    return SteadyMotion(MechanismState.moving(c, x.t, x.q, x.v), speeds, unbalanced_fraction(EquationDerivatives(x)))
+
+
+def _steady_newton(x: MechanismState, at: list[int], free: list[int]) -> tuple[MechanismState | None, MechanismState]:
+    """Newton's method; None where it does not settle, and where it ended."""
+    for _ in range(STEADY_ITERATIONS):
+        x, size = _steady_step(x, at, free)
+        if size < STEADY_LAST_STEP and _is_steady(x):
+            return x, x
+    return None, x
+
+
+def _is_steady(x: MechanismState) -> bool:
+    """Whether positions, speeds and multipliers fulfil the equations with all accelerations zero."""
+    e = EquationDerivatives(x)
+    return max(_row_gaps(e).max(initial=0.0), _rate_errors(e).max(initial=0.0)) < STEADY_TOLERANCE and is_balanced(
+        e, STEADY_TOLERANCE
+    )
+
+
+def _row_gaps(e: EquationDerivatives) -> np.ndarray:
+    """How far rows are from closed: of the mechanism's length, or in radians."""
+    return np.abs(row_scales(e.state.c) * e.block("g"))
+
+
+def _rate_errors(e: EquationDerivatives) -> np.ndarray:
+    """By how much rows miss their rates, as a part of the fastest velocity or prescribed rate."""
+    x, scale = e.state, row_scales(e.state.c)
+    asked = scale * (e.block("n") - e.by_velocity[e.at["n"]] @ x.v)
+    fastest = np.abs(x.v / x.c.sizes).max(initial=0.0) + np.abs(asked).max(initial=0.0)
+    return np.abs(scale * e.block("n")) / (fastest or 1.0)
+
+
+def _velocity_of_coordinate(b: Assembly, name: str) -> int:
+    """The velocity of a joint's coordinate."""
+    s = b.compiled.structure
+    floating = {n.name: d for d, n in enumerate(velocity_names(s)) if n.unit == "m"}
+    if name in floating:  # of a body that hangs on nothing: where a vehicle rolls along
+        return floating[name]
+    owner, _, what = name.partition(".")
+    element = s.model.find(owner)
+    if not isinstance(element, Joint) or what not in element.coordinates:
+        known = [f"{j.name}.{c}" for j in s.model.joints for c in j.measured(s.model.planar)]
+        hint = f"{suggest(str(name), known)}; {listing(known)}"
+        raise ModelError(f"turning={name!r}: name a joint's coordinate, for instance 'A.angle'{hint}")
+    row = coordinate_row(s, owner, what)
+    if row is None:
+        raise ModelError(
+            f"turning={name!r}: {element.title} closes a loop of the mechanism; name a coordinate along the way from "
+            f"ground, one of {', '.join(n.name for n in velocity_names(s))}"
+        )
+    return int(s.tables["tree"].v[row])
+
+
+def _steady_step(x: MechanismState, at: list[int], free: list[int]) -> tuple[MechanismState, float]:
+    """One step of Newton's method: (state, size of the step)."""
+    c, s = x.c, x.c.structure
+    given = prescribed_rows(c)
+    moving = np.array([d for d in range(s.nv) if d not in at and not given[:, d].any()], int)
+    scale = c.sizes
+    e = EquationDerivatives(x)
+    A, left, size = _steady_equations(e, moving, np.array(free, int), given, scale)
+    by_row = 1.0 / np.maximum(np.abs(A).max(axis=1, initial=0.0), 1e-300)
+    by_column = 1.0 / np.maximum(np.abs(by_row[:, None] * A).max(axis=0, initial=0.0), 1e-300)
+    step = by_column * np.linalg.lstsq(by_row[:, None] * A * by_column, -by_row * left, rcond=STEADY_SINGULAR_VALUE)[0]
+    m, k, rows = len(moving), len(free), len(s.rows)
+    longest = float(np.abs(step[: m + k]).max(initial=0.0))
+    part = min(1.0, STEADY_LONGEST_STEP / max(longest, 1e-300))
+    way = np.zeros(s.nv)
+    way[moving] = scale[moving] * step[:m] * part
+    q, v = x.q.copy(), x.v.copy()
+    retract(c.values.system, q, way)
+    v[free] += (1.0 + np.abs(v[free])) * step[m : m + k] * part
+    c.at(x.t, q, v)
+    lam, effort = x.lam + size * step[m + k : m + k + rows], x.effort + given.T @ (size * step[m + k + rows :])
+    return replace(x, q=q, v=v, z=c.z.copy(), lam=lam, effort=effort), longest
+
+
+def _steady_equations(
+    e: EquationDerivatives, moving: np.ndarray, free: np.ndarray, given: np.ndarray, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Scaled linear equations for changes of positions, speeds, multipliers and efforts: (A, right side, energy)."""
+    x, s = e.state, e.state.c.structure
+    length = x.c.values.length
+    r, n = e.at["r"], e.at["n"]
+    K, V = e.by_position[r].toarray(), e.by_position[n].toarray()
+    D, G = e.by_velocity[r].toarray(), e.by_velocity[n].toarray()
+    which = np.array([row.holonomic for row in s.rows], bool)
+    size = np.abs(K * np.outer(scale, scale)).max(initial=1e-300) + np.abs(scale * e.block("r")).max(initial=0.0)
+    by_place, by_speed = scale[moving], 1.0 + np.abs(x.v[free])
+    width = len(moving) + len(free)
+    A = np.zeros((s.nv + which.sum() + len(s.rows), width + len(s.rows) + len(given)))
+    forces, gaps, rates = np.split(A, [s.nv, s.nv + which.sum()])
+    forces[:, :width] = scale[:, None] * np.hstack([K[:, moving] * by_place, D[:, free] * by_speed]) / size
+    forces[:, width:] = -scale[:, None] * np.vstack([G, given]).T
+    if s.loads:
+        forces[:, width : width + len(s.rows)] += scale[:, None] * e.by_reactions
+    gaps[:, : len(moving)] = G[which][:, moving] * by_place / length
+    rates[:, :width] = np.hstack([V[:, moving] * by_place, G[:, free] * by_speed])
+    return A, np.r_[scale * e.block("r") / size, e.block("g")[which] / length, e.block("n")], float(size)
+
+
+def _body_of_velocity(s: Structure, d: int) -> int:
+    """The row of the body table that a velocity belongs to."""
+    return int(np.searchsorted(s.tables["tree"].v, d, side="right")) - 1
+
+
+def _steady_failure(x: MechanismState, names: list[str]) -> NotConverged:
+    """The error for a search that did not settle: what is left of forces, or which constraints are not fulfilled."""
+    s, e = x.c.structure, EquationDerivatives(x)
+    left, known = e.block("r"), velocity_names(s)
+    who = ", ".join(names)
+    begin = f"no steady motion of {s.model.name!r} was found in which {who} turn evenly and all else stands still"
+    residuals = {n.name: float(-value) for n, value in zip(known, left, strict=True)}
+    gaps, misses = _row_gaps(e), _rate_errors(e)
+    if max(gaps.max(initial=0.0), misses.max(initial=0.0)) > STEADY_TOLERANCE:
+        worse, unit = (
+            (misses, "of its rate") if misses.max() > gaps.max() else (gaps, "of the mechanism's length, or rad")
+        )
+        k = int(np.argmax(worse))
+        others = ", ".join(n.name for n in known)
+        return NotConverged(
+            f"{begin}: {s.rows[k].element.title} is not fulfilled ({worse[k]:.3g} {unit}). Something else has to move "
+            f"with it: where a wheel rolls, name the coordinate that it rolls along, too (one of {others}), and its "
+            f"speed by Initial or velocity=; or give a better guess of positions and speeds",
+            residuals,
+        )
+    acts = force_magnitudes(e)
+    part = np.abs(left) / np.where(acts > 0.0, acts, np.inf)
+    d = int(np.argmax(part))
+    return NotConverged(
+        f"{begin}: {-left[d]:.3g} remain along {known[d].name}, {part[d]:.2g} of what acts there. Give a better guess "
+        f"of positions and speeds",
+        residuals,
+    )

@@ -1,0 +1,378 @@
+"""Replacement joints: closed contacts and active stops, ropes, latches and friction as joints and constraints.
+
+By these, linear equations and Newton's method know what holds a mechanism; exact to second order, as stiffness
+needs it. A sticking contact is a common point where one side is sharp, and rolls where it is round; a smooth one
+keeps its height. What may push one way only has a sign, friction has a capacity. The joints are given by their
+frames in the reference configuration, and stay constraint rows in any coordinates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..assembly.assembled_state import Assembly
+from ..assembly.compiled_mechanism import compile_mechanism
+from ..constraints.blocks import COMMON_POINT, CONSTANT_DISTANCE, IN_PLANE, ON_PLANE, Row, no_slip
+from ..constraints.switch_kinds import FRICTION, LOCK, ONE_WAY, RATCHET, STATIC, STOP
+from ..derivatives.equation_derivatives import MechanismState
+from ..derivatives.output_derivatives import snapshot
+from ..engine.entry_point import MOTION
+from ..engine.kinematics import load_record as record
+from ..engine.loads import force_row
+from ..errors import ModelError
+from ..joints.coupler import Coupler
+from ..laws.bytecode import STACK_RESERVE, evaluate
+from ..model.body import GROUND
+from ..model.element import Element, element
+from ..model.force import Switch
+from ..model.joint import Joint, WorldFrame
+from ..model.model import Model
+from ..model.unsupported_elements import unsupported_elements
+from ..results.result import Result
+from ..simulation.impulse_stepping.setup import movers_of_assembly
+from ..tables.structure_definition import FrameSpec
+from ..tables.table_definitions import VALUE
+from ..tables.values import Values
+from .closed_contacts import (
+    BALL,
+    CLOSED_GAP,
+    CORNER,
+    DISK,
+    FLAT,
+    SHARP,
+    ContactState,
+    StaticContact,
+    SupportForces,
+    SurfaceForm,
+    support_forces,
+    surface_form,
+)
+from .stability import RestState
+
+Rows = tuple[tuple[float, ...], ...]
+
+
+@element
+class ContactJoint(Joint):
+    """A closed contact between frames F on ``body_i`` and M on ``body_j``.
+
+    Parameters
+    ----------
+    name : str
+    body_i, body_j : str
+    frames : two tuples of 12 numbers
+        F and M in the world as drawn: origin, rotation row by row.
+    radii : tuple of two numbers [m]
+        Of a disk, and of a ball; or the length of a link.
+    """
+
+    frames: tuple[tuple[float, ...], tuple[float, ...]]
+    radii: tuple[float, float] = (0.0, 0.0)
+
+    planar_normal: ClassVar[str] = "y"  # z is the normal of the contact
+    drawn: ClassVar[str] = "point_in_plane"
+
+    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame]:
+        """Its frames."""
+        F, M = (
+            (np.array(x[:3], float), np.array(x[3:], float).reshape(3, 3)) for x in (self.frames[0], self.frames[1])
+        )
+        return {"F": F, "M": M}
+
+
+@element
+class CommonPoint(ContactJoint):
+    """A sharp side sticks."""
+
+    blocks: ClassVar = COMMON_POINT
+    drawn: ClassVar[str] = "spherical"
+
+
+@element
+class PointOnFlat(ContactJoint):
+    """A point M slides on a plane z = 0 of F; a ball's centre above it at the radius of the ball."""
+
+    blocks: ClassVar = (IN_PLANE,)
+
+    def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
+        """The height."""
+        return (*row.par[:6], self.radii[1])
+
+
+@element
+class SlidingDisk(ContactJoint):
+    """A disk M slides on a plane z = 0 of F."""
+
+    blocks: ClassVar[tuple[Row, ...]] = (ON_PLANE,)
+
+    def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
+        """The radii."""
+        return (*row.par[:3], *self.radii, row.par[5], 0.0)
+
+
+@element
+class Rolling(SlidingDisk):
+    """A ball or disk M rolls on a plane z = 0 of F."""
+
+    blocks: ClassVar[tuple[Row, ...]] = (ON_PLANE, no_slip("x"), no_slip("y"))
+    drawn: ClassVar[str] = "rolling"
+
+
+@element
+class Centres(ContactJoint):
+    """Two balls, or a ball and a corner, that slide on each other: their centres keep their distance."""
+
+    blocks: ClassVar = CONSTANT_DISTANCE
+    drawn: ClassVar[str] = "link"
+
+    def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
+        """The distance."""
+        return (*row.par[:6], self.radii[1])
+
+
+FRICTION_ITERATIONS, FRICTION_TOLERANCE = (
+    30,
+    1e-10,
+)  # rounds for friction that follows its load, and a part of it that is no change
+EITHER_SIGN = 0.0
+"""Sign of what may push either way."""
+
+
+@element
+class HeldCoordinate(Coupler):
+    """One coordinate or more, whose weighted sum is held where it is."""
+
+    def check(self, n: Any) -> None:
+        """Whatever it was made of was checked."""
+
+
+@dataclass
+class ActiveConstraints:
+    """What holds a mechanism somewhere.
+
+    Attributes
+    ----------
+    parts : tuple of Element
+        The constraints that stand for what holds, by the names of these.
+    signs : dict
+        Name -> +1 if it may push its quantity up only, -1 down, 0 either way.
+    sticks : dict
+        Those of friction: name -> the element.
+    """
+
+    parts: list[Element] = field(default_factory=list)
+    signs: dict[str, float] = field(default_factory=dict)
+    friction_elements: dict[str, Element] = field(default_factory=dict)
+
+
+def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
+    """What may hold a mechanism at rest at a place, as constraints.
+
+    Raises
+    ------
+    ModelError
+        If something holds that has no constraint here.
+    """
+    out = ActiveConstraints()
+    parts = [e for e in unsupported_elements(model) if e.switches()]
+    if not parts:
+        return out
+    c = compile_mechanism(model, parameters=at.compiled.parameters, switches=True)
+    q, v = c.take(at.compiled, at.t, at.q, 0.0 * at.v)
+    c.at(at.t, q, v)
+    S = c.values.system
+    for k, x in enumerate(c.structure.switches):
+        value = float(c.work.sensed[VALUE, x.measured])
+        size = 1.0 if _is_rotation(model, x.element, x.switch) else c.values.length
+        lower, upper = float(S.switch_numbers.lower[k]), float(S.switch_numbers.upper[k])
+        sign = _push_sign(x.switch.kind, value, lower, upper, CLOSED_GAP * size)
+        if sign is not None:
+            out.parts.append(holding_constraint(x.element, x.switch, c.values, value))
+            out.signs[x.element.name] = sign
+            if x.switch.kind == FRICTION:
+                out.friction_elements[x.element.name] = x.element
+    return out
+
+
+def _is_rotation(model: Model, e: Element, w: Switch) -> bool:
+    return bool(w.along) and model.unit(w.along[0], e) == "rad"
+
+
+def _push_sign(kind: int, x: float, lower: float, upper: float, near: float) -> float | None:
+    """Which way a switch may push at rest; None if it is open."""
+    if kind == STOP:
+        return 1.0 if abs(x - lower) <= near else -1.0 if abs(x - upper) <= near else None
+    if kind == RATCHET:  # a tooth, and the pitch
+        return 1.0 if abs(x - lower - upper * round((x - lower) / upper)) <= near else None
+    return {FRICTION: EITHER_SIGN, LOCK: None, ONE_WAY: 1.0}.get(kind)
+
+
+def holding_constraint(e: Any, w: Switch, x: Values, value: float) -> Element:
+    """The constraint that holds a switch's quantity where it is."""
+    if w.along:
+        weights = e.switch_weights(x.numbers[e.name], w.label) if w.summed else (1.0,)
+        return HeldCoordinate(e.name, w.along, weights=tuple(float(np.real(x)) for x in weights), value=value)
+    if len(w.path) == 1:
+        ends = [x.poses.world(FrameSpec(0, e, role)) for role in e.ends()]
+        frames = [tuple(np.real(np.r_[p, np.ravel(R)]).tolist()) for p, R, _ in ends]
+        at = frames[0][: 2 if x.structure.model.planar else 3]
+        return Centres(e.name, *e.bodies, at=at, frames=(frames[0], frames[1]), radii=(0.0, value))
+    more = len(w.path) - 1
+    points = "a point" if more == 1 else f"{more} points"
+    raise ModelError(
+        f"{e.title} is taut, and runs over {points} between its ends: nothing here holds the sum of its parts. "
+        f"Give it a stiffness"
+    )
+
+
+def friction_capacity(model: Model, at: Assembly, e: Any, reaction: Callable[[str], tuple]) -> float:
+    """The most that something sticks with at rest [N] or [N m]; ``reaction`` of a joint: force and torque, (3,)."""
+    c = compile_mechanism(model, parameters=at.compiled.parameters)
+    q, v = c.take(at.compiled, at.t, at.q, 0.0 * at.v)
+    c.at(at.t, q, v, MOTION)
+    s, S, W = c.structure, c.values.system, c.work
+    k = next(i for i, f in enumerate(s.forces) if f is e)
+    par, first = force_row(S.force_parameters, k), int(S.forces.laws[k, 0])
+    x, load, law = float(W.sensed[VALUE, S.forces.F[k]]), 0.0, 0.0
+    if S.forces.load[k] >= 0:
+        load = float(e.load(par, record(W.FK, int(S.forces.M[k])), *reaction(e.joint)))
+    if first >= 0:
+        stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3))
+        law = float(evaluate(S.code, S.const, first, stack, (at.t, x, 0.0), W.sensed))
+    return abs(float(e.effort(par, x, 0.0, (law, 0.0, STATIC), load)))
+
+
+def support_with_friction(
+    model: Model, place: ContactState, x: RestState, held: ActiveConstraints
+) -> tuple[SupportForces, dict[str, float]]:
+    """What carries a mechanism at rest, and the most that each part that sticks bears under these loads."""
+    found, bears = support_forces(place, x, held.signs), dict[str, float]()
+    for _ in range(FRICTION_ITERATIONS):
+        result = snapshot(MechanismState.resting(x.c, x.t, x.q, found.lam))
+        before, bears = (
+            bears,
+            {
+                k: friction_capacity(model, place.at, e, _joint_reactions(result))
+                for k, e in held.friction_elements.items()
+            },
+        )
+        if all(abs(b - before.get(k, np.inf)) <= FRICTION_TOLERANCE * b for k, b in bears.items()):
+            break
+        found = support_forces(place, x, held.signs, bears)
+    return found, bears
+
+
+def _joint_reactions(result: Result) -> Callable[[str], tuple]:
+    """A joint's force and torque at the one time of a result."""
+
+    def of(joint: str) -> tuple:
+        return tuple(tuple(float(np.ravel(x)[0]) for x in part) for part in result.reactions.of(joint))
+
+    return of
+
+
+def model_without_contacts(model: Model, at: Assembly) -> tuple[Model, ActiveConstraints]:
+    """The model without contacts; what may hold at rest is a constraint there (`replacement_joints.active_constraints`)."""
+    gone = {e.name: None for e in (*model.contacts, *unsupported_elements(model))}
+    out, held = model.changed(gone), active_constraints(model, at)
+    out.add(*held.parts)
+    return out.snapshot(), held
+
+
+def model_with_contact_joints(bare: Model, place: ContactState) -> tuple[Model, dict[str, str]]:
+    """A copy of the model without contacts in which closed contacts are joints.
+
+    Returns
+    -------
+    model : Model
+    missing : dict
+        Contact -> why there is no joint that moves as it does.
+    """
+    out, missing = bare.copy(), dict[str, str]()
+    M = movers_of_assembly(place.scene, place.at)
+    at = _ReferenceFrames(place)
+    for c in place.contacts:
+        G = place.scene.geometry
+        a, b = surface_form(G, M, c.shapes[0], c.point, c.normal), surface_form(G, M, c.shapes[1], c.point, -c.normal)
+        joint = _contact_joint(c, a, b, at)
+        if isinstance(joint, str):
+            missing[c.name] = joint
+        else:
+            out.add(joint)
+    return out.snapshot(), missing
+
+
+class _ReferenceFrames:
+    """Takes frames from where bodies are to where they are drawn."""
+
+    def __init__(self, place: ContactState) -> None:
+        self.axes = 2 if place.at.compiled.structure.model.planar else 3
+        self.here, self.drawn = place.bodies, place.at.compiled.values.given.bodies
+
+    def __call__(self, body: str, p: np.ndarray, R: np.ndarray) -> tuple[float, ...]:
+        """Origin and rotation of a frame on a body, as drawn."""
+        if body != GROUND:
+            x, d = self.here[body], self.drawn[body]
+            p, R = np.real(d.c) + np.real(d.R) @ (x.R.T @ (p - x.p)), np.real(d.R) @ (x.R.T @ R)
+        return tuple(float(v) for v in (*p, *R.ravel()))
+
+
+def _contact_joint(c: StaticContact, a: SurfaceForm, b: SurfaceForm, at: _ReferenceFrames) -> ContactJoint | str:
+    """The joint that moves as a contact does, or why there is none."""
+    bodies, up = c.bodies, c.normal
+    if b.form == FLAT and a.form != FLAT:  # the plane is F
+        a, b, bodies, up = b, a, (bodies[1], bodies[0]), -c.normal
+    kind, centre, radii = _joint_kind(c.friction > 0.0, a, b)
+    if kind is None:
+        how = "sticking" if c.friction > 0.0 else "sliding"
+        return f"{c.name} is a {how} contact of what is {a.form} with what is {b.form} there"
+    axle = b.axle if b.form == DISK else up
+    first = a.centre if kind is Centres and a.form == BALL else c.point
+    second = c.point if centre is None else centre
+    frames = at(bodies[0], first, _normal_axes(up, c)), at(bodies[1], second, _axes_with_z(axle))
+    return kind(c.name, bodies[0], bodies[1], at=tuple(c.point[: at.axes].tolist()), frames=frames, radii=radii)
+
+
+def _joint_kind(
+    sticks: bool, a: SurfaceForm, b: SurfaceForm
+) -> tuple[type[ContactJoint] | None, np.ndarray | None, tuple[float, float]]:
+    """Which joint, where its second origin is (None: where they touch), its radii; ``a`` is flat if one of them is."""
+    forms = {a.form, b.form}
+    if sticks:
+        if CORNER in forms or forms <= set(SHARP):
+            return CommonPoint, None, (0.0, 0.0)
+        if a.form == FLAT and b.form in (BALL, DISK):
+            return Rolling, b.centre, (0.0, b.radius) if b.form == BALL else (b.radius, 0.0)
+        return None, None, (0.0, 0.0)
+    if a.form == FLAT and b.form in SHARP:
+        return PointOnFlat, None, (0.0, 0.0)
+    if a.form == FLAT and b.form == BALL:
+        return PointOnFlat, b.centre, (0.0, b.radius)
+    if a.form == FLAT and b.form == DISK:
+        return SlidingDisk, b.centre, (b.radius, 0.0)
+    if forms <= {BALL, CORNER} and BALL in forms:
+        return Centres, b.centre if b.form == BALL else None, (0.0, a.radius + b.radius)
+    return None, None, (0.0, 0.0)
+
+
+def _normal_axes(up: np.ndarray, c: StaticContact) -> np.ndarray:
+    """Axes of a frame: z along the normal; in the plane y is its normal."""
+    t = c.frame[1]
+    return np.column_stack([t, np.cross(up, t), up])
+
+
+def _axes_with_z(z: np.ndarray) -> np.ndarray:
+    """Axes with this z."""
+    x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def missing_joints_text(missing: Mapping[str, str]) -> str:
+    """Why contacts are not known, in words."""
+    return "; ".join(missing.values())

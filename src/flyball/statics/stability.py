@@ -1,0 +1,471 @@
+"""The state at rest, and whether an equilibrium is stable.
+
+`RestState` has the forces left unbalanced at a position, the stiffness, and the steps of Newton's method;
+everything is in units of energy: translations count as parts of the mechanism's length. Stability follows from the
+constrained stiffness, direction by direction, each coordinate in units of the stiffness that acts on it
+(Sylvester's law of inertia). At nonsmooth points an equilibrium is stable if the potential rises on all sides, and
+unstable if it falls along a direction on the side where that direction leads. Forces without potential are judged
+by the eigenvalues.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..assembly.compiled_mechanism import CompiledMechanism
+from ..derivatives.eigenvalues import Spectrum, spectrum
+from ..derivatives.equation_derivatives import EquationDerivatives, MechanismState
+from ..derivatives.nonsmooth_points import NonsmoothPoint, nonsmooth_error, nonsmooth_points, refuse_nonsmooth
+from ..derivatives.reduced_equations import (
+    DENSE_UNKNOWNS,
+    FreeCoordinates,
+    TurningFrame,
+    force_magnitudes,
+    free_coordinates,
+    is_balanced,
+    minimum_norm_solution,
+    reduced_equations,
+    stiffness_rounding,
+    unbalanced_fraction,
+)
+from ..engine.kinematics import retract
+from ..errors import AnalysisError
+from ..numerics.rank import null_space
+from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE
+from ..results.modes import largest_growth
+from ..tables.structure_definition import velocity_names
+
+
+@dataclass
+class RestState:
+    """A state at rest with multipliers.
+
+    Attributes
+    ----------
+    c : Compiled
+        In absolute coordinates.
+    t : float [s]
+    q, lam : ndarray
+    """
+
+    c: CompiledMechanism
+    t: float
+    q: np.ndarray
+    lam: np.ndarray
+    known_stability: Any = field(default=None, repr=False)  # on its stability, once asked for
+
+    @classmethod
+    def at(cls, c: CompiledMechanism, t: float, q: np.ndarray) -> RestState:
+        """With the multipliers that balance the forces best."""
+        bare = cls(c, t, q, np.zeros(len(c.structure.rows)))
+        return cls(c, t, q, bare.balancing_multipliers())
+
+    @cached_property
+    def equations(self) -> EquationDerivatives:
+        """The equations there."""
+        return EquationDerivatives(MechanismState.resting(self.c, self.t, self.q, self.lam))
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """Size of a step of one along every velocity: the mechanism's length, or a radian."""
+        return self.c.sizes
+
+    @cached_property
+    def G(self):
+        """All constraints, those on velocities too: none of them lets a displacement through. Unit rows; sparse."""
+        import scipy.sparse as sp
+
+        return sp.diags(self.row_scale) @ self.equations.by_velocity[self.equations.at["n"]] @ sp.diags(self.scale)
+
+    @cached_property
+    def row_scale(self) -> np.ndarray:
+        """What makes the rows' length one."""
+        G = self.equations.by_velocity[self.equations.at["n"]]
+        size = np.sqrt(np.asarray((G.multiply(G)) @ (self.scale**2)).ravel())
+        return 1.0 / np.where(size > 0.0, size, 1.0)
+
+    @cached_property
+    def K(self):
+        """Stiffness, scaled, sparse."""
+        import scipy.sparse as sp
+
+        d = sp.diags(self.scale)
+        return d @ self.equations.by_position[self.equations.at["r"]] @ d
+
+    @cached_property
+    def r(self) -> np.ndarray:
+        """What is left of the forces under these multipliers, scaled."""
+        return self.scale * self.equations.block("r")
+
+    @cached_property
+    def g(self) -> np.ndarray:
+        """Constraints' violations, scaled as G; those on velocities have none."""
+        which = np.array([r.holonomic for r in self.c.structure.rows], bool)
+        return np.where(which, self.row_scale * self.equations.block("g"), 0.0)
+
+    @cached_property
+    def size(self) -> float:
+        """The largest energy that acts or that stiffness makes of a step of one."""
+        most = np.abs(self.scale * force_magnitudes(self.equations)).max(initial=0.0)
+        return float(max(most, np.abs(self.K.data).max(initial=0.0), 1e-300))
+
+    @cached_property
+    def turns(self) -> np.ndarray:
+        """Which velocities turn, (nv,) bool."""
+        return np.array([n.unit == "rad" for n in velocity_names(self.c.structure)], bool)
+
+    def missing(self) -> float:
+        """What is left of the forces, of what acts, and the largest gap of the constraints."""
+        return float(np.abs(self.r).max(initial=0.0) / self.size + np.abs(self.g).max(initial=0.0))
+
+    def settled(self, part: float) -> bool:
+        """Whether every equation is balanced, but for a part of what acts in it."""
+        return is_balanced(self.equations, part)
+
+    def unbalanced(self) -> float:
+        """The largest force that the best multipliers leave, of those that act in its equation."""
+        return unbalanced_fraction(RestState(self.c, self.t, self.q, self.balancing_multipliers()).equations)
+
+    def pushed(self) -> str:
+        """The largest force that is left along a free coordinate, in words."""
+        f = free_coordinates(self.equations)
+        force = -f.Zv.T @ self.equations.block("r")
+        if not len(force):
+            return "no force"
+        size = self.scale[f.chosen_v]
+        k = int(np.argmax(np.abs(force * size)))
+        name = f.names[f.chosen_v[k]]
+        return f"{force[k]:.3g} {'N' if name.unit == 'm' else 'N*m'} push along {name.name}"
+
+    def open(self) -> float:
+        """The largest gap, of the mechanism's length or in radians."""
+        return float(np.abs(self.equations.block("g")).max(initial=0.0)) / self.c.values.length
+
+    def balancing_multipliers(self) -> np.ndarray:
+        """Multipliers that leave the least of the forces."""
+        if not len(self.g):
+            return self.lam
+        return self.lam + self.row_scale * minimum_norm_solution(self.G.T, self.r)
+
+    def step(self, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Newton's step, scaled, and the change of multipliers; damped by so many times the identity.
+
+        Raises
+        ------
+        SingularityError
+            If a law has no value or no slope there.
+        """
+        try:
+            return self._solve(self.r, self.g, damping)
+        except AnalysisError:
+            if found := nonsmooth_points(self.equations):
+                raise nonsmooth_error(found, self.t, "where it rests is open") from None
+            raise
+
+    def solved(self, r: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Changes of positions along the velocities and of multipliers that make up for changes r and g."""
+        step, lam = self._solve(self.scale * r, self.row_scale * g, 0.0)
+        return self.scale * step, lam
+
+    def _solve(self, r: np.ndarray, g: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
+        """The linear equations, every row and column by its own stiffness: soft directions beside stiff ones count."""
+        import scipy.sparse as sp
+
+        n = len(self.scale)
+        if n + len(g) <= DENSE_UNKNOWNS:
+            return self._solve_dense(r, g, damping)
+        K = (self.K + damping * self.size * sp.identity(n)).tocsr()
+        stiff = np.asarray(abs(K).max(axis=1).todense()).ravel() if n else np.zeros(0)
+        weakest = 1e-14 * stiff.max(initial=0.0)
+        own = 1.0 / np.sqrt(np.where(stiff > weakest, stiff, stiff.max(initial=1e-300) or 1.0))
+        D = sp.diags(own)
+        if not len(g):
+            return own * minimum_norm_solution(D @ K @ D, -own * r), np.zeros(0)
+        G = self.G @ D
+        rows = np.sqrt(np.asarray(G.multiply(G).sum(axis=1)).ravel())
+        rows = 1.0 / np.where(rows > 0.0, rows, 1.0)
+        G = sp.diags(rows) @ G
+        x = minimum_norm_solution(sp.bmat([[D @ K @ D, -G.T], [G, None]]), np.r_[-own * r, -rows * g])
+        return own * x[:n], rows * x[n:] * self.row_scale
+
+    def _solve_dense(self, r: np.ndarray, g: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
+        """The same of a small mechanism, in arrays: sparse ones take longer to be made than to be solved."""
+        n = len(self.scale)
+        K = self.K.toarray() + damping * self.size * np.eye(n)
+        stiff = np.abs(K).max(axis=1, initial=0.0)
+        most = float(stiff.max(initial=0.0))
+        own = 1.0 / np.sqrt(np.where(stiff > 1e-14 * most, stiff, most or 1.0))
+        K = own[:, None] * K * own
+        if not len(g):
+            return own * minimum_norm_solution(K, -own * r), np.zeros(0)
+        G = self.G.toarray() * own
+        rows = np.sqrt((G * G).sum(axis=1))
+        rows = 1.0 / np.where(rows > 0.0, rows, 1.0)
+        G = rows[:, None] * G
+        x = minimum_norm_solution(np.block([[K, -G.T], [G, np.zeros((len(g), len(g)))]]), np.r_[-own * r, -rows * g])
+        return own * x[:n], rows * x[n:] * self.row_scale
+
+    def moved(self, step: np.ndarray, lam: np.ndarray) -> RestState:
+        """A scaled step on."""
+        q = self.q.copy()
+        retract(self.c.values.system, q, self.scale * step)
+        return RestState(self.c, self.t, q, self.lam + lam)
+
+    def closed(self) -> RestState:
+        """Back on the constraints, with the multipliers that balance best."""
+        now = self
+        for _ in range(8):
+            if not len(now.g) or np.abs(now.g).max() < 1e-12 * self.c.values.length:
+                break
+            now = now.moved(minimum_norm_solution(now.G, -now.g), 0.0 * now.lam)
+        return RestState.at(now.c, now.t, now.q)
+
+
+NEUTRAL_STIFFNESS = 1e-8  # stiffness below this part of what acts is none
+
+
+@dataclass
+class ConstrainedStiffness:
+    """The constrained stiffness at a place, direction by direction.
+
+    ``matrix`` (f, f), ``along`` (nv, f) in scaled velocities, ``parts`` (f,) of what acts, and whether it is that of a
+    ``potential``; ``within`` is `across`.
+    """
+
+    matrix: np.ndarray
+    along: np.ndarray
+    parts: np.ndarray
+    potential: bool
+    within: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]] = field(repr=False)
+
+    def across(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``along`` and ``parts`` of the motions that some normals (m, nv), in scaled velocities, say nothing of."""
+        return self.within(normals)
+
+
+def constrained_stiffness(x: RestState, f: FreeCoordinates) -> ConstrainedStiffness:
+    """The stiffness of the freedoms at a place."""
+    e = x.equations
+    K = f.Zv.T @ e.by_position[e.at["r"]] @ f.Zv
+    Z = f.Zv / x.scale[:, None]
+    blur = np.max([np.abs(f.Zv.T @ d @ f.Zv) for d in stiffness_rounding(e)], axis=0)
+    unit = np.abs(K).sum(axis=1) + blur.sum(axis=1)
+    unit = 1.0 / np.sqrt(np.where(unit > 0.0, unit, 1.0))
+    own, blur = (unit[:, None] * X * unit for X in (K, blur))
+    acts_by = x.scale * force_magnitudes(e)
+
+    def within(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        B = null_space(normals @ Z * unit) if len(normals) else np.eye(len(own))
+        w, V = np.linalg.eigh(0.5 * B.T @ (own + own.T) @ B)
+        V = B @ V
+        along = Z @ (unit[:, None] * V)
+        size = np.abs(along)
+        acts = np.einsum("ik,ik->k", size, abs(x.K) @ size) + acts_by @ size**2
+        real = np.abs(w) > (np.abs(V) * (blur @ np.abs(V))).sum(axis=0)
+        parts = np.where(real, w / np.where(acts > 0.0, acts, 1.0), 0.0)
+        return along / np.linalg.norm(along, axis=0), parts
+
+    potential = bool((np.abs(own - own.T) <= NEUTRAL_STIFFNESS + 2.0 * blur).all())
+    return ConstrainedStiffness(K, *within(np.zeros((0, len(Z)))), potential, within)
+
+
+NEUTRAL_ON_SIDE = 1e-5  # stiffness below this part of what acts is none, the way across considered
+MAX_NONSMOOTH = 6  # kinks of which all sides are looked at
+SIDE_OFFSET = 2e-6  # way to a side of a kink, in radians or parts of the mechanism's length
+GROWTH_LIMIT = 1e-4  # growth below this part of the fastest is none
+INSIDE_TOLERANCE = 1e-6  # a direction lies on a side, but for this part
+
+
+def one_sided_stability(
+    x: RestState, f: FreeCoordinates, found: Sequence[NonsmoothPoint]
+) -> tuple[str, ConstrainedStiffness]:
+    """What all sides of kinks say together, and the stiffness of that with the least.
+
+    Raises
+    ------
+    SingularityError
+        If a force jumps, or the sides leave stability open.
+    """
+    if any(k.jump for k in found):
+        raise nonsmooth_error(found, x.t, "whether it is stable there is open")
+    normals = _distinct_normals([k.along[0] * x.scale for k in found])
+    if len(normals) > MAX_NONSMOOTH:
+        raise nonsmooth_error(found, x.t, f"of more than {MAX_NONSMOOTH} at once it is open whether it is stable there")
+    kinds, least = [], None
+    for signs in itertools.product((1.0, -1.0), repeat=len(normals)):
+        own = np.array(signs)[:, None] * normals
+        step = _interior_step(own @ (f.Zv / x.scale[:, None] * f.scale[f.chosen_v]))
+        if step is None:
+            continue
+        way = f.Zv @ (f.scale[f.chosen_v] * step) / x.scale
+        there = x.moved(SIDE_OFFSET * way / np.abs(own @ way).min(), 0.0 * x.lam)
+        s = constrained_stiffness(there, f)
+        kinds.append(_stability_on_side(s, own, there, f))
+        if least is None or s.parts.min(initial=np.inf) < least.parts.min(initial=np.inf):
+            least = s
+    assert least is not None
+    kind = next((k for k in (UNSTABLE, "", MARGINAL) if k in kinds), STABLE)
+    if not kind:
+        raise nonsmooth_error(found, x.t, "whether it is stable there is open")
+    return kind, least
+
+
+def _stability_on_side(s: ConstrainedStiffness, normals: np.ndarray, x: RestState, f: FreeCoordinates) -> str:
+    """What one side of kinks says of stability; nothing if it leaves it open.
+
+    On a cone a quadratic form is least along a direction in which it is stationary within one of the cone's faces
+    (Kaplan 2000), so every face is asked for its own. Without a potential only a motion that stays on the side tells.
+    """
+    if not s.potential:
+        return UNSTABLE if _has_growing_motion(x, f, normals) else ""
+    said = STABLE
+    for k in range(len(normals) + 1):
+        for on in itertools.combinations(range(len(normals)), k):
+            along, parts = s.across(normals[list(on)])
+            inside = _lead_inside(along, np.delete(normals, on, axis=0))
+            if (inside & (parts < -NEUTRAL_ON_SIDE)).any():
+                return UNSTABLE
+            if (inside & (parts <= NEUTRAL_ON_SIDE)).any():
+                said = MARGINAL
+    return said
+
+
+def _lead_inside(along: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Which directions (nv, n), or their opposites, lead to the inside of normals, or along their border."""
+    inward = normals @ along / np.linalg.norm(normals, axis=1)[:, None]
+    return (inward >= -INSIDE_TOLERANCE).all(axis=0) | (inward <= INSIDE_TOLERANCE).all(axis=0)
+
+
+def _has_growing_motion(x: RestState, f: FreeCoordinates, normals: np.ndarray) -> bool:
+    """Whether a straight motion grows that stays on a side: d e^(s t), of real s > 0 and d on the side."""
+    from scipy.linalg import eig
+
+    e = x.equations
+    r = e.at["r"]
+    M, D, K = (f.Zv.T @ X[r] @ f.Zv for X in (e.by_acceleration, e.by_velocity, e.by_position))
+    one, none = np.eye(len(M)), np.zeros_like(M)
+    w, V = eig(np.block([[none, one], [-K, -D]]), np.block([[one, none], [none, M]]))
+    grows = np.isfinite(w) & (w.real > GROWTH_LIMIT * np.abs(w[np.isfinite(w)]).max(initial=0.0)) & (w.imag == 0.0)
+    d = f.Zv @ V[: len(M), grows].real / x.scale[:, None]
+    return bool(_lead_inside(d / np.linalg.norm(d, axis=0), normals).any())
+
+
+def _distinct_normals(normals: Sequence[np.ndarray]) -> np.ndarray:
+    """Normals of which none is along another."""
+    out: list[np.ndarray] = []
+    for n in normals:
+        n = n / np.linalg.norm(n)
+        if not any(abs(abs(n @ m) - 1.0) < INSIDE_TOLERANCE for m in out):
+            out.append(n)
+    return np.array(out)
+
+
+def _interior_step(A: np.ndarray) -> np.ndarray | None:
+    """A step that leads to the inside of A step >= 0, of entries up to one; None if there is none."""
+    from scipy.optimize import linprog
+
+    m, n = A.shape
+    size = np.abs(A).max(axis=1, keepdims=True)
+    found = linprog(
+        np.r_[np.zeros(n), -1.0], np.hstack([-A / size, np.ones((m, 1))]), np.zeros(m), bounds=[(-1, 1)] * n + [(0, 1)]
+    )
+    return found.x[:n] if found.success and found.x[-1] > INSIDE_TOLERANCE else None
+
+
+NEGATIVE_DAMPING = 1e-12  # of the largest damping: what is negative beyond is no rounding
+
+
+@dataclass
+class Stability:
+    """What the stiffness says.
+
+    Attributes
+    ----------
+    kind : str
+        ``"stable"``, ``"marginal"`` or ``"unstable"``.
+    free : Free
+    stiffness : ndarray (f, f)
+        Of the freedoms; at a kink on the side where least of it is.
+    direction : ndarray (nv,)
+        Of least stiffness, in scaled velocities.
+    least : float
+        That stiffness, as part of what springs, weights and reactions do along it by themselves.
+    kinks : tuple of str
+        Forces with another slope on the other side of this place, in words.
+    """
+
+    kind: str
+    free: FreeCoordinates
+    stiffness: np.ndarray
+    direction: np.ndarray
+    least: float
+    kinks: tuple[str, ...] = ()
+
+
+def stability(x: RestState) -> Stability:
+    """Stability of an equilibrium; where forces have kinks there, from all sides of them.
+
+    Raises
+    ------
+    SingularityError
+        If a force jumps there, or the sides of its kinks leave stability open.
+    """
+    if x.known_stability is None:
+        x.known_stability = _computed_stability(x)
+    return x.known_stability
+
+
+def _computed_stability(x: RestState) -> Stability:
+    e = x.equations
+    f = free_coordinates(e)
+    if not f.Zv.shape[1]:
+        return Stability(STABLE, f, np.zeros((0, 0)), np.zeros(len(x.scale)), np.inf)
+    still = 0.0 * f.Zv
+    found = [k for k in nonsmooth_points(e) if k.is_crossed_by(f.Zv * f.scale[f.chosen_v], still)]
+    if found:
+        kind, s = one_sided_stability(x, f, found)
+        k = int(np.argmin(s.parts))
+        texts = tuple(dict.fromkeys(k.text for k in found))
+        return Stability(kind, f, s.matrix, s.along[:, k], float(s.parts[k]), texts)
+    s = constrained_stiffness(x, f)
+    k = int(np.argmin(s.parts))
+    kind = UNSTABLE if s.parts[k] < -NEUTRAL_STIFFNESS else MARGINAL if s.parts[k] <= NEUTRAL_STIFFNESS else STABLE
+    if not s.potential:  # flutter shows in the motion
+        refuse_nonsmooth(e, still, f.Zv)
+        kind = _stability_by_motion(e, f)
+    elif kind == STABLE and _has_negative_damping(e, f) and _stability_by_motion(e, f) == UNSTABLE:
+        kind = UNSTABLE
+    return Stability(kind, f, s.matrix, s.along[:, k], float(s.parts[k]))
+
+
+def _has_negative_damping(e: EquationDerivatives, f: FreeCoordinates) -> bool:
+    """Whether forces that follow velocities give energy to some motion: a negative damper."""
+    D = f.Zv.T @ e.by_velocity[e.at["r"]] @ f.Zv
+    d = np.linalg.eigvalsh(0.5 * (D + D.T))
+    return bool(len(d) and d[0] < -NEGATIVE_DAMPING * np.abs(d).max())
+
+
+def stability_by_eigenvalues(eigenvalues: Spectrum, *, discrete: bool = False) -> str:
+    """Stability by the motion, each eigenvalue judged by what it is uncertain by itself.
+
+    Parameters
+    ----------
+    eigenvalues : Spectrum
+    discrete : bool
+        Whether they are multipliers from one instant to the next, which must not exceed 1 in size.
+    """
+    most = largest_growth(eigenvalues.values, eigenvalues.uncertainty, discrete=discrete)
+    return UNSTABLE if most > 0.0 else MARGINAL if most == 0.0 else STABLE
+
+
+def _stability_by_motion(e: EquationDerivatives, f: FreeCoordinates) -> str:
+    """Stability by the eigenvalues, damping included."""
+    none = np.zeros((len(f.scale),) * 2)
+    r = reduced_equations(e, f, TurningFrame(np.zeros(3), none, none))
+    return stability_by_eigenvalues(spectrum(r.A, r.uncertainty))

@@ -1,1 +1,0 @@
-"""Steps by impulses: what touches, what joints hold, and how velocities change, over one step of time."""

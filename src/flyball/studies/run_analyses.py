@@ -1,0 +1,463 @@
+"""One run of a study: an analysis of the model, and the quantities that are read from its result by name.
+
+Motions and kinematics give curves over the output times, or one number of a curve; an instant, an equilibrium,
+modes and linear models give numbers; a user's function gives what it returns.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..analysis_options import AssembleOptions, Options
+from ..assembly.assemble import assemble
+from ..derivatives.equation_derivatives import MechanismState
+from ..derivatives.output_derivatives import snapshot
+from ..errors import ModelError, SimulationError
+from ..kinematics.driven_motion import KinematicsOptions, kinematics
+from ..linear.linearize import LinearizeOptions, linearize
+from ..linear.modes import ModesOptions, modes
+from ..model.element_laws import with_inputs
+from ..model.expressions import number
+from ..model.messages import listing, suggest
+from ..model.model import Model
+from ..model.quantities import single_quantity
+from ..model.unsupported_elements import refuse_unsupported, unsupported_elements
+from ..results.equilibrium import NOT_JUDGED, STABLE
+from ..results.linear_model import LinearModel
+from ..simulation.method_choice import SimulateOptions
+from ..simulation.prescribed_motion import KNOWN_SWITCHES
+from ..simulation.simulate import simulate
+from ..statics.controller_states import refuse_sampled_controllers
+from ..statics.equilibrium import equilibrium, rest_options
+
+CURVE, END, FUNCTION, VALUE = "curve", "end", "function", "value"
+
+
+@dataclass(frozen=True)
+class StudyQuantity:
+    """One quantity of a study: ``how`` it is read off what is called ``name``, or off the answer by a function."""
+
+    title: str
+    how: str
+    name: str
+    unit: str
+    function: Callable[[Any], Any] | None = None
+    of: tuple[Any, ...] = ()  # what else its name says
+
+
+def study_quantities(
+    of: Sequence[str] | Mapping[str, Callable[[Any], Any]], named: Callable[[Any], StudyQuantity]
+) -> tuple[StudyQuantity, ...]:
+    """What is asked for.
+
+    Raises
+    ------
+    ModelError
+        If there is no such quantity, or it is no number.
+    """
+    if isinstance(of, Mapping):
+        for title, function in of.items():
+            if not isinstance(title, str) or not callable(function):
+                raise ModelError(f"of maps names to functions of a run's answer, not {title!r} to {function!r}")
+        return tuple(StudyQuantity(title, FUNCTION, title, "", function) for title, function in of.items())
+    if isinstance(of, (str, bytes)) or not isinstance(of, Sequence) or not all(isinstance(x, str) for x in of):
+        raise ModelError(f"of is a list of names, for instance of=['max(slider.x)'], not {of!r}")
+    if len(set(of)) < len(of):
+        raise ModelError(f"of names something twice: {', '.join(map(str, of))}")
+    return tuple(named(text) for text in of)
+
+
+def ends_only(quantities: Sequence[StudyQuantity]) -> bool:
+    """Whether nothing but the ends of motions is looked at."""
+    return all(r.how == END for r in quantities)
+
+
+def reduce_curve(reduction: str, t: np.ndarray, y: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """A curve at the times of the study (nan where the motion has ended before), or one number of it."""
+    if reduction == CURVE and t is times:
+        return y
+    if reduction == CURVE:
+        out = np.full(len(times), np.nan)
+        at = np.searchsorted(times, t)
+        there = at < len(times)
+        there[there] = times[at[there]] == t[there]
+        out[at[there]] = y[there]
+        return out
+    if not len(t):
+        return np.array(np.nan)
+    if reduction == END:
+        return np.array(y[-1])
+    if reduction in ("max", "min"):
+        return np.array(getattr(np, reduction)(y))
+    y = y if reduction == "mean" else y**2
+    span = t[-1] - t[0]
+    mean = float(np.sum(0.5 * (y[1:] + y[:-1]) * np.diff(t)) / span) if span > 0.0 else float(y[-1])
+    return np.array(mean if reduction == "mean" else np.sqrt(mean))
+
+
+REDUCTIONS = ("end", "max", "min", "mean", "rms")
+REDUCTION_NAME = re.compile(rf"\s*({'|'.join(REDUCTIONS)})\s*\((.+)\)\s*")
+CALL_NAME = re.compile(r"\s*(\w+)\s*\(.*\)\s*")
+
+
+class RunAnalysis:
+    """An analysis that a study asks, of one point.
+
+    Attributes
+    ----------
+    title : str
+        As it is called in ``analysis=``.
+    takes : tuple of str
+        Options that it has, besides those of every study.
+    timed : bool
+        Whether it has output times.
+    """
+
+    title: str
+    takes: tuple[str, ...] = ()
+    timed = False
+
+    def refuse(self, model: Model) -> None:
+        """Refuse a model that it knows nothing of, before there are runs."""
+
+    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+        """What each run is asked, but for the parameters that are varied."""
+        raise NotImplementedError
+
+    def run(self, model: Model, o: Any) -> Any:
+        """The answer at one point."""
+        raise NotImplementedError
+
+    def remarks(self, found: Any) -> Sequence[object]:
+        """What a single run would say besides."""
+        return ()
+
+    def doubtful(self, found: Any) -> Sequence[str]:
+        """Reasons to think that the answer is not what its tolerance asks for."""
+        return ()
+
+    def named(self, model: Model, text: Any) -> StudyQuantity:
+        """A quantity by name.
+
+        Raises
+        ------
+        ModelError
+            If there is no such quantity, or it is no number.
+        """
+        raise NotImplementedError
+
+    def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
+        """A quantity of an answer."""
+        raise NotImplementedError
+
+    def read(self, found: Any, quantities: Sequence[StudyQuantity], times: np.ndarray) -> list[np.ndarray]:
+        """What is asked for of one run: (times,) for a curve, else ()."""
+        return [_function_value(r, found) if r.how == FUNCTION else self.value(found, r, times) for r in quantities]
+
+
+class TimedAnalysis(RunAnalysis):
+    """An analysis whose answer is a result over output times."""
+
+    timed = True
+
+    def named(self, model: Model, text: Any) -> StudyQuantity:
+        """A curve, or one number of it."""
+        found = REDUCTION_NAME.fullmatch(text) if isinstance(text, str) else None
+        how, name = (found[1], found[2].strip()) if found else (CURVE, text)
+        if isinstance(name, str) and (called := CALL_NAME.fullmatch(name)):
+            raise ModelError(
+                f"of={text!r}: {called[1]!r} is no number of a curve{suggest(called[1], REDUCTIONS)}; "
+                f"{listing(list(REDUCTIONS))}, of one curve each; for others give functions, of={{'name': function}}"
+            )
+        return StudyQuantity(text, how, name, single_quantity(model, name).unit)
+
+    def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
+        """Read off the curve."""
+        return reduce_curve(r.how, found.t, found.curve(r.name)[1], times)
+
+    def remarks(self, found: Any) -> Sequence[object]:
+        """Those of its health."""
+        return found.health.remarks
+
+
+class MotionAnalysis(TimedAnalysis):
+    """`Mechanism.simulate`."""
+
+    title = "motion"
+    takes = (*(f for f in SimulateOptions.__dataclass_fields__ if f not in ("parameters", "progress")),)
+
+    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+        """Those of the study, at its output times."""
+        return SimulateOptions.asked({**known, "outputs": times, "progress": False})
+
+    def run(self, model: Model, o: SimulateOptions) -> Any:
+        """The motion to its end."""
+        result = simulate(model, o)
+        if not result.health.success:
+            raise SimulationError(result.health.message, result)
+        return result
+
+    def doubtful(self, found: Any) -> Sequence[str]:
+        """Those of its health."""
+        return found.health.doubtful
+
+
+class KinematicsAnalysis(TimedAnalysis):
+    """`Mechanism.kinematics`."""
+
+    title = "kinematics"
+    takes = ("t_start", "t_end", "outputs", "coordinates", "specialize")
+
+    def refuse(self, model: Model) -> None:
+        """Refuse what only a motion knows."""
+        refuse_unsupported(model, self.title, KNOWN_SWITCHES)
+
+    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+        """Those of the study, at its output times."""
+        return KinematicsOptions.asked({**known, "times": times, "t_end": None, "progress": False})
+
+    def run(self, model: Model, o: KinematicsOptions) -> Any:
+        """As drivers prescribe."""
+        return kinematics(model, o)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FunctionOptions(Options):
+    """What a function is asked: the values of the parameters."""
+
+    parameters: Mapping[str, float] | None
+
+
+@dataclass(frozen=True)
+class FunctionAnalysis(RunAnalysis):
+    """A function of the mechanism and the values of its parameters; curves are read of what has them at one time."""
+
+    function: Callable[[Any, dict[str, float]], Any]
+    title = "function"
+
+    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+        """The values of parameters."""
+        return FunctionOptions.asked(known)
+
+    def run(self, model: Model, o: FunctionOptions) -> Any:
+        """What it returns."""
+        return self.function(model, dict(o.parameters or {}))
+
+    def named(self, model: Model, text: Any) -> StudyQuantity:
+        """Only functions know what it returns."""
+        raise ModelError(
+            f"of={text!r}: names say nothing of what a function of your own returns; give of={{'name': function of it}}"
+        )
+
+
+def _function_value(r: StudyQuantity, found: Any) -> np.ndarray:
+    """What a user's function makes of an answer: one number."""
+    y = np.asarray(r.function(found))  # type: ignore[misc]
+    if y.ndim or y.dtype.kind not in "fiub":
+        what = f"an array of {' x '.join(map(str, y.shape))}" if y.ndim else repr(y.item())
+        raise ModelError(f"the function {r.title!r} returned {what}; one number is wanted")
+    return y.astype(float)
+
+
+MODE_NAME = re.compile(r"(frequency|omega|damping_ratio)\[(\d+)\]")
+MODE_UNITS = {"frequency": "Hz", "omega": "rad/s", "damping_ratio": ""}
+RESPONSE_NAME = re.compile(r"(gain|phase)\((.+)\)")
+ABSCISSA, IS_STABLE, LEAST_STIFFNESS = "abscissa", "stable", "least"
+MODE_QUANTITIES = "frequency[0], omega[0] and damping_ratio[0], slowest first, and stable"
+LINEAR_QUANTITIES = "gain(output, input), gain(output, input, omega), phase(output, input, omega) and abscissa"
+
+
+def _curve_at_instant(model: Model, text: Any) -> StudyQuantity:
+    """A curve's value at the one instant that there is."""
+    if isinstance(text, str) and (found := REDUCTION_NAME.fullmatch(text)):
+        raise ModelError(f"of={text!r}: there is one instant only, at which {found[2].strip()} is one number")
+    return StudyQuantity(text, VALUE, text, single_quantity(model, text).unit)
+
+
+class InstantAnalysis(RunAnalysis):
+    """A mechanism assembled at a time: positions, velocities, accelerations and reactions there."""
+
+    title = "instant"
+    takes = ("t",)
+
+    def refuse(self, model: Model) -> None:
+        """Refuse what holds at times: whether it does, a motion knows."""
+        if parts := list(unsupported_elements(model)):
+            raise ModelError(
+                f"{model.name!r} has {', '.join(e.title for e in parts)}, and analysis='instant' does not know what "
+                f"holds at times; analysis='motion' does"
+            )
+
+    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+        """Time and parameters."""
+        return AssembleOptions.asked({**known, "t": known["t"] or 0.0})
+
+    def run(self, model: Model, o: AssembleOptions) -> Any:
+        """The state there, as a result with one time."""
+        a = assemble(model, t=o.t, parameters=o.parameters)
+        return snapshot(MechanismState.moving(a.compiled, a.t, a.q, a.v))
+
+    def named(self, model: Model, text: Any) -> StudyQuantity:
+        """A curve of a result."""
+        return _curve_at_instant(model, text)
+
+    def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
+        """Of the curve."""
+        return np.array(found.curve(r.name)[1][0])
+
+
+class EquilibriumAnalysis(InstantAnalysis):
+    """`Mechanism.equilibrium`."""
+
+    title = "equilibrium"
+
+    def refuse(self, model: Model) -> None:
+        """What it does not know each run says."""
+
+    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+        """Where it rests, as drawn the guess of every run."""
+        return rest_options(known["t"] or 0.0, known["parameters"])
+
+    def run(self, model: Model, o: Any) -> Any:
+        """The equilibrium."""
+        return equilibrium(model, o)
+
+    def named(self, model: Model, text: Any) -> StudyQuantity:
+        """A curve of a result, or a number of the equilibrium."""
+        return (
+            StudyQuantity(text, VALUE, text, "")
+            if text in (IS_STABLE, LEAST_STIFFNESS)
+            else _curve_at_instant(model, text)
+        )
+
+    def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
+        """Of a curve, or of the equilibrium."""
+        if r.name == IS_STABLE:
+            return np.array(np.nan if found.stability == NOT_JUDGED else float(found.stability == STABLE))
+        return np.array(found.least if r.name == LEAST_STIFFNESS else found[r.name])
+
+    def remarks(self, found: Any) -> Sequence[object]:
+        """What makes the answer less than it seems."""
+        own = [] if found.stability == STABLE else [f"the equilibrium is {found.stability}"]
+        return [*own, *found.kinks, *found.notes]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmallMotionOptions(Options):
+    """Where small motions are asked of: as drawn at ``t``, or about the equilibrium."""
+
+    t: float
+    parameters: Mapping[str, float] | None
+    about: str | None
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.about not in (None, "equilibrium"):
+            raise ModelError(f"about must be 'equilibrium' or nothing, got {self.about!r}")
+
+    def there(self, model: Model) -> dict[str, Any]:
+        """Where, for the analysis of it."""
+        told: dict[str, Any] = {"parameters": self.parameters, "coordinates": "auto", "frozen": False}
+        if self.about is None:
+            return told | {"about": None, "t": self.t}
+        return told | {"about": equilibrium(model, rest_options(self.t, self.parameters)), "t": None}
+
+
+class SmallMotionAnalysis(RunAnalysis):
+    """Small motions about a place."""
+
+    takes = ("t", "about")
+
+    def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
+        """Where, and from what to what."""
+        out, into = (
+            tuple(dict.fromkeys(r.of[k] for r in quantities if r.how == VALUE and len(r.of) == 3)) for k in (0, 1)
+        )
+        t, parameters, about = known["t"] or 0.0, known["parameters"], known["about"]
+        return SmallMotionOptions(t=t, parameters=parameters, about=about, inputs=into, outputs=out)
+
+    def remarks(self, found: Any) -> Sequence[object]:
+        """Its notes."""
+        return found.notes
+
+
+class ModesAnalysis(SmallMotionAnalysis):
+    """`Mechanism.modes`."""
+
+    title = "modes"
+
+    def refuse(self, model: Model) -> None:
+        """Refuse sampled controllers, which `linearize` knows."""
+        refuse_sampled_controllers(model, "modes")
+
+    def run(self, model: Model, o: SmallMotionOptions) -> Any:
+        """The modes."""
+        return modes(model, ModesOptions(count=None, **o.there(model)))
+
+    def named(self, model: Model, text: Any) -> StudyQuantity:
+        """A number of a mode, or of all."""
+        if text == IS_STABLE:
+            return StudyQuantity(text, VALUE, text, "")
+        if not (isinstance(text, str) and (found := MODE_NAME.fullmatch(text.replace(" ", "")))):
+            raise ModelError(f"of={text!r}: modes have {MODE_QUANTITIES}")
+        return StudyQuantity(text, VALUE, found[1], MODE_UNITS[found[1]], None, (int(found[2]),))
+
+    def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
+        """Of a mode; nan of one that there is not."""
+        if r.name == IS_STABLE:
+            return np.array(float(found.stable))
+        numbers, k = getattr(found, r.name), r.of[0]
+        return np.array(numbers[k] if k < len(numbers) else np.nan)
+
+
+class LinearAnalysis(SmallMotionAnalysis):
+    """`Mechanism.linearize`: eigenvalues, and what outputs answer to inputs."""
+
+    title = "linearize"
+
+    def run(self, model: Model, o: SmallMotionOptions) -> LinearModel:
+        """The linear model, with the inputs and outputs that are asked for."""
+        return linearize(model, LinearizeOptions(inputs=o.inputs, outputs=o.outputs, **o.there(model)))
+
+    def named(self, model: Model, text: Any) -> StudyQuantity:
+        """Gain or phase from an input to an output, or a number of the eigenvalues."""
+        if text == ABSCISSA:
+            return StudyQuantity(text, VALUE, text, "1/s")
+        if not (isinstance(text, str) and (found := RESPONSE_NAME.fullmatch(text.strip()))):
+            raise ModelError(
+                f"of={text!r}: linear models have {LINEAR_QUANTITIES}; for curves there is analysis='instant'"
+            )
+        how, parts = found[1], [x.strip() for x in found[2].split(",")]
+        if len(parts) not in ((2, 3) if how == "gain" else (3,)):
+            raise ModelError(f"of={text!r}: linear models have {LINEAR_QUANTITIES}")
+        out, into = single_quantity(model, parts[0]).unit, with_inputs(model, [parts[1]])[1][0].unit
+        at = number(parts[2], {}, "rad/s", text) if len(parts) == 3 else 0.0
+        below = f"({into})" if set("*/") & set(into) else into or "1"
+        unit = "rad" if how == "phase" else "" if "SI" in (out, into) else f"{out or 1}/{below}"
+        return StudyQuantity(text, VALUE, how, unit, None, (parts[0], parts[1], at))
+
+    def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
+        """Of the frequency response, at frequency 0 with its sign; or of the eigenvalues."""
+        if r.name == ABSCISSA:
+            return _spectral_abscissa(found)
+        out, into, at = r.of
+        g = found.response([at], into, out)[0]
+        return np.array(np.angle(g) if r.name == "phase" else g.real if at == 0.0 else abs(g))
+
+
+def _spectral_abscissa(found: LinearModel) -> np.ndarray:
+    """The fastest growth [1/s]: of multipliers from one instant to the next that of s in z = exp(s period)."""
+    w = found.eigenvalues
+    if not len(w):
+        return np.array(np.nan)
+    if found.period is None:
+        return np.array(w.real.max())
+    with np.errstate(divide="ignore"):  # what is gone after one period
+        return np.array(np.log(np.abs(w)).max() / found.period)

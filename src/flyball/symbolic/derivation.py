@@ -1,0 +1,35 @@
+"""Derivation of the symbolic equations of a mechanism: options, choice of coordinates, and what each call returns."""
+
+from __future__ import annotations
+
+from ..errors import ModelError
+from ..expression_graph.graph import Symbol
+from ..model.element_laws import with_inputs
+from ..model.model import Model, suggest
+from ..model.unsupported_elements import SLIDING, refuse_unsupported
+from .coordinates import choose_coordinates
+from .equations import Equations, SymbolicOptions
+from .parametrized_model import ParametrizedModel
+
+NAME_CHOICES = ("parameters", "all", "none")
+
+
+def symbolic(model: Model, o: SymbolicOptions) -> Equations:
+    """Equations of motion as expressions: see `Mechanism.symbolic`."""
+    refuse_unsupported(model, "symbolic", SLIDING)
+    if o.names not in NAME_CHOICES:
+        raise ModelError(
+            f"names is {o.names!r}{suggest(o.names, NAME_CHOICES)}; must be one of {', '.join(NAME_CHOICES)}"
+        )
+    plain: Model = model.snapshot()
+    told: dict[str, Symbol] = {}
+    if o.names == "all":
+        numbered = ParametrizedModel(plain)
+        plain, told = numbered.model, numbered.symbols
+    if o.inputs:
+        plain, inputs = with_inputs(plain, o.inputs)
+        told |= {i.parameter: Symbol(i.name, "input", unit=i.unit) for i in inputs if i.parameter != i.name}
+    plain = plain.snapshot()
+    out = Equations(plain, choose_coordinates(plain, o.parameters, o.coordinates), o, told)
+    out.described = model.snapshot()
+    return out

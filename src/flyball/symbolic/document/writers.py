@@ -1,0 +1,227 @@
+"""A document of equations as plain text and as a LaTeX file for pdflatex; formulas broken into lines."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from ...expression_graph.printers.formula_layout import latex_escaped, wrap_fragments
+from ...expression_graph.printers.latex import BREAK, LatexPrinter
+from ...expression_graph.printers.text import TextPrinter, broken_lines
+from .parts import Block, Cell, DataTable, Display, Document, Formula, Matrix, Paragraph, Tex
+
+ZERO = Tex("0", "0")
+
+
+def formula_width(latex: str) -> int:
+    """About how many letters wide a formula is; those of indices count less."""
+    told = re.sub(r"\\(begin|end)\{\w+\}|\\(left|right|quad|,|mathbf|boldsymbol|sqrt|ddot|dot)", "", latex)
+    told = re.sub(r"\\(text|mathrm|operatorname)\{", "{", told)
+    told = re.sub(r"\\(sin|cos|tan)", r"\1", told)
+    told = re.sub(r"\\[A-Za-z]+", "x", told)
+    small = sum(
+        len(re.sub(r"[{}\s]", "", m[1] or m[2])) for m in re.finditer(r"[_^](?:\{((?:[^{}]|\{[^{}]*\})*)\}|(.))", told)
+    )
+    signs = told.count(" + ") + told.count(" - ") + told.count(" = ")
+    return round(len(re.sub(r"[{}_^\s&\\\x1f]", "", told)) - 0.35 * small + 0.8 * signs)
+
+
+def aligned_lines(formula: Formula, most: int) -> str:
+    """A formula in LaTeX, in lines of about ``most`` letters."""
+    printer = LatexPrinter()
+    before = formula.left.latex if not formula.before else printer.products(formula.before)
+    after = printer.apart(formula.right) if formula.after else printer.expression(formula.right)
+    if formula.after:
+        more = printer.products(formula.after)
+        after = more if formula.right == 0.0 else f"{after}{BREAK}{joined_terms(more)}"
+    pieces = [*before.split(BREAK), *f" = {after}".split(BREAK)]
+    rows = wrap_fragments(pieces, most, formula_width)
+    if len(rows) == 1:
+        return rows[0]
+    rows = [("&" if k == 0 else r"&\quad {}") + row for k, row in enumerate(rows)]
+    return r"\begin{aligned} " + " \\\\\n".join(rows) + r" \end{aligned}"
+
+
+def joined_terms(more: str) -> str:
+    """What is added to something, with its sign."""
+    return f" - {more[1:]}" if more.startswith("-") else f" + {more}"
+
+
+def nonzero_entries(matrix: Matrix) -> list[Formula]:
+    """What stands in a matrix that is not zero, entry by entry."""
+    out = []
+    for k, x in _matrix_entries(matrix):
+        if matrix.symmetric and k[0] > k[-1]:
+            continue
+        if x != 0.0:
+            where = ",".join(str(i + 1) for i in k)
+            out.append(
+                Formula(Tex(f"{_entry_letter(matrix.left.latex)}_{{{where}}}", f"{matrix.left.plain}[{where}]"), x)
+            )
+    return out
+
+
+def _matrix_entries(matrix: Matrix) -> list[tuple[tuple[int, ...], object]]:
+    shape = matrix.entries.shape
+    return [((i, j), matrix.entries[i, j]) for i in range(shape[0]) for j in range(shape[1])]
+
+
+def _entry_letter(latex: str) -> str:
+    """The letter of a matrix as that of its entries."""
+    found = re.fullmatch(r"\\mathbf\{(\w)\}", latex)
+    return found[1] if found else latex
+
+
+def matrix_cells(matrix: Matrix) -> list[list[str]]:
+    """Entries in LaTeX; zeros are dots."""
+    printer = LatexPrinter()
+    return [[r"\cdot" if x == 0.0 else printer.expression(x).replace(BREAK, "") for x in row] for row in matrix.entries]
+
+
+def fits_width(made: list[list[str]], most: int) -> bool:
+    """Whether a matrix is no wider than ``most`` letters."""
+    return sum(max((formula_width(c) for c in column), default=0) + 2 for column in zip(*made, strict=True)) <= most
+
+
+TEXT_WIDTH = 100
+
+
+def text_document(document: Document, width: int = TEXT_WIDTH) -> str:
+    """The document, for printing."""
+    out = [document.title, "=" * len(document.title), document.subtitle]
+    for section in document.sections:
+        out += ["", section.title, "-" * len(section.title)]
+        for block in section.blocks:
+            out += text_lines(block, width)
+    return "\n".join(out) + "\n"
+
+
+def text_lines(block: Block, width: int) -> list[str]:
+    """Lines of a block."""
+    if isinstance(block, Paragraph):
+        return [block.text]
+    if isinstance(block, Display):
+        return [block.formula.plain]
+    if isinstance(block, DataTable):
+        return text_table([block.columns, *block.rows])
+    if isinstance(block, Matrix):
+        return text_matrix(block, width)
+    head = [f"{block.title}: {block.note}" if block.note else block.title] if block.title else []
+    return head + [line for f in block.formulas for line in text_formula(f, width)]
+
+
+def text_formula(f: Formula, width: int) -> list[str]:
+    """A formula in lines."""
+    printer = TextPrinter()
+    before = f.left.plain if not f.before else printer.products(f.before)
+    after = printer.expression(f.right)
+    if f.after:
+        more = printer.products(f.after)
+        after = more if f.right == 0.0 else after + joined_terms(more)
+    line = f"{before} = {after}{f'  [{f.unit}]' if f.unit else ''}"
+    first, *others = broken_lines(line, width - 6)
+    return [f"  {first}", *(f"      {x}" for x in others)]
+
+
+def text_matrix(m: Matrix, width: int) -> list[str]:
+    """A matrix under its columns' names; entry by entry if it is too wide."""
+    printer = TextPrinter()
+    rows = [
+        [m.rows[i].plain, *("." if x == 0.0 else printer.expression(x) for x in row)] for i, row in enumerate(m.entries)
+    ]
+    head = ["", *(c.plain for c in m.columns)]
+    lines = text_table([head, *rows]) if m.columns else text_table(rows)
+    if max(map(len, lines), default=0) <= width:
+        return [f"  {m.left.plain} =", *(f"  {line}" for line in lines)]
+    return [line for f in nonzero_entries(m) for line in text_formula(f, width)]
+
+
+def text_table(rows: Sequence[Sequence[Cell]]) -> list[str]:
+    """Rows with their columns under one another."""
+    texts = [[c.plain if isinstance(c, Tex) else c for c in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*texts, strict=True)]
+    return ["  " + "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in texts]
+
+
+LATEX_WIDTH = 84  # letters in a line of a formula
+LATEX_MATRIX_WIDTH = 84
+LATEX_PREAMBLE = r"""\documentclass[10pt,a4paper,fleqn]{article}
+\usepackage[utf8]{inputenc}
+\usepackage{amsmath,amssymb}
+\usepackage[margin=18mm]{geometry}
+\usepackage{longtable}
+\allowdisplaybreaks
+\setlength{\parindent}{0pt}
+\setlength{\parskip}{4pt}
+\setlength{\tabcolsep}{4pt}
+\setlength{\LTleft}{0pt}
+\title{%s}
+\author{}
+\date{%s}
+\begin{document}
+\maketitle
+"""
+UNICODE = {"–": "--", "²": r"\textsuperscript{2}", "³": r"\textsuperscript{3}", "°": r"\textdegree{}", "μ": r"$\mu$"}
+
+
+def latex_document(document: Document) -> str:
+    """The document in LaTeX."""
+    out = [LATEX_PREAMBLE % (latex_words(document.title), latex_words(document.subtitle))]
+    for section in document.sections:
+        out.append(rf"\section*{{{latex_words(section.title)}}}")
+        out += [latex_block(block) for block in section.blocks]
+    return "\n".join(out) + "\n\\end{document}\n"
+
+
+def latex_words(text: str) -> str:
+    """Plain text between LaTeX; letters that the font lacks are left out."""
+    told = latex_escaped(text.replace("\\", "/")).replace(r"\sim ", r"\textasciitilde{}").replace(r"\wedge ", r"\^{}")
+    for letter, latex in UNICODE.items():
+        told = told.replace(letter, latex)
+    return told.encode("latin-1", "replace").decode("latin-1")
+
+
+def latex_block(block: Block) -> str:
+    """A block."""
+    if isinstance(block, Paragraph):
+        return f"{latex_words(block.text)}\n"
+    if isinstance(block, Display):
+        return rf"\[ {block.formula.latex} \]"
+    if isinstance(block, DataTable):
+        return latex_table(block)
+    if isinstance(block, Matrix):
+        return latex_matrix(block)
+    note = f" \\textit{{{latex_words(block.note)}}}" if block.note else ""
+    head = f"\\paragraph{{{latex_words(block.title)}}}{note}\\mbox{{}}\n" if block.title else ""
+    return head + "\n".join(latex_formula(f) for f in block.formulas)
+
+
+def latex_formula(f: Formula) -> str:
+    """A formula in lines."""
+    unit = rf"\quad \text{{{latex_words(f.unit)}}}" if f.unit else ""
+    return rf"\[ {aligned_lines(f, LATEX_WIDTH)}{unit} \]"
+
+
+def latex_matrix(m: Matrix) -> str:
+    """A matrix; entry by entry if it is too wide."""
+    made = matrix_cells(m)
+    if len(made) <= 30 and fits_width(made, LATEX_MATRIX_WIDTH):
+        body = " \\\\\n".join(" & ".join(row) for row in made)
+        columns = "c" * m.entries.shape[1]
+        return rf"\[ {m.left.latex} = \left[\begin{{array}}{{{columns}}}" + f"\n{body}\n" + r"\end{array}\right] \]"
+    return "\n".join(latex_formula(f) for f in nonzero_entries(m))
+
+
+def latex_table(t: DataTable) -> str:
+    """A table that may go over pages."""
+    share = 0.98 * (1.0 - 0.017 * (len(t.columns) - 1)) / len(t.columns)
+    columns = "".join(rf"p{{{share:.3f}\textwidth}}" for _ in t.columns)
+    head = " & ".join(rf"\textit{{{latex_words(c)}}}" for c in t.columns)
+    rows = " \\\\\n".join(" & ".join(map(latex_cell, row)) for row in t.rows)
+    start = rf"{{\small\begin{{longtable}}{{@{{}}{columns}@{{}}}}"
+    return f"{start}\n\\hline\n{head} \\\\\n\\hline\n\\endhead\n{rows} \\\\\n\\hline\n\\end{{longtable}}}}"
+
+
+def latex_cell(c: Cell) -> str:
+    """A cell of a table."""
+    return f"${c.latex}$" if isinstance(c, Tex) else latex_words(c)

@@ -1,0 +1,271 @@
+"""Coordinate partitioning: which coordinates are independent, and which constraints determine the others.
+
+Independent coordinates are named by the user, or chosen by QR with column pivoting of an orthonormal basis of the
+motions that the constraints allow (Businger and Golub 1965; for mechanisms: Wehage and Haug 1982). Velocities are
+chosen; a tree joint's coordinates follow its velocities, one by one or, for a quaternion, all together.
+Constraints are the rows and the coordinates of tree joints that drivers prescribe; their rank is found from
+values at and near the initial position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...derivatives.reduced_equations import gap_lengths, normalised_rows
+from ...engine.rows import BY_TIME
+from ...errors import ModelError, SingularityError
+from ...expression_graph.evaluation import evaluate, evaluate_array
+from ...expression_graph.graph import zero_objects
+from ...expression_graph.tracing import TracedEquations
+from ...laws.bytecode import evaluate_jet
+from ...model.model import listing, suggest
+from ...numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space, rank
+from ...tables.structure_definition import Structure, velocity_names
+from .zero_test import Probe
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """Equations g = 0, G v = nu, G vdot = gamma as expressions.
+
+    Attributes
+    ----------
+    elements : list of str
+        Whose each is.
+    holonomic : ndarray of bool
+        Which are constraints on positions.
+    """
+
+    elements: list[str]
+    holonomic: np.ndarray
+    g: np.ndarray
+    G: np.ndarray
+    nu: np.ndarray
+    gamma: np.ndarray
+
+
+def collect_constraints(x: TracedEquations) -> Constraints:
+    """Rows first, in the order of the multipliers, then prescribed coordinates."""
+    s, S, W = x.structure, x.system, x.work
+    there = len(x.g) > len(s.rows)  # prescribed coordinates are among the rows already
+    n = 0 if there else len(s.prescribed)
+    later = sorted(s.prescribed, key=lambda name: s.slices[name].start) if there else list(s.prescribed)
+    G, g, nu, gamma = zero_objects(n, s.nv), zero_objects(n), zero_objects(n), zero_objects(n)
+    for k, b in enumerate(s.prescribed[name] for name in later[:n]):
+        law = S.tree.law[b]
+        value, rate, second = evaluate_jet(S.code, S.const, law, W.stack, x.t, W.sensed, BY_TIME)
+        G[k, S.tree.v[b]] = 1.0
+        g[k] = x.q[S.tree.q[b]] - (value - S.bodies.offset[b])
+        nu[k], gamma[k] = rate, second
+    return Constraints(
+        [r.element.name for r in s.rows] + later,
+        np.array([r.holonomic for r in s.rows] + [True] * len(later), bool),
+        np.concatenate([x.g, g]),
+        np.concatenate([x.G.reshape(-1, s.nv), G]),
+        np.concatenate([x.nu, nu]),
+        np.concatenate([x.gamma, gamma]),
+    )
+
+
+DEPENDENCE_TOLERANCE = 1e-8  # part of the largest by which an independent coordinate must move
+
+
+@dataclass(frozen=True)
+class Partition:
+    """What constraints leave free, as numbers at one position.
+
+    Attributes
+    ----------
+    chosen : list of int
+        Independent velocities.
+    rows : list of int
+        As many of the constraints as are independent.
+    """
+
+    chosen: list[int]
+    rows: list[int]
+
+    def dependent(self, nv: int) -> list[int]:
+        """The other velocities."""
+        return [d for d in range(nv) if d not in self.chosen]
+
+
+def choose_independent(
+    G: np.ndarray, scale: np.ndarray, requested: Sequence[int] = (), only: bool = False
+) -> Partition:
+    """Choose independent velocities and constraints.
+
+    Parameters
+    ----------
+    G : ndarray (nr, nv)
+        Jacobian at one position.
+    scale : ndarray (nv,)
+        A large step along each velocity.
+    requested : sequence of int
+        Velocities that must be among them.
+    only : bool
+        Whether no others may be.
+
+    Raises
+    ------
+    ValueError
+        With the velocity that cannot be independent of those before it.
+    """
+    from scipy.linalg import qr
+
+    A = normalised_rows(G, scale)
+    N = null_space(A) if len(A) else np.eye(len(scale))
+    f = N.shape[1]
+    chosen: list[int] = []
+    left = N.copy()
+    largest = float(np.sqrt((N * N).sum(axis=1)).max(initial=0.0))
+    for d in requested:
+        along = left[d]
+        if len(chosen) == f or np.linalg.norm(along) <= DEPENDENCE_TOLERANCE * largest:
+            raise ValueError(d)
+        e = along / np.linalg.norm(along)
+        left = left - np.outer(left @ e, e)
+        chosen.append(d)
+    if not only and len(chosen) < f:
+        *_, order = qr(left.T, mode="economic", pivoting=True)
+        chosen += [int(d) for d in order if d not in chosen][: f - len(chosen)]
+    rank = len(scale) - f
+    rows: list[int] = []
+    if rank:
+        *_, order = qr(A.T, mode="economic", pivoting=True)
+        rows = sorted(int(k) for k in order[:rank])
+    return Partition(sorted(chosen), rows)
+
+
+def velocities_by_name(names: Sequence[str], requested: Sequence[str], model: str) -> list[int]:
+    """Velocities by name.
+
+    Raises
+    ------
+    ModelError
+        If there is no such coordinate; the message lists what there is.
+    """
+    at = {n: k for k, n in enumerate(names)}
+    for n in requested:
+        if n not in at:
+            known = f"{suggest(n, at)}; {listing(list(at))}"
+            raise ModelError(f"{model!r} has no coordinate {n!r} in these coordinates{known}")
+        if list(requested).count(n) > 1:
+            raise ModelError(f"independent names {n!r} twice")
+    return [at[n] for n in requested]
+
+
+def position_groups(s: Structure) -> list[tuple[list[int], list[int]]]:
+    """Coordinates that belong together and their velocities: one and one, or a quaternion and its turns."""
+    out = []
+    tree = s.tables["tree"]
+    for q, v, nq, nv in zip(*(x.tolist() for x in (tree.q, tree.v, tree.nq, tree.nv)), strict=True):
+        single = nv if nq == nv else nv - 3
+        out += [([q + k], [v + k]) for k in range(single)]
+        if nq > nv:
+            out.append((list(range(q + single, q + nq)), list(range(v + single, v + nv))))
+    return out
+
+
+def singular_start_error(names: Sequence[str], t: float) -> SingularityError:
+    """The error of a start where the constraints lose rank."""
+    return SingularityError(
+        f"the mechanism is in a singular position at t = {t:.6g} s: the constraints of {', '.join(names)} depend on "
+        "each other here and not nearby, so that coordinates cannot be told apart; draw it away from there",
+        t,
+        tuple(names),
+    )
+
+
+NEARBY_STEP = (
+    1e-2  # part of a radian, or of the mechanism's length, that it is moved by to see whether its rank is the usual
+)
+MAX_ITERATIONS = 20
+CLOSURE_TOLERANCE = 1e-10  # of the mechanism's length
+
+
+class ConstraintValues:
+    """Numbers at the start.
+
+    Parameters
+    ----------
+    x : Traced
+    c : Constraints
+    start : mapping
+        Numbers of time, coordinates and velocities by the names of their symbols; others are zero.
+    """
+
+    def __init__(self, x: TracedEquations, c: Constraints, start: Mapping[str, float]) -> None:
+        self.x, self.c = x, c
+        others = {s.data.name: 0.0 for s in (*x.z, *x.lam, *x.loads)}
+        self.values: dict[str, float] = others | {name: float(y) for name, y in start.items()}
+        self.probe = Probe(self.values)
+        length = float(getattr(x.system.scales.length, "value", x.system.scales.length))
+        units = [n.unit for n in velocity_names(x.structure)]
+        self.length = length
+        self.scale = np.array([1.0 if u == "m" else 1.0 / length for u in units])
+        self.G = self.jacobian(self.values)
+
+    def jacobian(self, values: Mapping[str, float]) -> np.ndarray:
+        """G there, with plain zeros for rounding."""
+        G = np.array(evaluate_array(self.c.G, values), float).reshape(self.c.G.shape)
+        size = np.abs(G * self.scale).max(axis=1, initial=0.0, keepdims=True)
+        G[np.abs(G * self.scale) <= 1e-13 * size] = 0.0
+        return G
+
+    def refuse_singular(self, f: Partition) -> None:
+        """Refuse a start where the constraints lose rank.
+
+        Raises
+        ------
+        SingularityError
+            Naming the elements whose constraints depend on one another here and not nearby.
+        """
+        which = np.flatnonzero(self.c.holonomic)
+        if not f.chosen or not len(which):
+            return
+        here = rank(normalised_rows(self.G[which], self.scale))
+        rng = np.random.default_rng(0)
+        for _ in range(2):
+            G = self._nearby(rng, which)
+            if G is not None and rank(normalised_rows(G, self.scale)) > here:
+                raise singular_start_error(self._lost(self.G[which], G, which), self.values[self.x.t.data.name])
+
+    def _nearby(self, rng: np.random.Generator, which: np.ndarray) -> np.ndarray | None:
+        """Constraints on positions at the closed position near a random step away; None if none is found."""
+        null = null_space(normalised_rows(self.G[which], self.scale))
+        a = null @ rng.standard_normal(null.shape[1])
+        step = NEARBY_STEP * self.scale * self.length * a / np.abs(a).max()
+        values = dict(self.values)
+        for _ in range(MAX_ITERATIONS):
+            self._moved(values, step)
+            G = self.jacobian(values)[which]
+            g = gap_lengths(np.array(evaluate(list(self.c.g[which]), values), float), G, self.scale)
+            if np.abs(g).max(initial=0.0) < CLOSURE_TOLERANCE * self.length:
+                return G
+            step = -self.scale * np.linalg.lstsq(normalised_rows(G, self.scale), g, rcond=RANK_TOLERANCE)[0]
+        return None
+
+    def _moved(self, values: dict[str, float], step: np.ndarray) -> None:
+        """Coordinates moved along the velocities; quaternions of unit length."""
+        T = np.array(evaluate_array(self.x.T, values), float).reshape(self.x.T.shape)
+        dq = T @ step
+        names = [s.data.name for s in self.x.q]
+        for q, v in position_groups(self.x.structure):
+            moved = np.array([values[names[k]] + dq[k] for k in q])
+            if len(q) > len(v):
+                moved /= np.linalg.norm(moved)
+            values |= {names[k]: float(y) for k, y in zip(q, moved, strict=True)}
+
+    def _lost(self, here: np.ndarray, there: np.ndarray, which: np.ndarray) -> list[str]:
+        """Elements whose rows take part in dependencies that are not there nearby."""
+        y, span = (
+            fundamental_subspaces(normalised_rows(here, self.scale)).dependencies,
+            fundamental_subspaces(normalised_rows(there, self.scale)).span,
+        )
+        part = np.abs(y @ (y.T @ span)).max(axis=1)
+        found = [self.c.elements[k] for k, p in zip(which, part, strict=True) if p > 1e-3]
+        return list(dict.fromkeys(found))

@@ -1,0 +1,219 @@
+"""What defines dependent quantities: formulas, or equations that Newton's method solves.
+
+The path from the last position is subdivided where Newton's method does not follow it, and the sign of the
+Jacobian's determinant is preserved: where it changes, the branch ends (a dead centre), and no other branch is
+taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import AnalysisError, SingularityError
+from ...expression_graph.evaluation import evaluate, jacobian, symbols_of
+from ...expression_graph.graph import Node
+from .linear_systems import Determinants, solve_blocks, sparse_product
+
+
+@dataclass(frozen=True)
+class Definition:
+    """Symbols, and what they are in terms of symbols that are known before.
+
+    Attributes
+    ----------
+    symbols : tuple of Node
+    values : tuple of Node
+        Formulas; empty where there are none, and ``residuals`` determine the symbols.
+    residuals : tuple of Node
+        What vanishes; as many as symbols.
+    how : str
+        How the formula was found, and which branch of it is taken.
+    radius : Node or number, optional
+        sqrt(x^2 + y^2) of a formula atan2(y, x), where that is known.
+    """
+
+    symbols: tuple[Node, ...]
+    values: tuple[Any, ...] = ()
+    residuals: tuple[Any, ...] = ()
+    how: str = ""
+    radius: Any = None
+
+    @property
+    def closed(self) -> bool:
+        """Whether there are formulas."""
+        return bool(self.values)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What it defines."""
+        return tuple(x.data.name for x in self.symbols)
+
+
+class FormulaSubstitution:
+    """Expressions with formulas put in for symbols that have some; each expression of the graph is seen once.
+
+    Parameters
+    ----------
+    definitions : sequence of Definition
+        Each stands on those before.
+
+    Attributes
+    ----------
+    implicit : list of Definition
+        Those without formulas, their equations with all formulas put in.
+    """
+
+    def __init__(self, definitions: Sequence[Definition]) -> None:
+        self._known: dict[int, Node] = {}
+        self.implicit: list[Definition] = []
+        for d in definitions:
+            if d.closed:
+                found = self([d.symbols[0].graph.node(y) for y in d.values])
+                self._known |= {s.index: y for s, y in zip(d.symbols, found, strict=True)}
+            else:
+                gaps = self([d.symbols[0].graph.node(y) for y in d.residuals])
+                self.implicit.append(Definition(d.symbols, (), tuple(gaps), d.how))
+
+    def __call__(self, nodes: Sequence[Any]) -> list[Any]:
+        """Expressions in which no symbol with a formula is left."""
+        for x in new_nodes(nodes, self._known):
+            args = tuple(self._known[a.index] for a in x.args)
+            same = all(a is b for a, b in zip(args, x.args, strict=True))
+            self._known[x.index] = x if same else x.graph.rebuilt(x, args)
+        return [self._known[x.index] if isinstance(x, Node) else x for x in nodes]
+
+
+def new_nodes(nodes: Sequence[Any], known: Mapping[int, Any]) -> list[Node]:
+    """What expressions are made of and is not known, in an order of evaluation."""
+    found: dict[int, Node] = {}
+    to_see = [x for x in nodes if isinstance(x, Node)]
+    while to_see:
+        x = to_see.pop()
+        if x.index not in found and x.index not in known:
+            found[x.index] = x
+            to_see.extend(x.args)
+    return [found[k] for k in sorted(found)]
+
+
+def implicit_rates(
+    definitions: Sequence[Definition], by: Sequence[Node], dets: Determinants
+) -> list[tuple[Node, list[Any]]]:
+    """Derivatives of symbols without formulas: dw/du = -(dr/dw)^-1 dr/du, one after the other.
+
+    Parameters
+    ----------
+    definitions : sequence of Definition
+        All without formulas: see `FormulaSubstitution`.
+    by : sequence of Node
+        Symbols.
+
+    Returns
+    -------
+    list of (symbol, derivatives by each of these)
+    """
+    found: list[tuple[Node, list[Any]]] = []
+    for d in definitions:
+        own, others = jacobian(d.residuals, d.symbols), jacobian(d.residuals, by)
+        if found:
+            before = jacobian(d.residuals, [w for w, _ in found])
+            others = others + sparse_product(before, np.array([row for _, row in found], object))
+        X = solve_blocks(own, others, dets)
+        found += [(w, [-y for y in row]) for w, row in zip(d.symbols, X, strict=True)]
+    return found
+
+
+MAX_STEPS = 30
+CLOSURE_TOLERANCE = 1e-13  # change of the unknowns, relative to their size
+NEAR_SOLUTION = 0.5  # rad or m: a longer step of the unknowns is cut
+SHORTEST_STEP = 1e-6  # part of the way
+
+
+class ImplicitSolver:
+    """Unknowns of one definition as a function of what its equations hold.
+
+    Parameters
+    ----------
+    definition : Definition
+    start : mapping
+        Numbers of all symbols where the branch is known.
+    """
+
+    def __init__(self, definition: Definition, start: Mapping[str, float]) -> None:
+        self.unknowns = [x.data.name for x in definition.symbols]
+        self._nodes = [*definition.residuals, *jacobian(definition.residuals, definition.symbols).ravel()]
+        self._given = [x.data.name for x in symbols_of(self._nodes) if x.data.name not in self.unknowns]
+        self._own = {x.data.name: x.value for x in symbols_of(self._nodes) if not x.moving}
+        at = {n: float(start.get(n, self._own.get(n, 0.0))) for n in self._given}
+        self._w = np.array([start.get(n, 0.0) for n in self.unknowns])
+        found = self._newton(at, self._w)
+        if found is None:
+            raise AnalysisError(f"no {', '.join(self.unknowns)} fulfil their equations at the start")
+        self._at, (self._w, self._sign) = at, found
+        if self._sign == 0.0:
+            raise SingularityError(f"{', '.join(self.unknowns)} are not determined at the start: it is singular")
+        self._first = self._at, self._w
+
+    def __call__(self, values: Mapping[str, Any]) -> dict[str, float]:
+        """Their values.
+
+        Raises
+        ------
+        SingularityError
+            If the branch ends before.
+        """
+        there = {n: float(values.get(n, self._own.get(n, 0.0))) for n in self._given}
+        w = self._follow(there, self._at, self._w)
+        if w is None:
+            w = self._follow(there, *self._first)
+        if w is None:
+            known = ", ".join(f"{n} = {x:.6g}" for n, x in there.items() if n not in self._own)
+            raise SingularityError(
+                f"{', '.join(self.unknowns)} cannot be followed to {known}: the mechanism does not close there, or "
+                "there is a singular position on the way"
+            )
+        self._at, self._w = there, w
+        return dict(zip(self.unknowns, w.tolist(), strict=True))
+
+    def _follow(self, there: dict[str, float], at: dict[str, float], w: np.ndarray) -> np.ndarray | None:
+        done, part = 0.0, 1.0
+        while done < 1.0:
+            to = min(done + part, 1.0)
+            way = there if to == 1.0 else {n: at[n] + to * (there[n] - at[n]) for n in there}
+            found = self._newton(way, w)
+            if found is not None and found[1] == self._sign and np.abs(found[0] - w).max() <= NEAR_SOLUTION:
+                w, done, part = found[0], to, 2.0 * part
+            else:
+                part *= 0.5
+                if part < SHORTEST_STEP:
+                    return None
+        return w
+
+    def _newton(self, at: Mapping[str, float], w: np.ndarray) -> tuple[np.ndarray, float] | None:
+        n = len(w)
+        w = w.copy()
+        last = np.inf
+        for _ in range(MAX_STEPS):
+            found = evaluate(self._nodes, {**at, **dict(zip(self.unknowns, w.tolist(), strict=True))})
+            r, J = np.array(found[:n], float), np.array(found[n:], float).reshape(n, n)
+            if not (np.isfinite(r).all() and np.isfinite(J).all()):
+                return None
+            try:
+                step = np.linalg.solve(J, r)
+            except np.linalg.LinAlgError:
+                return None
+            w -= step
+            size = float(np.abs(step).max() / (1.0 + np.abs(w).max()))
+            if size <= CLOSURE_TOLERANCE or (size <= 1e-9 and size >= 0.25 * last):
+                return w, float(np.linalg.slogdet(J)[0])
+            last = size
+        return None
+
+
+def unknown_symbols(nodes: Sequence[Any], definitions: Sequence[Definition]) -> list[Node]:
+    """Symbols of these definitions that expressions hold."""
+    held = {x.index for x in symbols_of(nodes)}
+    return [w for d in definitions for w in d.symbols if w.index in held]

@@ -1,0 +1,327 @@
+"""Explicit differential equations of a mechanism in independent coordinates, and their report as text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...derivatives.reduced_equations import gap_lengths, normalised_rows
+from ...errors import ModelError
+from ...expression_graph.evaluation import directional_derivatives, evaluate, symbols_of
+from ...expression_graph.graph import Node, Symbol
+from ...expression_graph.simplification.arctangents import (
+    ArctangentSubstitution,
+    fast_simplification,
+    without_whole_turns,
+)
+from ...expression_graph.simplification.reading_cost import symbol_count
+from ...expression_graph.tracing import TracedEquations
+from ...model.body import Driver
+from ...model.model import suggest
+from ...numerics.rank import fundamental_subspaces
+from ..expressions import TOO_LONG, Expressions, formula_lines, node_count
+from ..named_equations import curve_parameters_at
+from .definitions import Definition
+from .reduction import ExtraSymbols, ReducedEquations, reduce_equations
+
+if TYPE_CHECKING:
+    from ..equations import Equations
+
+
+MAX_READ = 300  # operations up to which all is put in the independent coordinates
+SHORT_COUNT = 40.0  # symbols up to which a coordinate is, though its formula by others is shorter
+Row = tuple[str, Any]
+
+
+def report(x: ExplicitEquations) -> str:
+    """The equations as text, no longer than can be read."""
+    s, units = x.solution, x.equations.units
+    free = ", ".join(x.independent)
+    lines = [
+        f"explicit equations of {x.equations.model.name!r}: M a = f"
+        + (f", a the accelerations of {free}" if free else ""),
+        f"independent: {free or 'none, drivers leave no freedom'}",
+        *(f"{name}: {form_description(how)}" for name, how in x.branches.items()),
+        *x.notes,
+        *(["angles are told up to whole turns"] if any(d.closed for d in s.positions) else []),
+    ]
+    algebra = ArctangentSubstitution(
+        [(w, y, d.radius) for d in s.definitions if d.closed for w, y in definition_pairs(d)]
+    )
+    places = coordinate_formulas(s.positions, algebra)
+    motion = [(f"M[{a}, {b}]", s.M[i, j]) for (i, a), (j, b) in upper_triangle(x.independent)]
+    motion += [(f"f[{a}]", y) for a, y in zip(x.independent, s.f, strict=True)]
+    g = x.equations.graph
+    motion = [(name, g.node(y)) for name, y in motion]
+    body = shorter_listing(
+        [places + substituted_rows(motion, algebra), places + with_rate_formulas(motion, s.definitions, s.positions)],
+        units,
+    )
+    if not body:
+        body = [
+            line
+            for row in places
+            for line in formula_lines([row], units) or [f"{row[0]}: {TOO_LONG.format(node_count([row[1]]))}"]
+        ]
+        body += [f"{k}: {TOO_LONG.format(getattr(x, k).operations)}" for k in ("M", "f")]
+    size = {k: getattr(x, k).operations for k in ("M", "f")}
+    return "\n".join([*lines, "", *body, "", f"operations: {', '.join(f'{k} {n}' for k, n in size.items())}"])
+
+
+def form_description(how: str) -> str:
+    """The form of an equation, without letters that stand for nothing here."""
+    how = re.sub(r"A cos w \+ B sin w \+ C = 0, branch (.)", r"of the two solutions the drawn one (branch \1)", how)
+    how = how.replace("A cos w + B sin w = 0", "the drawn one of two opposite directions")
+    return re.sub(r"quadratic, branch (.)", r"of the two solutions the drawn one (branch \1)", how)
+
+
+def definition_pairs(d: Definition) -> list[tuple[Node, Any]]:
+    """Symbols with their formulas."""
+    return list(zip(d.symbols, d.values, strict=True))
+
+
+def upper_triangle(names: Sequence[str]) -> list[tuple[tuple[int, str], tuple[int, str]]]:
+    """Places of a symmetric matrix, each once."""
+    told = list(enumerate(names))
+    return [(a, b) for a in told for b in told if a[0] <= b[0]]
+
+
+def coordinate_formulas(definitions: Sequence[Definition], algebra: ArctangentSubstitution) -> list[Row]:
+    """Formulas of dependent coordinates: by the independent ones where that is short, else by others before them."""
+    out = []
+    for w, y in (pair for d in definitions if d.closed for pair in definition_pairs(d)):
+        y = without_whole_turns(w.graph.node(y))
+        by_free = algebra([w])
+        put = fast_simplification(by_free)[0]
+        out.append((w.data.name, put if symbol_count([put]) <= max(SHORT_COUNT, symbol_count([y])) else y))
+    return out
+
+
+def substituted_rows(rows: Sequence[Row], algebra: ArctangentSubstitution) -> list[Row]:
+    """The same in the independent coordinates."""
+    return list(zip([name for name, _ in rows], algebra([y for _, y in rows]), strict=True))
+
+
+def with_rate_formulas(
+    rows: Sequence[Row], definitions: Sequence[Definition], places: Sequence[Definition]
+) -> list[Row]:
+    """The same by dependent coordinates and their rates, after formulas of the rates that they hold."""
+    by = {w.index: (w, y) for d in definitions[len(places) :] if d.closed for w, y in definition_pairs(d)}
+    wanted: dict[int, Row] = {}
+    to_see = [y for _, y in rows]
+    while to_see:
+        for s in symbols_of([to_see.pop()]):
+            if s.index in by and s.index not in wanted:
+                w, y = by[s.index]
+                wanted[s.index] = (w.data.name, w.graph.node(y))
+                to_see.append(w.graph.node(y))
+    return [*(wanted[k] for k in by if k in wanted), *rows]
+
+
+def shorter_listing(alternatives: Sequence[Sequence[Row]], units: Sequence[Sequence[Node]]) -> list[str]:
+    """The first way in lines if it is small, else the shorter of both; nothing if none can be read."""
+    first, second = ([y for _, y in rows] for rows in alternatives)
+    lines = [formula_lines(alternatives[0], units)] if node_count(first) <= MAX_READ else []
+    if not (lines and lines[0]) or sum(map(len, lines[0])) > 2500 or node_count(second) < node_count(first) / 2:
+        lines.append(formula_lines(alternatives[1], units))
+    return min((x for x in lines if x), key=lambda x: sum(map(len, x)), default=[])
+
+
+INPUT_THRESHOLD = 1e-8  # part by which something may change with multipliers that act on nothing
+
+
+class ExplicitEquations:
+    """Equations of motion without constraints and multipliers, M a = f, by coordinate partitioning.
+
+    The independent coordinates u determine the others, w: by formulas where loops close in closed form, in the mode of
+    assembly that is drawn; else by their equations, which Newton's method solves. Velocities and accelerations of the
+    others follow from the constraints' derivatives (Wehage and Haug 1982), exactly.
+
+        M a = f,   M = Z^T M Z,   f = Z^T (f - M b),   v = Z u' + b',   v' = Z a + b
+
+    Attributes
+    ----------
+    equations : Equations
+        Those with constraints.
+    independent : tuple of str
+        Independent coordinates.
+    dependent : tuple of str
+        Those that have a formula, in the order in which they are found: each may hold those before it.
+    implicit : tuple of str
+        Coordinates (and loads of joints with friction) that have none.
+    notes : tuple of str
+        Why they have none.
+    branches : dict
+        From each dependent coordinate to the form of its equation and the branch that is taken.
+    """
+
+    def __init__(self, equations: Equations, solution: ReducedEquations, inputs: dict[str, Node]) -> None:
+        self.equations, self.solution, self.inputs = equations, solution, inputs
+        self.independent = solution.independent
+        formulas = [d for d in solution.positions if d.closed]
+        self.dependent = tuple(n for d in formulas for n in d.names)
+        self.branches = {n: d.how for d in formulas for n in d.names}
+        self.implicit = tuple(n for d in solution.formulas.implicit for n in d.names)
+        self.notes = tuple(solution.notes)
+
+    # -- parts
+
+    def _told(self, nodes: Any, rows: Sequence[str] = (), columns: Sequence[str] = ()) -> Expressions:
+        x = np.asarray(nodes, object)
+        out = np.empty(x.shape, object)
+        out.ravel()[:] = self.solution.inlined([self.equations.graph.node(y) for y in x.ravel()])
+        return Expressions(self.equations, out, rows, columns)
+
+    @property
+    def M(self) -> Expressions:
+        """Reduced mass matrix, along the independent velocities."""
+        return self._told(self.solution.M, self.independent, self.independent)
+
+    @property
+    def f(self) -> Expressions:
+        """Reduced forces, along the independent velocities."""
+        return self._told(self.solution.f, self.independent)
+
+    @property
+    def Z(self) -> Expressions:
+        """What the velocities change with the independent ones: v = Z u' + what drivers do."""
+        return self._told(self.solution.Z, self.solution.names, self.independent)
+
+    @property
+    def accelerations(self) -> Expressions:
+        """Of the independent coordinates, solved for in straight-line code (L D L^T)."""
+        return self._told(self.solution.accelerations[self.solution.chosen], self.independent)
+
+    def formula(self, coordinate: str) -> Expressions:
+        """A dependent coordinate as it is found: it may hold others that are found before.
+
+        Raises
+        ------
+        ModelError
+            If it has no formula, or is independent.
+        """
+        for d in self.solution.positions:
+            if coordinate in d.names and d.closed:
+                return Expressions(self.equations, d.values[d.names.index(coordinate)], unit=self._unit(coordinate))
+        if coordinate in self.independent:
+            raise ModelError(f"{coordinate!r} is independent: it has no formula")
+        known = {*self.dependent, *self.implicit}
+        if coordinate in self.implicit:
+            raise ModelError(f"{coordinate!r} has no formula: {'; '.join(self.notes)}")
+        raise ModelError(f"there is no dependent coordinate {coordinate!r}{suggest(coordinate, known)}")
+
+    def conditions(self, coordinate: str) -> Expressions:
+        """What vanishes where an implicit coordinate is right: the equations that it shares with others.
+
+        Raises
+        ------
+        ModelError
+            If it is not implicit.
+        """
+        for d in self.solution.formulas.implicit:
+            if coordinate in d.names:
+                return self._told(d.residuals, d.names)
+        raise ModelError(f"{coordinate!r} is not implicit; these are: {', '.join(self.implicit) or 'none'}")
+
+    @property
+    def determinants(self) -> dict[str, Expressions]:
+        """What must not vanish, by what it determines: where it does, the partition is singular."""
+        return {k: self._told(x) for k, x in self.solution.determinants.items()}
+
+    def __getitem__(self, name: str) -> Expressions:
+        """Anything that a result has, in the independent coordinates, their rates, and what has no formula.
+
+        Raises
+        ------
+        ModelError
+            If there is nothing of that name, or redundant constraints leave it undetermined.
+        """
+        found = self.equations[name]
+        self._refuse_undetermined(name, found)
+        told = self._told(found.nodes, found.rows, found.columns)
+        return Expressions(self.equations, told.nodes, found.rows, found.columns, found.unit)
+
+    def _unit(self, name: str) -> str:
+        return str(self.equations.symbol(name).data.unit) if name in self.equations.named else "rad"
+
+    def _refuse_undetermined(self, name: str, x: Expressions) -> None:
+        s = self.solution
+        place = s.place
+        if not s.undetermined:
+            return
+        y = fundamental_subspaces(normalised_rows(place.G, place.scale)).dependencies
+        values = place.values | {a.data.name: 0.0 for a in self.equations.named_equations.vdot}
+        lam = s.traced.lam
+        slope = np.array([self._slope(x.list(), symbol, values) for symbol in lam])
+        slope = gap_lengths(slope.T, place.G[: len(lam)], place.scale).T  # by multipliers of rows of unit size
+        among = np.abs(y[: len(lam)].T @ slope)
+        if (among > INPUT_THRESHOLD * np.abs(slope).max(initial=0.0)).any():
+            raise ModelError(
+                f"{name!r} is not determined: redundant constraints ({', '.join(s.undetermined)}) leave it open; ask "
+                "for other quantities, or take the redundancy out: m.mobility() names it"
+            )
+
+    @staticmethod
+    def _slope(nodes: list[Any], by: Node, values: dict[str, float]) -> list[float]:
+        return [float(y) for y in evaluate(directional_derivatives(nodes, [(by, 1.0)]), values)]
+
+    def __repr__(self) -> str:
+        return (
+            f"<explicit equations of {self.equations.model.name!r} in {', '.join(self.independent) or 'nothing free'}>"
+        )
+
+    def __str__(self) -> str:
+        return report(self)
+
+
+def explicit_equations(
+    equations: Equations, independent: Sequence[str] = (), closed: bool = False
+) -> ExplicitEquations:
+    """Take constraints and multipliers out: see `Equations.explicit`."""
+    eq, x = equations, equations.named_equations
+    traced, inputs = with_input_rates(eq)
+    places = [(p.symbol, p.equation) for p in x.places]
+    start = eq.start | (curve_parameters_at(x, x.places, eq.start) if places else {})
+    found = reduce_equations(traced, start, independent, ExtraSymbols(x.vdot, places))
+    out = ExplicitEquations(eq, found, inputs)
+    if closed and out.implicit:
+        raise ModelError(
+            f"{eq.model.name!r} has no closed form: {'; '.join(found.notes)}. Leave out closed: these coordinates are "
+            "implicit functions then, with exact derivatives"
+        )
+    return out
+
+
+def with_input_rates(eq: Equations) -> tuple[TracedEquations, dict[str, Node]]:
+    """Equations in which inputs that move drivers have rates, and all inputs by name.
+
+    Raises
+    ------
+    ModelError
+        If a parameter that is an input changes the constraints.
+    """
+    x, g = eq.named_equations.traced, eq.graph
+    given = {name: eq.symbol(name) for name in eq.inputs}
+    nu, gamma = x.nu.copy(), x.gamma.copy()
+    inputs: dict[str, Node] = {}
+    for name, u in given.items():
+        inputs[name] = u
+        part = eq.model[name] if any(name == d.name for d in eq.model.drivers) else None
+        if isinstance(part, Driver):
+            k = x.structure.slices[name].start
+            rates = [g.symbol(Symbol(f"{name}{p}", "input", "", f"{u.data.unit}/s{n}"), 0.0) for p, n in RATE_SUFFIXES]
+            nu[k], gamma[k] = nu[k] + rates[0], gamma[k] + rates[1]
+            inputs |= {r.data.name: r for r in rates}
+            eq.named_equations.named.update({r.data.name: r for r in rates})
+        elif any(y != 0.0 for y in directional_derivatives([*x.g, *x.nu], [(u, 1.0)])):
+            raise ModelError(
+                f"input {name!r} changes constraints, so that its rates act too; let a driver do that, and name that"
+            )
+    return replace(x, nu=nu, gamma=gamma), inputs
+
+
+RATE_SUFFIXES = (("'", ""), ("''", "^2"))

@@ -1,0 +1,195 @@
+"""Small linear systems solved in straight-line code on expressions, without inverses or pivoting.
+
+Equations and unknowns are matched (Hopcroft and Karp 1973) and ordered in block triangular form (the strongly
+connected components of Tarjan 1972; Duff and Reid 1978). Blocks of up to three are solved by Cramer's rule, whose
+determinants vanish at a singular position; larger ones by orthogonalisation (modified Gram-Schmidt of the matrix
+with its right-hand sides appended, which is backward stable without pivoting: Björck 1967).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...expression_graph.graph import zero_objects
+from ...math.scalar import sqrt
+
+Block = tuple[list[int], list[int]]
+"""Equations and the unknowns that they determine together."""
+
+
+def solution_blocks(pattern: np.ndarray) -> list[Block] | None:
+    """Blocks in an order of solution.
+
+    Parameters
+    ----------
+    pattern : ndarray of bool (n, n)
+        Whether an unknown (column) stands in an equation (row).
+
+    Returns
+    -------
+    list of (rows, columns) or None
+        None where the pattern alone makes the equations singular.
+    """
+    import scipy.sparse as sp
+    from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
+
+    n = len(pattern)
+    if n == 0:
+        return []
+    match = maximum_bipartite_matching(sp.csr_matrix(pattern), perm_type="column")  # row -> column
+    if (match < 0).any():
+        return None
+    moved = pattern[:, match]  # unknown k is now the one that equation k is solved for
+    count, label = connected_components(sp.csr_matrix(moved), directed=True, connection="strong")
+    rows = [np.flatnonzero(label == k).tolist() for k in range(count)]
+    needs = [{int(label[j]) for r in rows[k] for j in np.flatnonzero(moved[r])} - {k} for k in range(count)]
+    return [(rows[k], match[rows[k]].tolist()) for k in _in_order(needs, [min(match[r]) for r in rows])]
+
+
+def _in_order(needs: Sequence[set[int]], first: Sequence[int]) -> list[int]:
+    """Each after those that it needs; else by their first unknowns."""
+    done: list[int] = []
+    left = sorted(range(len(needs)), key=lambda k: first[k])
+    while left:
+        k = next(k for k in left if needs[k] <= set(done))
+        done.append(k)
+        left.remove(k)
+    return done
+
+
+MAX_CRAMER = 3  # unknowns up to which determinants are written out
+
+
+@dataclass
+class Determinants:
+    """What must not vanish: (which unknowns, expression)."""
+
+    found: list[tuple[tuple[int, ...], Any]] = field(default_factory=list)
+
+    def add(self, columns: list[int], value: Any) -> None:
+        """Another one; plain numbers are none."""
+        if not getattr(value, "known", True):
+            self.found.append((tuple(columns), value))
+
+
+def nonzero_pattern(A: np.ndarray) -> np.ndarray:
+    """Which entries are no zeros."""
+    return np.array([[x != 0.0 for x in row] for row in A], bool).reshape(A.shape)
+
+
+def solve_blocks(A: np.ndarray, B: np.ndarray, dets: Determinants, order: list[Block] | None = None) -> np.ndarray:
+    """X with A X = B.
+
+    Parameters
+    ----------
+    A, B : ndarray of Node (n, n), (n, m)
+    dets : Determinants
+        Those of the blocks are added.
+    order : list of Block, optional
+        The blocks of A; found here if not given.
+
+    Raises
+    ------
+    ZeroDivisionError
+        If A is singular by its pattern.
+    """
+    order = solution_blocks(nonzero_pattern(A)) if order is None else order
+    if order is None:
+        raise ZeroDivisionError("the equations are singular")
+    X = zero_objects(*B.shape)
+    done: list[int] = []
+    for rows, columns in order:
+        right = B[rows] - sparse_product(A[np.ix_(rows, done)], X[done])
+        X[columns] = _block(A[np.ix_(rows, columns)], right, columns, dets)
+        done += columns
+    return X
+
+
+def transposed_blocks(order: list[Block]) -> list[Block]:
+    """Blocks of the transposed matrix."""
+    return [(columns, rows) for rows, columns in reversed(order)]
+
+
+def sparse_product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """A B, zeros dropped."""
+    out = zero_objects(len(A), *B.shape[1:])
+    for i, row in enumerate(A):
+        for k, a in enumerate(row):
+            if a != 0.0:
+                out[i] = out[i] + a * B[k]
+    return out
+
+
+def _block(A: np.ndarray, B: np.ndarray, columns: list[int], dets: Determinants) -> np.ndarray:
+    n = len(A)
+    if n > MAX_CRAMER:
+        return _orthogonal(A, B, columns, dets)
+    adjugate, det = _adjugate(A)
+    dets.add(columns, det)
+    return sparse_product(adjugate, B) / det
+
+
+def _adjugate(A: np.ndarray) -> tuple[np.ndarray, Any]:
+    """Adjugate and determinant of up to three rows."""
+    n = len(A)
+    out = zero_objects(n, n)
+    if n == 1:
+        out[0, 0] = 1.0
+    elif n == 2:
+        out[:] = [[A[1, 1], -A[0, 1]], [-A[1, 0], A[0, 0]]]
+    else:
+        for i in range(3):
+            for j in range(3):
+                (a, b), (c, d) = [k for k in range(3) if k != j], [k for k in range(3) if k != i]
+                minor = A[a, c] * A[b, d] - A[a, d] * A[b, c]
+                out[i, j] = minor if (i + j) % 2 == 0 else -minor
+    return out, sum((A[0, k] * out[k, 0] for k in range(n)), 0.0)
+
+
+def _orthogonal(A: np.ndarray, B: np.ndarray, columns: list[int], dets: Determinants) -> np.ndarray:
+    n = len(A)
+    Q = [A[:, k].copy() for k in range(n)]
+    C, R, Y = B.copy(), zero_objects(n, n), zero_objects(*B.shape)
+    det: Any = 1.0
+    for k in range(n):
+        R[k, k] = sqrt(sum((x * x for x in Q[k]), 0.0))
+        det = det * R[k, k]
+        e = Q[k] / R[k, k]
+        for j in range(k + 1, n):
+            R[k, j] = _dot(e, Q[j])
+            Q[j] = Q[j] - R[k, j] * e
+        for j in range(B.shape[1]):
+            Y[k, j] = _dot(e, C[:, j])
+            C[:, j] = C[:, j] - Y[k, j] * e
+    dets.add(columns, det)
+    X = zero_objects(*B.shape)
+    for k in reversed(range(n)):
+        X[k] = (Y[k] - sparse_product(R[k : k + 1, k + 1 :], X[k + 1 :])[0]) / R[k, k]
+    return X
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> Any:
+    return sum((x * y for x, y in zip(a, b, strict=True) if x != 0.0 and y != 0.0), 0.0)
+
+
+def solve_symmetric(M: np.ndarray, B: np.ndarray, pivots: Determinants) -> np.ndarray:
+    """X with M X = B by M = L D L^T, for a positive definite M; the pivots are added."""
+    n = len(M)
+    L, D = zero_objects(n, n), zero_objects(n)
+    for k in range(n):
+        for j in range(k):
+            L[k, j] = (M[k, j] - sum((L[k, i] * D[i] * L[j, i] for i in range(j)), 0.0)) / D[j]
+        D[k] = M[k, k] - sum((L[k, i] * L[k, i] * D[i] for i in range(k)), 0.0)
+        pivots.add([k], D[k])
+    X = B.copy()
+    for k in range(n):
+        X[k] = X[k] - sparse_product(L[k : k + 1, :k], X[:k])[0]
+    for k in range(n):
+        X[k] = X[k] / D[k]
+    for k in reversed(range(n)):
+        X[k] = X[k] - sparse_product(L[k + 1 :, k : k + 1].T, X[k + 1 :])[0]
+    return X

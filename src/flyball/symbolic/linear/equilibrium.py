@@ -1,0 +1,349 @@
+"""Whether an operating point is an equilibrium or a steady motion, and for which parameters.
+
+Multipliers are those that balance the forces at the point. What remains must vanish by itself: conditions on the
+parameters. A motion with constant rates must look the same at later times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...derivatives.reduced_equations import gap_lengths
+from ...errors import AnalysisError, ModelError
+from ...expression_graph.evaluation import evaluate, jacobian, nodes_in_order, substitute
+from ...expression_graph.graph import SYMBOL, Node, zero_objects
+from ...numerics.rank import RANK_TOLERANCE, fundamental_subspaces, null_space, rank
+from .derivatives import Derivatives, TracedMechanism
+from .elimination import (
+    DependentEquations,
+    identically_zero,
+    matrix_product,
+    nominal_value,
+    nominal_values,
+    solve_equations,
+    values_and_sizes,
+)
+from .operating_point import OperatingPoint
+from .reduction import Freedoms, reduce_linear, scaled_rows, with_bases_of
+
+BALANCE_TOLERANCE = 1e-6  # of the terms that cancel, and of the largest force anywhere: what is left at an equilibrium
+ZERO_FORCE_TOLERANCE = 1e-9  # step in radians, or parts of the mechanism's length, that an equilibrium may be off
+
+
+def balancing_multipliers(m: TracedMechanism, point: OperatingPoint, f: Freedoms) -> np.ndarray:
+    """Multipliers (rows,) under which r = 0; those of rows that depend on others are 0.
+
+    Raises
+    ------
+    ModelError
+        If friction follows them: they are then no solution of linear equations.
+    """
+    lam = zero_objects(len(m.multipliers))
+    if not len(f.rows_v):
+        return lam
+    r, R = _forces(m, point)
+    if any(x in m.multipliers for x in nodes_in_order(list(R.ravel()))):
+        names = ", ".join(repr(e.name) for e in m.model.forces if hasattr(e, "load"))
+        raise ModelError(
+            f"friction of {names} follows the reactions, which at this point are no solution of linear equations; "
+            f"linearize takes it, in numbers"
+        )
+    others = np.setdiff1d(np.arange(len(r)), np.r_[f.chosen_v, f.held])
+    lam[f.rows_v] = solve_equations(R[np.ix_(others, f.rows_v)], -r[others, None])[:, 0]
+    return lam
+
+
+def _forces(m: TracedMechanism, point: OperatingPoint) -> tuple[np.ndarray, np.ndarray]:
+    """R without multipliers, and its derivatives by them."""
+    by = jacobian(list(m.r), m.multipliers)
+    flat = substitute([*m.r, *by.ravel()], point.replacing(m))
+    nv = len(m.r)
+    r = zero_objects(nv)
+    r[:] = substitute(flat[:nv], [(s, 0.0) for s in m.multipliers])
+    R = zero_objects(*by.shape)
+    R.ravel()[:] = flat[nv:]
+    return r, R
+
+
+def equilibrium_conditions(m: TracedMechanism, point: OperatingPoint, lam: np.ndarray, f: Freedoms) -> list[Node]:
+    """Forces along the free coordinates, which vanish at an equilibrium; those that always do are left out."""
+    r = zero_objects(len(m.r), 1)
+    r[:, 0] = substitute(list(m.r), [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
+    found = substitute(list(matrix_product(f.Zv.T, r)[:, 0]), [(s, 0.0) for s in m.added])
+    return not_identically_zero(found)
+
+
+def not_identically_zero(nodes: Sequence[Any]) -> list[Node]:
+    """Those that do not vanish for all parameters; what is a number is rounding, or refused."""
+    told = [x for x, none in zip(nodes, identically_zero(nodes), strict=True) if isinstance(x, Node) and not none]
+    return [x for x in told if not x.known]
+
+
+def refuse_unbalanced(m: TracedMechanism, f: Freedoms, stiffness: np.ndarray, at: dict[str, float]) -> None:
+    """Refuse a point that is no equilibrium with the parameters' own values.
+
+    Parameters
+    ----------
+    m : Mechanics
+    f : Free
+    stiffness : ndarray
+        Derivatives of r by positions there.
+    at : dict
+        Values of all symbols there that are no parameters with their own values.
+
+    Raises
+    ------
+    AnalysisError
+        If the velocities do not stay what they are.
+    ModelError
+        With what is left unbalanced.
+    """
+    moving = any(at[s.data.name] for s in m.x.v)
+    if moving and m.x.lam:
+        terms = np.array(values_and_sizes(list(m.x.gamma), at))
+        if (np.abs(terms[:, 0]) > BALANCE_TOLERANCE * (terms[:, 1] + terms[:, 1].max())).any():
+            raise unsteady_error(m)
+    r = np.array(values_and_sizes(list(m.r), at)) * m.scale[:, None]
+    Z = nominal_values(f.Zv) / m.scale[:, None] * m.scale[f.chosen_v]
+    left, terms = Z.T @ r[:, 0], np.abs(Z).T @ r[:, 1]
+    near = np.abs(nominal_values(stiffness) * m.scale * m.scale[:, None]).sum(axis=1) * m.values.length
+    for d, x, own in zip(f.chosen_v, left, terms, strict=True):
+        if abs(x) > BALANCE_TOLERANCE * (own + 1e-3 * r[:, 1].max()) + ZERO_FORCE_TOLERANCE * near[d]:
+            name = m.names[d]
+            others = "; other steady motions than of joints' coordinates linearize takes, in numbers" if moving else ""
+            raise ModelError(
+                f"{m.model.name!r} is in no equilibrium there: {x / m.scale[d]:.6g} "
+                f"{'N' if name.unit == 'm' else 'N m'} are left along {name.name}. Give another point, for instance "
+                f"at=m.equilibrium(), or name a parameter that has the value which balances it: "
+                f"balanced_by=[...]{others}"
+            )
+
+
+def unsteady_error(m: TracedMechanism) -> AnalysisError:
+    """The error for a motion that does not stay what it is."""
+    return AnalysisError(
+        f"{m.model.name!r} does not stay there as it is: its velocities change, or its linear equations do. Symbolic "
+        f"ones are about equilibria, and about motions in which coordinates of joints turn or slide evenly while all "
+        f"others stand still (coordinates='joint'); linearize takes other steady motions, in numbers"
+    )
+
+
+def balancing_parameters(m: TracedMechanism, at: Sequence[Node], names: Sequence[str]) -> list[tuple[Node, Node]]:
+    """Parameters as the conditions of equilibrium ask for: (symbol, expression of the others).
+
+    Parameters
+    ----------
+    m : Mechanics
+    at : sequence of Node
+        The conditions.
+    names : sequence of str
+        As many parameters, in which these are linear.
+
+    Raises
+    ------
+    ModelError
+        If they do not tell these parameters, or not linearly.
+    """
+    for name in names:
+        if name not in m.given:
+            raise ModelError(
+                f"{m.model.name!r} has no parameter {name!r} with a value of its own to balance by; where an input is "
+                f"to balance, give the force or torque beside it a parameter: torque='tau'"
+            )
+    if len(at) != len(names):
+        raise ModelError(
+            f"{len(at)} conditions of equilibrium tell {len(at)} parameters, not {len(names)} ({', '.join(names)})"
+        )
+    symbols = [m.given[k] for k in names]
+    J = jacobian(at, symbols)
+    if any(x.op == SYMBOL and x in symbols for x in nodes_in_order(list(J.ravel()))):
+        raise ModelError(f"the conditions of equilibrium are not linear in {', '.join(names)}; take other parameters")
+    rest = zero_objects(len(at), 1)
+    rest[:, 0] = substitute(list(at), [(s, 0.0) for s in symbols])
+    try:
+        found = solve_equations(J, -rest)[:, 0]
+    except DependentEquations:
+        raise ModelError(f"equilibrium does not tell {', '.join(names)}: take other parameters") from None
+    return [(s, m.graph.node(x)) for s, x in zip(symbols, found, strict=True)]
+
+
+CLOSURE_TOLERANCE = 1e-7  # of the terms of a constraint: what may be left of it
+
+
+@dataclass(frozen=True)
+class Validity:
+    """What has to vanish at a point, as expressions of the parameters.
+
+    Attributes
+    ----------
+    forces : sequence of Node
+        Forces along the free coordinates.
+    loops : sequence of Node
+        Constraints.
+    """
+
+    forces: Sequence[Node] = ()
+    loops: Sequence[Node] = ()
+
+    def refuse(self, name: str, values: Mapping[str, float]) -> None:
+        """Refuse values of parameters for which the point is another one.
+
+        Raises
+        ------
+        ModelError
+            With what is left.
+        """
+        told = ", ".join(f"{k} = {x:g}" for k, x in values.items())
+        remedy = (
+            "give the others that go with it, or make the equations about the point that belongs to them: "
+            "symbolic(parameters=...), linear(at=m.equilibrium(parameters=...))"
+        )
+        if _residuals(self.loops, values, CLOSURE_TOLERANCE) is not None:
+            raise ModelError(
+                f"with {told} the loops of {name!r} do not close at the point that these equations are about, whose "
+                f"coordinates are numbers; {remedy}"
+            )
+        left = _residuals(self.forces, values, BALANCE_TOLERANCE)
+        if left is not None:
+            raise ModelError(
+                f"with {told} {name!r} is in no equilibrium at the point that these equations are about: {left:.6g} N "
+                f"or N m are left; {remedy}, or name a parameter that balances: balanced_by=[...]"
+            )
+
+
+def _residuals(nodes: Sequence[Node], values: Mapping[str, float], part: float) -> float | None:
+    """What does not vanish, beyond rounding and what is left with the parameters' own values."""
+    if not values or not nodes:
+        return None
+    here, own = values_and_sizes(nodes, values), values_and_sizes(nodes)
+    most = max(size for _, size in here)
+    for (x, size), (before, _) in zip(here, own, strict=True):
+        if not abs(x) <= part * (size + 1e-3 * most) + 2.0 * abs(before):
+            return x
+    return None
+
+
+TEST_DURATION = 0.1  # angle [rad], or part of the mechanism's length, that it moves by between the instants compared
+TEST_STEPS = 8
+STEADY_TOLERANCE = 1e-7  # relative difference of equations that are the same
+NEARBY_STEP = (
+    1e-2  # part of a radian, or of the mechanism's length, that it is moved by to see whether its rank is the usual
+)
+MAX_ITERATIONS = 20
+LOOP_CLOSURE_TOLERANCE = 1e-10  # of the mechanism's length
+
+
+def refuse_unsteady(
+    m: TracedMechanism, d: Derivatives, f: Freedoms, point: OperatingPoint, known: dict[str, float]
+) -> None:
+    """Refuse a motion whose linear equations change while it goes on, or that follow time.
+
+    ``known`` tells the multipliers, and parameters that have other values than their own.
+
+    Raises
+    ------
+    AnalysisError
+        If they do.
+    """
+    v = np.array([nominal_value(x) for x in point.v])
+    here = point.numbers(m) | known
+    size = np.abs(v / np.array([m.values.length if n.unit == "m" else 1.0 for n in m.names])).max(initial=0.0)
+    later = dict(here)
+    if size > 0.0:
+        for _ in range(TEST_STEPS):
+            _moved(m, later, v, TEST_DURATION / size / TEST_STEPS)
+    else:
+        later[m.x.t.data.name] += 1.0 / np.sqrt(np.abs(_matrix(m, d, f, here)).max(initial=0.0) or 1.0)
+    now, then = (_matrix(m, d, f, at) for at in (here, later))
+    if np.abs(then - now).max(initial=0.0) > STEADY_TOLERANCE * np.abs(now).max(initial=0.0):
+        if size > 0.0:
+            raise unsteady_error(m)
+        raise AnalysisError(
+            f"the linear equations of {m.model.name!r} at this point change with time: laws change with time; "
+            f"linearize takes this very instant with frozen=True, in numbers"
+        )
+
+
+def _matrix(m: TracedMechanism, d: Derivatives, f: Freedoms, at: dict[str, float]) -> np.ndarray:
+    """A in numbers, in the same coordinates."""
+    p = d.near(at)
+    n = f.Z.shape[1] + f.Zv.shape[1]
+    return nominal_values(reduce_linear(m, p, with_bases_of(f, p)).rate[:, :n])
+
+
+def _moved(m: TracedMechanism, at: dict[str, float], v: np.ndarray, h: float) -> None:
+    """A step of Runge and Kutta's along constant velocities."""
+    names = [s.data.name for s in m.x.q]
+    q = np.array([at[k] for k in names])
+
+    def rate(q: np.ndarray) -> np.ndarray:
+        T = evaluate(list(m.x.T.ravel()), at | dict(zip(names, q.tolist(), strict=True)))
+        return np.array(T, float).reshape(len(names), -1) @ v
+
+    k1 = rate(q)
+    k2 = rate(q + 0.5 * h * k1)
+    k3 = rate(q + 0.5 * h * k2)
+    k4 = rate(q + h * k3)
+    at |= dict(zip(names, (q + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)).tolist(), strict=True))
+    at[m.x.t.data.name] += h
+
+
+def refuse_singular(m: TracedMechanism, G: list[Node], point: OperatingPoint) -> None:
+    """Refuse a position where the constraints lose rank: nothing linear holds there.
+
+    Raises
+    ------
+    ModelError
+        Naming the elements whose rows depend on each other there and not nearby.
+    """
+    which = np.flatnonzero(m.holonomic)
+    here = point.numbers(m)
+    if not len(which):
+        return
+    now = _rows(m, G, here)[which]
+    N = null_space(now)
+    rng = np.random.default_rng(0)
+    for _ in range(2 if N.shape[1] else 0):
+        step = m.scale * (N @ rng.standard_normal(N.shape[1]))
+        step *= NEARBY_STEP * m.values.length / np.abs(step / m.scale).max()
+        there = _nearby(m, G, dict(here), step, which)
+        if there is not None and rank(there) > rank(now):
+            raise ModelError(
+                f"{m.model.name!r} is in a singular position there: the constraints of {_lost(m, now, there, which)} "
+                f"depend on each other at this point and not nearby, so that there are no linear equations; give "
+                f"another point"
+            )
+
+
+def _rows(m: TracedMechanism, G: list[Node], at: dict[str, float]) -> np.ndarray:
+    return scaled_rows(np.array(evaluate(G, at), object).reshape(len(m.n), -1), m.scale)
+
+
+def _nearby(
+    m: TracedMechanism, G: list[Node], at: dict[str, float], step: np.ndarray, which: np.ndarray
+) -> np.ndarray | None:
+    """Rows at the closed position near a step away; None if none is found."""
+    names = [s.data.name for s in m.x.q]
+    for _ in range(MAX_ITERATIONS):
+        T = np.array(evaluate(list(m.x.T.ravel()), at), float).reshape(len(names), -1)
+        for k, dq in zip(names, T @ step, strict=True):
+            at[k] += float(dq)
+        A = np.array(evaluate(G, at), float).reshape(len(m.n), -1)[which]
+        g = gap_lengths(np.array(evaluate(list(m.g[which]), at), float), A, m.scale)
+        if np.abs(g).max() < LOOP_CLOSURE_TOLERANCE * m.values.length:
+            return _rows(m, G, at)[which]
+        step = m.scale * np.linalg.lstsq(scaled_rows(A, m.scale), -g, rcond=RANK_TOLERANCE)[0]
+    return None
+
+
+def _lost(m: TracedMechanism, now: np.ndarray, there: np.ndarray, which: np.ndarray) -> str:
+    """Elements whose rows take part in dependencies that are not there nearby."""
+    here, span = fundamental_subspaces(now).dependencies, fundamental_subspaces(there).span
+    part = np.abs(here @ (here.T @ span)).max(axis=1)
+    s = m.values.structure
+    of = [*(r.element.name for r in s.rows), *s.prescribed]
+    return ", ".join(dict.fromkeys(of[k] for k, x in zip(which, part, strict=True) if x > 1e-3))

@@ -1,0 +1,428 @@
+"""Linear equations of a mechanism about an operating point, with expressions of its parameters as entries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...errors import AnalysisError, ModelError
+from ...expression_graph.evaluation import evaluate, substitute, symbols_of
+from ...expression_graph.graph import Node
+from ...linear.operating_point import operating_state
+from ...model.messages import listing, suggest
+from ...model.model import Model
+from ...results.equilibrium import Equilibrium
+from ...results.result import Result
+from ...results.wording import with_unit
+from ...tables.coordinate_choice import spanning_joints
+from ..expressions import Expressions, SymbolTable
+from .derivatives import Derivatives, Perturbed, TracedMechanism, refuse_unknown, trace_mechanism
+from .elimination import nominal_value
+from .equilibrium import (
+    Validity,
+    balancing_multipliers,
+    balancing_parameters,
+    equilibrium_conditions,
+    not_identically_zero,
+    refuse_singular,
+    refuse_unbalanced,
+    refuse_unsteady,
+)
+from .operating_point import OperatingPoint, given_point, reference_point
+from .polynomials import cancel_common_factors, readable_coefficients, scale_fraction
+from .reduction import Freedoms, StateSpaceMatrices, find_freedoms, reduce_linear, state_space_matrices
+from .stability import StabilityConditions, stability_conditions
+from .transfer_functions import PolynomialPencil, TransferFunction, checked_values, polynomial_pencil
+
+FACTORED = 300  # operations
+
+
+@dataclass
+class LinearEquations(SymbolTable):
+    """Linear equations x' = A x + B u, y = C x + D u whose entries are expressions of the mechanism's parameters.
+
+    The states are changes of as many coordinates as there are freedoms, then changes of their rates, as those of
+    `LinearModel`.
+
+    Attributes
+    ----------
+    name : str
+    parameters : dict
+        Name -> value of the parameters that have one of their own.
+    matrices : Matrices
+        What the properties tell, as arrays of nodes.
+    conditions : list of Node
+        What has to vanish for the point to be an equilibrium, where it does not by itself: the equations hold for
+        parameters with which it does, and numbers with which it does not are refused.
+    balanced_by : dict
+        Parameter -> the expression of the others that it stands for, since equilibrium asks for it.
+    found : tuple of str
+        Coordinates that are numbers at the point, whatever the parameters: loops were closed numerically.
+    """
+
+    name: str
+    parameters: dict[str, float]
+    matrices: StateSpaceMatrices
+    conditions: list[Node]
+    balanced_by: dict[str, Node]
+    found: tuple[str, ...]
+    at: Perturbed = field(repr=False)
+    free: Freedoms = field(repr=False)
+    mechanics: TracedMechanism = field(repr=False)
+    validity: Validity = field(default=Validity(), repr=False)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states x."""
+        return self.matrices.states
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs u."""
+        return self.matrices.inputs
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs y."""
+        return self.matrices.outputs
+
+    @property
+    def A(self) -> Expressions:
+        """In x' = A x + B u, (n, n)."""
+        return self._told(self.matrices.A, self.states, self.states)
+
+    @property
+    def B(self) -> Expressions:
+        """In x' = A x + B u, (n, inputs); errors as `C`."""
+        return self._proper(self.matrices.B, self.states, self.inputs)
+
+    @property
+    def C(self) -> Expressions:
+        """In y = C x + D u, (outputs, n).
+
+        Raises
+        ------
+        AnalysisError
+            If an output follows the rate of an input.
+        """
+        return self._proper(self.matrices.C, self.outputs, self.states)
+
+    @property
+    def D(self) -> Expressions:
+        """In y = C x + D u, (outputs, inputs); errors as `C`."""
+        return self._proper(self.matrices.D, self.outputs, self.inputs)
+
+    @property
+    def mass(self) -> Expressions | None:
+        """M of M a'' + D a' + K a = 0 in the first f states, (f, f); None with constraints on velocities only."""
+        return self._second(self.matrices.mass)
+
+    @property
+    def damping(self) -> Expressions | None:
+        """D of the same."""
+        return self._second(self.matrices.damping)
+
+    @property
+    def stiffness(self) -> Expressions | None:
+        """K of the same."""
+        return self._second(self.matrices.stiffness)
+
+    def _second(self, X: np.ndarray | None) -> Expressions | None:
+        return None if X is None else self._told(X, self.states[: len(X)], self.states[: len(X)])
+
+    def _proper(self, X: np.ndarray, rows: tuple[str, ...], columns: tuple[str, ...]) -> Expressions:
+        if self.matrices.improper:
+            raise AnalysisError(self.matrices.improper)
+        return self._told(X, rows, columns)
+
+    def _told(self, X: np.ndarray, rows: tuple[str, ...], columns: tuple[str, ...]) -> Expressions:
+        return Expressions(self, X, rows, columns)
+
+    @property
+    def title(self) -> str:
+        """The mechanism's name."""
+        return repr(self.name)
+
+    @property
+    def named(self) -> dict[str, Node]:
+        """Symbols in the matrices, by name."""
+        m = self.matrices
+        return {x.data.name: x for x in symbols_of([n for X in (m.A, m.B, m.C, m.D) for n in X.ravel().tolist()])}
+
+    def checked(self, values: Mapping[str, Any], requested: Mapping[str, Node]) -> dict[str, float]:
+        """Values by the names of symbols; refuses those that there are not. What `Expressions` ask."""
+        return checked_values(self, values)
+
+    def values(self, **parameters: float) -> dict[str, np.ndarray]:
+        """A, B, C, D in numbers: with the parameters' own values, or others.
+
+        Raises
+        ------
+        ModelError
+            If there is no such parameter, equilibrium says what it is, or the point is no equilibrium with it.
+        """
+        return {k: getattr(self, k).at(parameters).astype(float) + 0.0 for k in "ABCD"}
+
+    def eigenvalues(self, **parameters: float) -> np.ndarray:
+        """Of A in numbers, (n,) complex [1/s]."""
+        return np.linalg.eigvals(self.A.at(parameters).astype(float))
+
+    def balance(self, **parameters: float) -> dict[str, float]:
+        """Values of the parameters that balance, for values of the others."""
+        told = checked_values(self, parameters)
+        found = evaluate(list(self.balanced_by.values()), told)
+        return {k: float(x) for k, x in zip(self.balanced_by, found, strict=True)}
+
+    @cached_property
+    def pencil(self) -> PolynomialPencil:
+        """The same equations as a matrix of polynomials, constraints left in."""
+        positive = [k for k, x in self.parameters.items() if x > 0.0]
+        return polynomial_pencil(self.mechanics, self.at, self.free, positive)
+
+    def transfer_function(self, input: str | None = None, output: str | None = None) -> TransferFunction:
+        """Transfer function with symbolic coefficients; of the only input and output if not named.
+
+        Raises
+        ------
+        ModelError
+            If there is no such input or output, or the mechanism is too large, with the size met.
+        ImportError
+            If the package ``sympy`` is not installed.
+        """
+        i, k = self.index("input", input), self.index("output", output)
+        P = self.pencil
+        ring = P.ring
+        num, den, common = cancel_common_factors(ring, P.numerator(i, k), P.characteristic() * P.below[k])
+        num, den = scale_fraction(ring, num, den)
+        both = [readable_coefficients(ring, num), readable_coefficients(ring, den)]
+        graph = self.mechanics.graph
+        nodes = ring.printer.back(both[0], graph), ring.printer.back(both[1], graph)
+        units = self.matrices.input_units[i], self.matrices.output_units[k]
+        names = {"input": self.inputs[i], "output": self.outputs[k], "input_unit": units[0], "output_unit": units[1]}
+        return TransferFunction(
+            name=self.name, **names, s=ring.s, num=tuple(both[0]), den=tuple(both[1]), cancelled=common,
+            parameters=self.parameters, balanced_by=self.balanced_by, nodes=nodes,
+            validity=self.validity,
+        )  # fmt: skip
+
+    def routh(self, positive: Sequence[str] | None = None) -> StabilityConditions:
+        """When all eigenvalues have negative real parts, as inequalities in the parameters.
+
+        Parameters
+        ----------
+        positive : sequence of str, optional
+            What is greater than zero: parameters, and ``"sin(alpha)"`` or the like; all that is now, if not given.
+
+        Raises
+        ------
+        ModelError
+            If the mechanism is too large, with the size met.
+        ImportError
+            If the package ``sympy`` is not installed.
+        """
+        P = self.pencil
+        out = stability_conditions(P.ring, P.characteristic(), self.name, (self.parameters, self.balanced_by), positive)
+        out.validity = self.validity
+        return out
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people: names, and what equilibrium asks of the parameters."""
+        x, out = self.matrices, []
+        for what, names, units in (
+            ("state", x.states, x.state_units),
+            ("input", x.inputs, x.input_units),
+            ("output", x.outputs, x.output_units),
+        ):
+            out += [(what, with_unit(name, unit)) for name, unit in zip(names, units, strict=True)]
+        out += [("equilibrium", f"{k} = {self._short(e)}") for k, e in self.balanced_by.items()]
+        out += [("equilibrium", f"0 = {self._short(e)}") for e in self.conditions]
+        return out + [("found", f"{name} is a number, so that loops close") for name in self.found]
+
+    def _short(self, x: Node) -> Any:
+        """For people: factored, where that is cheap."""
+        made = self.printer(x)
+        return self.printer.sympy.factor(made) if made.count_ops() < FACTORED else made
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{a}: {b}" for a, b in self.lines())
+
+    def __str__(self) -> str:
+        """The names, and the matrices."""
+        shown = "A" if self.matrices.improper else "ABCD"
+        told = [(k, getattr(self, k)) for k in shown]
+        out = [repr(self), *(f"{k} =\n{X}" for k, X in told if X.nodes.size)]
+        return "\n".join(out + ([self.matrices.improper] if self.matrices.improper else []))
+
+    def latex(self) -> str:
+        """x' = A x + B u, y = C x + D u as LaTeX; x' = A x alone without inputs and outputs."""
+        out = [rf"\dot x = {self.A.latex()} x"]
+        if self.inputs:
+            out[0] += f" + {self.B.latex()} u"
+        if self.outputs:
+            out.append(f"y = {self.C.latex()} x" + (f" + {self.D.latex()} u" if self.inputs else ""))
+        return r" \\ ".join(out)
+
+    def _repr_latex_(self) -> str:
+        return rf"$\displaystyle \begin{{gathered}} {self.latex()} \end{{gathered}}$"
+
+    def index(self, what: str, name: str | None) -> int:
+        """Which input or output that is; the only one if not named."""
+        names: tuple[str, ...] = getattr(self, f"{what}s")
+        if name is None and len(names) == 1:
+            return 0
+        if name not in names:
+            given = "say which" if name is None else f"there is no {what} {name!r}{suggest(name, list(names))}"
+            there = listing(list(names)) if names else f"the equations were made without any: {what}s=[...]"
+            raise ModelError(f"{given}; {there}")
+        return names.index(name)
+
+
+REST_TOLERANCE = 1e-12  # [1/s]: slower is rounding
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearizationOptions:
+    """What `linear_equations` is asked; see there."""
+
+    inputs: Sequence[str] = ()
+    outputs: Sequence[str] = ()
+    at: Equilibrium | Result | Mapping[str, Any] | None = None
+    coordinates: str = "joint"
+    independent: Sequence[str] = ()
+    balanced_by: Sequence[str] = ()
+    parameters: Mapping[str, float] | None = None
+    tree: Sequence[str] | None = None  # the tree joints, where they are known
+
+
+def linear_equations(
+    model: Model,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    *,
+    at: Equilibrium | Result | Mapping[str, Any] | None = None,
+    coordinates: str = "joint",
+    independent: Sequence[str] = (),
+    balanced_by: Sequence[str] = (),
+    parameters: Mapping[str, float] | None = None,
+) -> LinearEquations:
+    """Linear equations x' = A x + B u, y = C x + D u with the parameters as symbols.
+
+    About an equilibrium, or a motion in which coordinates of joints turn evenly while all others stand still.
+
+    Parameters
+    ----------
+    inputs, outputs : sequence of str
+        As of `Mechanism.linearize`.
+    at : Equilibrium, Result or mapping, optional
+        Where. As drawn, if not given: then coordinates are the expressions by which the mechanism is drawn. A mapping
+        gives coordinates, and as ``"A.angle rate"`` their rates: numbers, texts with a unit, expressions of parameters;
+        what it does not give is as drawn, or moved so that loops close. Of an equilibrium, or the end of a motion, the
+        coordinates are numbers.
+    coordinates : {"joint", "absolute"}
+        Those that the equations are made in.
+    independent : sequence of str
+        Coordinates that the states are changes of; chosen by pivoting if not given.
+    balanced_by : sequence of str
+        Parameters that take the values with which the point is an equilibrium, as many as there are conditions.
+    parameters : mapping, optional
+        Values in place of the model's own, in SI units or with a unit.
+
+    Raises
+    ------
+    ModelError
+        If a name does not exist, the point cannot be closed, is singular or no equilibrium, or something moves without
+        inertia.
+    AnalysisError
+        If the linear equations change with time, or an output follows the rate of an input.
+    """
+    if coordinates not in ("joint", "absolute"):
+        raise ModelError(f"unknown coordinates {coordinates!r}; choose one of joint, absolute")
+    asked = LinearizationOptions(
+        inputs=inputs, outputs=outputs, at=at, coordinates=coordinates, independent=independent,
+        balanced_by=balanced_by, parameters=parameters,
+    )  # fmt: skip
+    return linearize_about(model, asked)
+
+
+def linearize_about(model: Model, o: LinearizationOptions) -> LinearEquations:
+    """As `linear_equations`."""
+    refuse_unknown(model, o.outputs)
+    m, point = _traced_at_point(model, o)
+    curves = [m.output(name) for name in o.outputs]
+    d = Derivatives(m, [y for _, y in curves])
+    where = point.replacing(m)
+    first = d.at([*where, *((s, 0.0) for s in m.multipliers)])
+    refuse_singular(m, [m.graph.node(x) for x in _by_velocity(d)], point)
+    f = find_freedoms(m, first, o.independent)
+    lam = balancing_multipliers(m, point, f)
+    at_rest = equilibrium_conditions(m, point, lam, f)
+    pairs = balancing_parameters(m, at_rest, o.balanced_by) if o.balanced_by else []
+    point = OperatingPoint(substitute(point.q, pairs), substitute(point.v, pairs), point.z, point.t, point.found)
+    lam[:] = substitute(list(lam), pairs)
+    known = {s.data.name: nominal_value(x) for s, x in [*pairs, *zip(m.multipliers, lam, strict=True)]}
+    refuse_unbalanced(m, f, first.by["rx"], point.numbers(m) | _loads_at_rest(m) | known)
+    where = [*point.replacing(m), *zip(m.multipliers, lam, strict=True)]
+    p = d.at(where).replaced(pairs) if pairs else d.at(where)
+    f = find_freedoms(m, p, o.independent)
+    refuse_unsteady(m, d, f, point, known)
+    out = state_space_matrices(
+        m, p, f, reduce_linear(m, p, f), list(zip(o.outputs, (unit for unit, _ in curves), strict=True))
+    )
+    return LinearEquations(
+        name=m.model.name,
+        parameters={k: x.value for k, x in m.given.items() if x not in m.added and k not in dict(_names(pairs))},
+        conditions=[] if pairs else at_rest,
+        balanced_by=dict(_names(pairs)),
+        found=point.found,
+        at=p,
+        free=f,
+        mechanics=m,
+        matrices=out,
+        validity=Validity([] if pairs else at_rest, not_identically_zero(substitute(list(m.g), where))),
+    )
+
+
+def _names(pairs: Sequence[tuple[Any, Any]]) -> list[tuple[str, Any]]:
+    return [(s.data.name, x) for s, x in pairs]
+
+
+def _by_velocity(d: Derivatives) -> list[Any]:
+    """G, row by row."""
+    rows = slice(*d.ends[2:4])
+    columns = np.array([c[rows] for c in d.columns["v"]], object).reshape(len(d.m.x.v), -1)
+    return list(columns.T.ravel())
+
+
+def _loads_at_rest(m: TracedMechanism) -> dict[str, float]:
+    """Loads of joints with friction, which are no unknowns any more."""
+    return {s.data.name: 0.0 for s in m.x.loads}
+
+
+def _traced_at_point(model: Model, o: LinearizationOptions) -> tuple[TracedMechanism, OperatingPoint]:
+    """The mechanism traced in its coordinates, and the point."""
+    if isinstance(o.at, Equilibrium | Result):
+        if isinstance(o.at, Equilibrium) and o.at.preload:
+            raise ModelError(
+                "at is an equilibrium under a preload, which is no part of the mechanism: add it to its forces"
+            )
+        x, _ = operating_state(model, o.at, coordinates=o.coordinates, parameters=o.parameters)
+        values = dict(x.c.parameters)
+        m = trace_mechanism(model, x.c.structure.tree, o.inputs, values)
+        v = x.v if np.abs(x.v / x.c.sizes).max(initial=0.0) > REST_TOLERANCE else 0.0 * x.v
+        return m, OperatingPoint(x.q.tolist(), v.tolist(), x.z.tolist(), x.t)
+    tree = o.tree
+    if tree is None:
+        tree = spanning_joints(model) if o.coordinates == "joint" else ()
+    m = trace_mechanism(model, tree, o.inputs, o.parameters)
+    return m, reference_or_given(m, o.at)
+
+
+def reference_or_given(m: TracedMechanism, at: Mapping[str, Any] | None) -> OperatingPoint:
+    """As drawn where loops close there, else moved."""
+    if not (at is None or isinstance(at, Mapping)):
+        raise ModelError(f"at={at!r}: must be a mapping of coordinates, an equilibrium, a result, or None for as drawn")
+    return given_point(m, at or {}) if at or len(m.g) else reference_point(m)

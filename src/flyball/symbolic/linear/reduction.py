@@ -1,0 +1,342 @@
+"""Elimination of the constraints from linear equations, and the matrices A, B, C, D.
+
+With x a change of position, u = x' - N x one of velocity, l of the multipliers and w of the inputs,
+
+    M u' + D u + K x + R l + r_w w = 0,    G x + g_w w = 0,    G u + V x + n_w w + g_w w' = 0,
+
+x = Z a + X w and u = Zv b + P a + U w + U1 w'. Multipliers are eliminated by Y with Y^T R = 0, which is Zv unless
+friction depends on the reactions. Independent rows and coordinates are chosen by the values of the parameters,
+with the pivoting of `Mechanism.linearize`; the basis consists of expressions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...derivatives.reduced_equations import massless_motion_error, pivot_rows
+from ...errors import ModelError
+from ...expression_graph.evaluation import substitute
+from ...expression_graph.graph import Node, zero_objects
+from ...numerics.rank import RANK_TOLERANCE, null_space, rank
+from .derivatives import Perturbed, TracedMechanism
+from .elimination import DependentEquations, is_zero, matrix_product, nominal_values, solve_equations
+
+ROUNDING_TOLERANCE = 1e-13  # part of the largest row below which one is what rounding left of none
+
+
+@dataclass
+class Freedoms:
+    """Freedoms.
+
+    Attributes
+    ----------
+    Z, Zv : ndarray (nv, f), (nv, fv)
+        Bases of the changes of positions, and of velocities, that the constraints allow: the identity in the rows
+        ``chosen`` and ``chosen_v``.
+    rows, rows_v : ndarray of int
+        Independent constraints on positions, and of all; the others follow from these.
+    held : ndarray of int
+        Coordinates that mean nothing: turns of point masses.
+    """
+
+    Z: np.ndarray
+    Zv: np.ndarray
+    chosen: np.ndarray
+    chosen_v: np.ndarray
+    rows: np.ndarray
+    rows_v: np.ndarray
+    held: np.ndarray
+
+
+def find_freedoms(m: TracedMechanism, p: Perturbed, requested: Sequence[str] = ()) -> Freedoms:
+    """Freedoms at a point; ``requested`` names the coordinates that tell the others.
+
+    Raises
+    ------
+    ModelError
+        If the wanted coordinates do not tell the others.
+    """
+    G = p.by["nv"]
+    held = _massless_velocities(p)
+    which = np.flatnonzero(m.holonomic)
+    chosen, rows = _chosen(m, G, which, held, _indices(m, requested))
+    Z = _basis(G, rows, chosen, held)
+    if len(which) == len(G):
+        return Freedoms(Z, Z, chosen, chosen, rows, rows, held)
+    chosen_v, rows_v = _chosen(m, G, np.arange(len(G)), held, None)
+    return Freedoms(Z, _basis(G, rows_v, chosen_v, held), chosen, chosen_v, rows, rows_v, held)
+
+
+def with_bases_of(f: Freedoms, p: Perturbed) -> Freedoms:
+    """The same coordinates and rows with the bases of another state."""
+    G = p.by["nv"]
+    return replace(f, Z=_basis(G, f.rows, f.chosen, f.held), Zv=_basis(G, f.rows_v, f.chosen_v, f.held))
+
+
+def _indices(m: TracedMechanism, requested: Sequence[str]) -> np.ndarray | None:
+    known = [n.name for n in m.names]
+    for name in requested:
+        if name not in known:
+            raise ModelError(f"there is no coordinate {name!r} to tell the others by; there are {', '.join(known)}")
+    return np.sort([known.index(name) for name in requested]) if requested else None
+
+
+def scaled_rows(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Values of rows, of unit size, turns counted in lengths."""
+    A = nominal_values(G) * scale
+    size = np.sqrt((A * A).sum(axis=1))
+    least = ROUNDING_TOLERANCE * size.max(initial=0.0)
+    return np.where(size > least, 1.0 / np.where(size > least, size, 1.0), 0.0)[:, None] * A
+
+
+def _chosen(
+    m: TracedMechanism, G: np.ndarray, which: np.ndarray, held: np.ndarray, requested: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates that tell the others, and independent rows."""
+    from scipy.linalg import qr
+
+    still = np.eye(len(m.names))[held]
+    A = np.vstack([scaled_rows(G[which], m.scale), still])
+    N = null_space(A)
+    chosen = pivot_rows(N)
+    if requested is not None:
+        if len(requested) != len(chosen) or rank(N[requested]) < len(chosen):
+            raise ModelError(
+                f"{', '.join(m.names[d].name for d in requested)} do not tell the other coordinates there: "
+                f"{len(chosen)} that do are {', '.join(m.names[d].name for d in chosen)}"
+            )
+        chosen = requested
+    if not len(which):
+        return chosen, which
+    _, R, order = qr(A[: len(which)].T, mode="economic", pivoting=True)
+    d = np.abs(np.diag(R))
+    return chosen, np.sort(which[order[: int((d > RANK_TOLERANCE * d[0]).sum())]])
+
+
+def _basis(G: np.ndarray, rows: np.ndarray, chosen: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """The identity in the chosen rows; the others as the constraints say."""
+    nv = G.shape[1]
+    others = np.setdiff1d(np.arange(nv), np.r_[chosen, held])
+    Z = zero_objects(nv, len(chosen))
+    Z[chosen, np.arange(len(chosen))] = 1.0
+    if len(others) and len(chosen):
+        Z[others] = solve_equations(G[np.ix_(rows, others)], -G[np.ix_(rows, chosen)])
+    return Z
+
+
+def _massless_velocities(p: Perturbed) -> np.ndarray:
+    """Velocities without inertia, force and constraint."""
+    empty = lambda X: np.array([all(is_zero(x) for x in row) for row in X], bool)  # noqa: E731
+    out = empty(p.by["ra"]) & empty(p.by["rx"]) & empty(p.by["rv"]) & empty(p.by["nv"].T)
+    return np.flatnonzero(out)
+
+
+IMPROPER_TOLERANCE = (
+    1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
+)
+
+
+@dataclass
+class ReducedLinearEquations:
+    """Linear equations in s = (a, b): columns are s, the inputs, their first and their second rates.
+
+    Attributes
+    ----------
+    rate : ndarray (n, n + 3 m)
+        s'.
+    position, velocity, acceleration, multipliers : ndarray
+        Changes of everything.
+    M, D, K : ndarray (f, f) or None
+        M a'' + D a' + K a = 0, where all constraints are on positions.
+    """
+
+    rate: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    multipliers: np.ndarray
+    M: np.ndarray | None
+    D: np.ndarray | None
+    K: np.ndarray | None
+
+
+def reduce_linear(m: TracedMechanism, p: Perturbed, f: Freedoms) -> ReducedLinearEquations:
+    """Take the constraints out.
+
+    Raises
+    ------
+    ModelError
+        If something free moves without inertia.
+    """
+    by, nv, k = p.by, len(m.names), len(m.inputs)
+    na, nb = f.Z.shape[1], f.Zv.shape[1]
+    X = -_dependent(f.rows, f.chosen, f.held, by["nv"], by["gw"])
+    none = zero_objects(nv, k)
+    holonomic = np.array([m.holonomic[i] for i in f.rows_v], bool)
+    rates = zero_objects(len(by["gw"]), k)
+    rates[f.rows_v[holonomic]] = by["gw"][f.rows_v[holonomic]]
+    V = _clean(by["nx"])
+    P, U, U1 = (
+        -_dependent(f.rows_v, f.chosen_v, f.held, by["nv"], right)
+        for right in (matrix_product(V, f.Z), _sum(matrix_product(V, X), by["nw"]), rates)
+    )
+    x = np.hstack([f.Z, zero_objects(nv, nb), X, none, none])
+    u = np.hstack([P, f.Zv, U, U1, none])
+    a_dot = _sum(u, matrix_product(p.N, x))[f.chosen]
+    known = _sum(matrix_product(P, a_dot), np.hstack([zero_objects(nv, na + nb), none, U, U1]))
+    acting = np.hstack([zero_objects(nv, na + nb), by["rw"], none, none])
+    others = _sum(matrix_product(by["rv"], u), matrix_product(by["rx"], x), acting)
+    Y = _left_null_space(f, by["rl"])
+    mass = matrix_product(Y.T, matrix_product(by["ra"], f.Zv))
+    forces = matrix_product(Y.T, _sum(matrix_product(by["ra"], known), others))
+    try:
+        b_dot = -solve_equations(mass, forces) if nb else forces
+    except DependentEquations as e:
+        raise massless_motion_error(m.names[f.chosen_v[e.row]].name) from None
+    acceleration = _sum(matrix_product(f.Zv, b_dot), known)
+    left = _sum(matrix_product(by["ra"], acceleration), others)
+    lam = zero_objects(len(m.multipliers), left.shape[1])
+    if len(f.rows_v):
+        rest = np.setdiff1d(np.arange(nv), np.r_[f.chosen_v, f.held])
+        lam[f.rows_v] = -solve_equations(by["rl"][np.ix_(rest, f.rows_v)], left[rest])
+    second: tuple[Any, Any, Any] = (None, None, None)
+    if na == nb and len(f.rows) == len(f.rows_v):
+        turned = -matrix_product(p.N, f.Z)  # u = Z a' + turned a
+        D = matrix_product(Y.T, _sum(matrix_product(by["ra"], turned), matrix_product(by["rv"], f.Z)))
+        K = matrix_product(Y.T, _sum(matrix_product(by["rv"], turned), matrix_product(by["rx"], f.Z)))
+        second = (mass, D, K)
+    return ReducedLinearEquations(np.vstack([a_dot, b_dot]), x, u, acceleration, lam, *second)
+
+
+def _sum(*parts: np.ndarray) -> np.ndarray:
+    total = parts[0].copy()
+    for part in parts[1:]:
+        for at, x in np.ndenumerate(part):
+            if not is_zero(x):
+                total[at] = total[at] + x
+    return total
+
+
+def _clean(A: np.ndarray) -> np.ndarray:
+    """Zeros where there are no expressions."""
+    out = zero_objects(*A.shape)
+    for at, x in np.ndenumerate(A):
+        if not is_zero(x):
+            out[at] = x
+    return out
+
+
+def _dependent(rows: np.ndarray, chosen: np.ndarray, held: np.ndarray, G: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The x with G x = right that changes no chosen coordinate."""
+    out = zero_objects(G.shape[1], right.shape[1])
+    others = np.setdiff1d(np.arange(G.shape[1]), np.r_[chosen, held])
+    if len(others) and right.shape[1]:
+        out[others] = solve_equations(G[np.ix_(rows, others)], right[rows])
+    return out
+
+
+def _left_null_space(f: Freedoms, R: np.ndarray) -> np.ndarray:
+    """Y, the identity in the chosen rows, with Y^T R = 0."""
+    Y = zero_objects(*f.Zv.shape)
+    Y[f.chosen_v, np.arange(len(f.chosen_v))] = 1.0
+    rest = np.setdiff1d(np.arange(len(Y)), np.r_[f.chosen_v, f.held])
+    if len(rest) and len(f.chosen_v):
+        Y[rest] = -solve_equations(R[np.ix_(rest, f.rows_v)].T, R[np.ix_(f.chosen_v, f.rows_v)].T)
+    return Y
+
+
+def improper_output(parts: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[int, int, str] | None:
+    """Which output follows the rate of which input, if one does: from its parts by inputs and their rates."""
+    D, D1, D2 = (nominal_values(x) for x in parts)
+    size = np.abs(D) + np.abs(D1) + np.abs(D2) + np.abs(nominal_values(parts[0])).max(initial=0.0)
+    for rate, part in (("rate", D1), ("second rate", D2)):
+        bad = np.argwhere(np.abs(part) > IMPROPER_TOLERANCE * size)
+        if len(bad):
+            return int(bad[0][0]), int(bad[0][1]), rate
+    return None
+
+
+@dataclass
+class StateSpaceMatrices:
+    """Arrays of objects: nodes or numbers.
+
+    Attributes
+    ----------
+    improper : str
+        Why there are no B, C and D: an output follows the rate of an input; else empty.
+    """
+
+    states: tuple[str, ...]
+    state_units: tuple[str, ...]
+    inputs: tuple[str, ...]
+    input_units: tuple[str, ...]
+    outputs: tuple[str, ...]
+    output_units: tuple[str, ...]
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    mass: np.ndarray | None
+    damping: np.ndarray | None
+    stiffness: np.ndarray | None
+    improper: str = ""
+
+
+def state_space_matrices(
+    m: TracedMechanism, p: Perturbed, f: Freedoms, r: ReducedLinearEquations, outputs: Sequence[tuple[str, str]]
+) -> StateSpaceMatrices:
+    """Of the reduced equations, in the state in which rates of inputs do not appear; ``outputs``: names and units."""
+    k, n = len(m.inputs), len(r.rate)
+    y = _outputs(p, r, n, k)
+    A, (B, B1, B2) = r.rate[:, :n], _parts(r.rate, n, k)
+    C, (D, D1, D2) = y[:, :n], _parts(y, n, k)
+    shift = B1 + matrix_product(A, B2)
+    why = ""
+    if bad := improper_output((D, D1 + matrix_product(C, B2), D2)):
+        output, i, rate = bad
+        why = (
+            f"output {outputs[output][0]!r} follows the {rate} of input {m.inputs[i].name!r}, which no state-space "
+            f"model can; leave out one of the two, or ask for the transfer function"
+        )
+    here, rates = ([m.names[d] for d in of] for of in (f.chosen, f.chosen_v))
+    still = [(s, 0.0) for s in m.added]
+    new = lambda X: None if X is None else _replaced(X, still)  # noqa: E731
+    return StateSpaceMatrices(
+        states=(*(x.name for x in here), *(f"{x.name} rate" for x in rates)),
+        state_units=(*(x.unit for x in here), *(f"{x.unit}/s" for x in rates)),
+        inputs=tuple(i.name for i in m.inputs),
+        input_units=tuple(i.unit for i in m.inputs),
+        outputs=tuple(name for name, _ in outputs),
+        output_units=tuple(unit for _, unit in outputs),
+        A=_replaced(A, still),
+        B=_replaced(B + matrix_product(A, shift), still),
+        C=_replaced(C, still),
+        D=_replaced(D + matrix_product(C, shift), still),
+        mass=new(r.M),
+        damping=new(r.D),
+        stiffness=new(r.K),
+        improper=why,
+    )
+
+
+def _replaced(X: np.ndarray, pairs: Sequence[tuple[Node, float]]) -> np.ndarray:
+    out = X.copy()
+    out.ravel()[:] = substitute(list(X.ravel()), pairs)
+    return out
+
+
+def _parts(x: np.ndarray, n: int, k: int) -> list[np.ndarray]:
+    """Columns of the inputs, of their first and of their second rates."""
+    return [x[:, n + i * k : n + (i + 1) * k] for i in range(3)]
+
+
+def _outputs(p: Perturbed, r: ReducedLinearEquations, n: int, k: int) -> np.ndarray:
+    """Outputs by the states, the inputs and their rates, (outputs, n + 3 k)."""
+    y = matrix_product(p.by["yx"], r.position) + matrix_product(p.by["yv"], r.velocity)
+    y = y + matrix_product(p.by["ya"], r.acceleration) + matrix_product(p.by["yl"], r.multipliers)
+    y[:, n : n + k] = y[:, n : n + k] + p.by["yw"]
+    return y

@@ -1,0 +1,378 @@
+"""Transfer functions whose coefficients are expressions of the parameters, by Cramer's rule without division.
+
+With x(s) the changes of positions, u = (s - N) x those of velocities, l of the multipliers, w of the inputs,
+
+    [(M s + D)(s - N) + K   R] [x]     [r_w]
+    [G, or G (s - N) + V    0] [l] = - [g_w, n_w] w,    y = (y_a s + y_v)(s - N) x + y_x x + y_l l + y_w w
+
+so that y / w = det [P b; c d] / det P. The determinant of P is the characteristic polynomial, times a factor
+without s.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...errors import ModelError, import_optional
+from ...expression_graph.evaluation import evaluate
+from ...expression_graph.graph import Node, zero_objects
+from ...model.messages import listing, suggest
+from ...results.wording import with_unit
+from .derivatives import Perturbed, TracedMechanism
+from .elimination import is_zero, matrix_product
+from .equilibrium import Validity
+from .polynomials import PolynomialRing, determinant
+from .reduction import Freedoms
+
+
+@dataclass
+class PolynomialPencil:
+    """The polynomial matrix P(s) with a column for every input and a row for every output, as rows of polynomials."""
+
+    ring: PolynomialRing
+    P: list[list[Any]]  # (n, n + inputs)
+    y: list[list[Any]]  # (outputs, n + inputs), times their denominators
+    below: list[Any]  # the denominators of the outputs
+    what: str
+
+    def characteristic(self) -> Any:
+        """Determinant of P."""
+        n = len(self.P)
+        return determinant([row[:n] for row in self.P], self.ring, self.what)
+
+    def numerator(self, i: int, k: int) -> Any:
+        """Of the transfer function from input i to output k, times the denominator of the output."""
+        n = len(self.P)
+        rows = [[*row[:n], row[n + i]] for row in [*self.P, self.y[k]]]
+        return determinant(rows, self.ring, self.what)
+
+
+def polynomial_pencil(m: TracedMechanism, p: Perturbed, f: Freedoms, positive: list[str]) -> PolynomialPencil:
+    """Take linear equations into polynomials; the rows of constraints are those that do not follow from others."""
+    kept = np.setdiff1d(np.arange(len(m.names)), f.held)
+    parts = _powers(p, f, kept, m)
+    ring = PolynomialRing(parts, m.model.name, positive)
+    s = ring.s_element
+    P, below = [], []
+    (r0, r1, r2, c0, c1, y0, y1, y2) = ring.matrices
+    whole = [
+        *(r0 + r1 * s + r2 * (s * s)),
+        *(c0 + c1 * s),
+        *(y0 + y1 * s + y2 * (s * s)),
+    ]
+    for row in whole:
+        common = ring.ring.one
+        for x in row:
+            common = common.lcm(x.denom)
+        below.append(common)
+        P.append(ring.cleared(list(row)))
+    n = len(r0) + len(c0)
+    return PolynomialPencil(ring, P[:n], P[n:], below[n:], m.model.name)
+
+
+def _powers(p: Perturbed, f: Freedoms, independent: np.ndarray, m: TracedMechanism) -> list[np.ndarray]:
+    """Coefficients of the powers of s: of the equations of motion, constraints and outputs."""
+    by, k = p.by, len(m.inputs)
+    still = {s.index for s in m.added}
+
+    def at_rest(X: np.ndarray) -> np.ndarray:
+        from ...expression_graph.evaluation import substitute
+
+        out = zero_objects(*X.shape)
+        out.ravel()[:] = substitute(list(X.ravel()), [(s, 0.0) for s in m.added]) if still else list(X.ravel())
+        return out
+
+    l = f.rows_v
+
+    def second(a: np.ndarray, v: np.ndarray, x: np.ndarray, more: np.ndarray, w: np.ndarray) -> list[np.ndarray]:
+        """(a s + v) (s - N) + x, columns of multipliers and inputs behind."""
+        n = len(a)
+        first = _less(v, matrix_product(a, p.N))
+        zeroth = _less(x, matrix_product(v, p.N))
+        none = zero_objects(n, len(l) + k)
+        return [
+            np.hstack(X)
+            for X in ((zeroth[:, independent], more, w), (first[:, independent], none), (a[:, independent], none))
+        ]
+
+    r = second(
+        by["ra"][independent],
+        by["rv"][independent],
+        by["rx"][independent],
+        by["rl"][np.ix_(independent, l)],
+        by["rw"][independent],
+    )
+    holonomic = m.holonomic[l][:, None]
+    zeroth = _less(by["nx"][l], matrix_product(by["nv"][l], p.N))
+    none = zero_objects(len(l), len(l))
+    c0 = np.hstack(
+        [_either(holonomic, by["nv"][l], zeroth)[:, independent], none, _either(holonomic, by["gw"][l], by["nw"][l])]
+    )
+    c1 = np.hstack(
+        [
+            _either(holonomic, zero_objects(*by["nv"][l].shape), by["nv"][l])[:, independent],
+            none,
+            zero_objects(len(l), k),
+        ]
+    )
+    y = second(by["ya"], by["yv"], by["yx"], by["yl"][:, l], by["yw"])
+    return [at_rest(X) for X in (*r, c0, c1, *y)]
+
+
+def _either(which: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.where(which, a, b)
+
+
+def _less(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    out = A.copy()
+    for at, x in np.ndenumerate(B):
+        if not is_zero(x):
+            out[at] = out[at] - x
+    return out
+
+
+@dataclass
+class TransferFunction:
+    """G(s) = num(s) / den(s) from an input to an output.
+
+    Attributes
+    ----------
+    name : str
+        The mechanism's.
+    input, output, input_unit, output_unit : str
+    s : sympy.Symbol
+    num, den : tuple of sympy.Expr
+        Coefficients, of the highest power first. What numerator and denominator have in common for all values of the
+        parameters is left out.
+    cancelled : sympy.Expr
+        That common factor, where it has s in it (1 if not): its zeros are eigenvalues of the mechanism that this input
+        does not move or this output does not see.
+    parameters : dict
+        Name -> value.
+    balanced_by : dict
+        Parameter -> the expression (`Node`) that it stands for, since equilibrium asks for it.
+    """
+
+    name: str
+    input: str
+    output: str
+    input_unit: str
+    output_unit: str
+    s: Any
+    num: tuple[Any, ...]
+    den: tuple[Any, ...]
+    cancelled: Any
+    parameters: dict[str, float]
+    balanced_by: dict[str, Node] = field(default_factory=dict)
+    nodes: tuple[list[Any], list[Any]] = field(default=([], []), repr=False)  # of num and den
+    validity: Validity = field(default=Validity(), repr=False)
+
+    @property
+    def expression(self) -> Any:
+        """num / den as one SymPy expression in s."""
+        return self._polynomial(self.num) / self._polynomial(self.den)
+
+    def _polynomial(self, coefficients: Sequence[Any]) -> Any:
+        n = len(coefficients) - 1
+        return sum((c * self.s ** (n - k) for k, c in enumerate(coefficients)), 0 * self.s)
+
+    def at(self, **parameters: float) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients of numerator and denominator in numbers, that of the denominator's highest power being 1.
+
+        Raises
+        ------
+        ModelError
+            If there is no such parameter, equilibrium says what it is, or the point is no equilibrium with it.
+        """
+        told = checked_values(self, parameters)
+        num, den = (np.array(evaluate(x, told), float) for x in self.nodes)
+        return num / den[0], den / den[0]
+
+    def zeros(self, **parameters: float) -> np.ndarray:
+        """Zeros [1/s]."""
+        return np.roots(self.at(**parameters)[0])
+
+    def poles(self, **parameters: float) -> np.ndarray:
+        """Poles [1/s]."""
+        return np.roots(self.at(**parameters)[1])
+
+    def response_at(self, omega: Sequence[float], **parameters: float) -> np.ndarray:
+        """Frequency response G(i omega) at angular frequencies [rad/s], complex."""
+        num, den = self.at(**parameters)
+        s = 1j * np.atleast_1d(np.asarray(omega, float))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.polyval(num, s) / np.polyval(den, s)
+
+    # -- what pictures of linear models ask
+
+    large = False
+    period = None  # in s, not in z
+
+    @cached_property
+    def inputs(self) -> tuple[str, ...]:
+        """The input."""
+        return (self.input,)
+
+    @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        """The output."""
+        return (self.output,)
+
+    @property
+    def input_units(self) -> tuple[str, ...]:
+        """Its unit."""
+        return (self.input_unit,)
+
+    @property
+    def output_units(self) -> tuple[str, ...]:
+        """Its unit."""
+        return (self.output_unit,)
+
+    @property
+    def eigenvalues(self) -> np.ndarray:
+        """The poles."""
+        return self.poles()
+
+    def input_index(self, name: str | None) -> int:
+        """Zero, if that is the input."""
+        return self._only("input", self.input, name)
+
+    def output_index(self, name: str | None) -> int:
+        """Zero, if that is the output."""
+        return self._only("output", self.output, name)
+
+    def _only(self, what: str, single: str, name: str | None) -> int:
+        if name not in (None, single):
+            raise ModelError(f"there is no {what} {name!r}: this transfer function's is {single!r}")
+        return 0
+
+    def transfer(self, input: str | None = None, output: str | None = None) -> tuple[np.ndarray, np.ndarray, float]:
+        """Zeros, poles [1/s] and gain: G(s) = gain prod(s - zeros) / prod(s - poles)."""
+        self.input_index(input), self.output_index(output)
+        num, den = self.at()
+        return np.roots(num), np.roots(den), float(num[0])
+
+    def response(self, omega: Sequence[float], input: str | None = None, output: str | None = None) -> np.ndarray:
+        """As `response_at`, with the parameters' own values."""
+        self.input_index(input), self.output_index(output)
+        return self.response_at(omega)
+
+    def bode(self, omega: Sequence[float] | None = None, path: str | os.PathLike | None = None) -> Any:
+        """Bode plot with the parameters' own values; returns the Matplotlib figure, or writes it to ``path``."""
+        from ...view.linear_plots import bode_plot
+
+        return bode_plot(self, None, None, omega, path)  # type: ignore[arg-type]
+
+    def to_control(self, **parameters: float) -> Any:
+        """As ``control.TransferFunction``, in numbers.
+
+        Raises
+        ------
+        ImportError
+            If the package ``control`` is not installed.
+        """
+        control = import_optional("control", "control")
+        names = {
+            "inputs": [_identifier(self.input)],
+            "outputs": [_identifier(self.output)],
+            "name": _identifier(self.name),
+        }
+        return control.tf(*self.at(**parameters), **names)
+
+    # -- shown
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people."""
+        out = [("from", with_unit(self.input, self.input_unit)), ("to", with_unit(self.output, self.output_unit))]
+        if all(c == 0 for c in self.num):
+            return [*out, ("transfer function", "0: to first order the output does not answer to this input")]
+        out += [
+            ("numerator", polynomial_text(self._terms(self.num))),
+            ("denominator", polynomial_text(self._terms(self.den))),
+        ]
+        if self.cancelled != 1:
+            out.append(("cancelled", f"{self.cancelled}: eigenvalues that are not between this input and this output"))
+        out += [("equilibrium", f"{k} is the value that balances") for k in self.balanced_by]
+        return out
+
+    def _terms(self, coefficients: Sequence[Any]) -> list[tuple[str, str]]:
+        n = len(coefficients) - 1
+        return [(str(c), _power(n - k)) for k, c in enumerate(coefficients) if c != 0]
+
+    def latex(self) -> str:
+        """G(s) as LaTeX."""
+        above, below = (self._latex(x) for x in (self.num, self.den))
+        return rf"G(s) = \frac{{{above}}}{{{below}}}"
+
+    def _latex(self, coefficients: Sequence[Any]) -> str:
+        from sympy import Add, latex
+
+        n = len(coefficients) - 1
+        parts = []
+        for k, c in enumerate(coefficients):
+            if c == 0:
+                continue
+            power = "" if n == k else "s" if n - k == 1 else f"s^{{{n - k}}}"
+            text = latex(c)
+            if c == 1 and power:
+                text = ""
+            elif c == -1 and power:
+                text = "-"
+            elif isinstance(c, Add) and power:
+                text = rf"\left({text}\right)"
+            parts.append(f"{text} {power}".strip())
+        return " + ".join(parts).replace("+ -", "- ") or "0"
+
+    def _repr_latex_(self) -> str:
+        return f"$\\displaystyle {self.latex()}$"
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{a}: {b}" for a, b in self.lines())
+
+
+def checked_values(f: Any, parameters: Mapping[str, float]) -> dict[str, float]:
+    """Values by name; refuses parameters that there are not, those that equilibrium tells, and another point."""
+    for name in parameters:
+        if name in f.balanced_by:
+            raise ModelError(f"{name!r} has the value with which the mechanism is in equilibrium")
+        if name not in f.parameters:
+            known = list(f.parameters)
+            raise ModelError(f"{f.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
+    values = {k: float(x) for k, x in parameters.items()}
+    f.validity.refuse(f.name, values)
+    return values
+
+
+def polynomial_text(terms: Sequence[tuple[str, str]]) -> str:
+    """A polynomial in s: (coefficient, power) terms."""
+    out = ""
+    for c, power in terms:
+        sign, c = ("-", c[1:]) if c.startswith("-") and not _is_sum(c) else ("+", c)
+        c = f"({c})" if _is_sum(c) and power else c
+        text = power if c == "1" and power else f"{c}*{power}" if power else c
+        out += f" {sign} {text}" if out else f"-{text}" if sign == "-" else text
+    return out or "0"
+
+
+def _is_sum(text: str) -> bool:
+    """Whether there is a sum outside of brackets."""
+    depth = 0
+    for k, c in enumerate(text):
+        depth += (c == "(") - (c == ")")
+        if depth == 0 and k and c in "+-" and text[k - 1] == " ":
+            return True
+    return False
+
+
+def _power(n: int) -> str:
+    return "" if n == 0 else "s" if n == 1 else f"s**{n}"
+
+
+def _identifier(name: str) -> str:
+    return "".join(c if c.isalnum() else "_" for c in name)

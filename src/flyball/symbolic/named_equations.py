@@ -1,0 +1,563 @@
+"""A mechanism's equations of motion in its own names: the traced equations, in the coordinates of the user.
+
+Positions have the names of coordinates: ``"hinge.angle"``. A rate has a prime behind it, ``"crank.x'"``, an
+acceleration two. A body that is free in space has the Euler parameters ``e0`` to ``e3`` (scalar first) and the
+angular velocity ``w_x``, ``w_y``, ``w_z`` along its own axes, a spherical joint those of its relative rotation.
+Where a body's centre of mass is not its reference point, its coordinates are ``com_x``, ``com_y``, ``com_z``.
+Multipliers are called ``"A.lam_nx"``.
+
+The engine measures an angle by atan2 and adds whole turns. Here an angle is its closed form where it has one (a
+coordinate, or in the plane a difference of the bodies' angles), else the arctangent, in (-pi, pi]. Coordinates
+prescribed by drivers are constraints with a multiplier. The parameter of a follower's curve is a symbol with an
+equation of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..constraints.curve import point
+from ..constraints.registry import Kind
+from ..engine.kinematics import load_record, twist_column
+from ..engine.loads import apply_efforts, apply_forces, gather_forces, inertial_wrenches
+from ..engine.rows import BY_TIME, row_parameters
+from ..errors import ModelError
+from ..expression_graph.evaluation import evaluate, nodes_in_order
+from ..expression_graph.graph import ADD, MULTIPLY, NUMBER, Graph, Node, Symbol, object_vector
+from ..expression_graph.tracing import Names, TracedEquations, object_tables, trace_equations
+from ..laws.bytecode import evaluate_jet
+from ..math.scalar import atan2
+from ..math.spline import BREAKS
+from ..math.vec import mtv, sub
+from ..model.body import Body, Driver, Frame
+from ..model.element import Element
+from ..model.joint import Joint
+from ..tables.forest import coordinate_row
+from ..tables.structure_definition import Structure, velocity_names
+from ..tables.table_definitions import FREE, SPHERICAL, System, Work, map_arrays
+from ..tables.values import Values
+
+COORDINATE_LETTERS = {"displacement": "s", "angle": r"\varphi", "angle_1": r"\varphi_1", "angle_2": r"\varphi_2"}
+RATE, SECOND = "'", "''"
+
+
+class MechanismSymbols(NamedTuple):
+    """Symbols of a mechanism, in the order of the engine's arrays."""
+
+    q: list[Symbol]
+    v: list[Symbol]
+    vdot: list[Symbol]
+    z: list[Symbol]
+    lam: list[Symbol]  # of the rows, then efforts of drivers that prescribe a coordinate
+    loads: list[Symbol]
+
+
+def mechanism_symbols(x: Values) -> MechanismSymbols:
+    """Symbols of a mechanism in some coordinates."""
+    s = x.structure
+    v = [_velocity(x, name.name, name.unit) for name in velocity_names(s)]
+    q = _coordinates(s, v)
+    rates = [_rate(p) if p.kind == "coordinate" else p for p in v]
+    seconds = [_second(p) if p.kind == "coordinate" else _rate(p, "acceleration") for p in v]
+    states = [_state(name) for name in s.states]
+    loads = [Symbol(f"{e.name}.load", "load", rf"P_{{{latex_part_name(e.name)}}}", "N", e.name) for e in s.loads]
+    return MechanismSymbols(q, rates, seconds, states, _multipliers(s), loads)
+
+
+def _velocity(x: Values, name: str, unit: str) -> Symbol:
+    """The coordinate that a velocity is the rate of; an angular velocity is its own."""
+    owner, _, what = name.rpartition(".")
+    kind, _, axis = what.rpartition(" ")
+    index = latex_part_name(owner)
+    if kind == "turn":
+        return Symbol(f"{owner}.w_{axis}", "velocity", rf"\omega_{{{axis},{index}}}", "rad/s", owner)
+    letter = COORDINATE_LETTERS.get(what, what if what in "xyz" else rf"\mathrm{{{what}}}")
+    if what in "xyz" and _has_offset_centre(x, owner):
+        what, index = f"com_{what}", f"S,{index}"
+    return Symbol(f"{owner}.{what}", "coordinate", _indexed(letter, index), unit, owner)
+
+
+def _has_offset_centre(x: Values, owner: str) -> bool:
+    """Whether that is a body whose centre of mass is not its reference point."""
+    return owner in x.bodies and any(c.real != 0.0 for c in x.bodies[owner].com)
+
+
+def _indexed(letter: str, index: str) -> str:
+    base, _, own = letter.partition("_")
+    return f"{base}_{{{own + ',' if own else ''}{index}}}"
+
+
+def _coordinates(s: Structure, v: list[Symbol]) -> list[Symbol]:
+    """Those of every row of the body table."""
+    out: list[Symbol] = []
+    tree = s.tables["tree"]
+    for b, (first, kind) in enumerate(zip(tree.v.tolist(), tree.joint.tolist(), strict=True)):
+        if kind in (FREE, SPHERICAL):
+            owner = v[first + (3 if kind == FREE else 0)].element
+            out += v[first : first + 3] if kind == FREE else []
+            out += [
+                Symbol(f"{owner}.e{k}", "coordinate", rf"e_{{{k},{latex_part_name(owner)}}}", "1", owner)
+                for k in range(4)
+            ]
+        else:
+            out += v[first : first + int(tree.nv[b])]
+        assert len(out) == int(tree.q[b] + tree.nq[b])
+    return out
+
+
+def _rate(p: Symbol, kind: str = "velocity") -> Symbol:
+    return Symbol(p.name + RATE, kind, _dotted(r"\dot", p.latex), f"{p.unit}/s", p.element)
+
+
+def _second(p: Symbol) -> Symbol:
+    return Symbol(p.name + SECOND, "acceleration", _dotted(r"\ddot", p.latex), f"{p.unit}/s^2", p.element)
+
+
+def _dotted(dot: str, latex: str) -> str:
+    """A dot over the letter, not over its indices."""
+    letter, _, rest = latex.partition("_")
+    return f"{dot}{{{letter}}}" + (f"_{rest}" if rest else "")
+
+
+def _state(name: str) -> Symbol:
+    owner, _, what = name.rpartition(".")
+    latex = {"place": "s", "work": "W"}.get(what, rf"\mathrm{{{what}}}")
+    unit = {"place": "m", "work": "J"}.get(what, "rad")
+    return Symbol(
+        name if what in ("place", "work") else f"{name} (turns)",
+        "state",
+        f"{latex}_{{{latex_part_name(owner)}}}",
+        unit,
+        owner,
+    )
+
+
+def _multipliers(s: Structure) -> list[Symbol]:
+    """One for each row; what a driver or a coupling gives is its effort."""
+    names = [_row_name(row.element, row.label) for row in s.rows]
+    names = list(numbered_names(names))
+    out = [_multiplier(s, name, row.element) for name, row in zip(names, s.rows, strict=True)]
+    later = sorted(s.prescribed, key=lambda k: s.slices[k].start)
+    return out + [_multiplier(s, f"{name}.effort", s.model[name]) for name in later]
+
+
+def _row_name(e: Element, label: str) -> str:
+    if isinstance(e, Driver):
+        return f"{e.name}.effort"
+    return f"{e.name}.lam_{label}" if label and isinstance(e, Joint) else f"{e.name}.lam"
+
+
+def _multiplier(s: Structure, name: str, e: Element) -> Symbol:
+    what = name.removeprefix(f"{e.name}.")
+    letter, index = (
+        (r"\tau", "")
+        if what == "effort"
+        else (r"\lambda", what.removeprefix("lam").removeprefix("_").removeprefix("n"))
+    )
+    unit = ("N*m" if s.model.unit(e.coordinate, e) == "rad" else "N") if isinstance(e, Driver) else ""
+    return Symbol(
+        name, "multiplier", _indexed(letter, (index + "," if index else "") + latex_part_name(e.name)), unit, e.name
+    )
+
+
+def numbered_names(names: Iterable[str]) -> Iterable[str]:
+    """The names; from the second of equal ones on with a number behind."""
+    seen: dict[str, int] = {}
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        yield name if seen[name] == 1 else f"{name}_{seen[name]}"
+
+
+def latex_part_name(name: str) -> str:
+    """A name of the mechanism's in LaTeX."""
+    for c in "\\{}$&#^_%~":
+        name = name.replace(c, rf"\{c}" if c in "{}$&#_%" else "-")
+    return rf"\text{{{name}}}"
+
+
+FULL_TURN = 2.0 * math.pi
+
+
+def with_whole_turns(x: Values, S: System) -> tuple[System, list[int]]:
+    """The tables with every angle counted, those of drivers too, and no row compared modulo a turn.
+
+    Returns
+    -------
+    System, list of int
+        For each state added behind the structure's own: the term that leans on it.
+    """
+    s = x.structure
+    hint, parameters = S.terms.hint.copy(), S.term_parameters.copy()
+    more: list[int] = []
+    for k, t in enumerate(s.terms):
+        if t.formula.of_kind.turns and hint[k] < 0:
+            hint[k] = len(s.states) + len(more)
+            parameters[k, 0] = 1.0
+            more.append(k)
+    rows = S.rows._replace(wrapped=np.zeros_like(S.rows.wrapped))
+    return S._replace(rows=rows, terms=S.terms._replace(hint=hint), term_parameters=parameters), more
+
+
+class ClosedFormAngles:
+    """Closed forms of measured angles, in the coordinates q (engine's own, as expressions)."""
+
+    def __init__(self, x: Values, q: Sequence[Any], W: Any) -> None:
+        self.x, self.q = x, q
+        self._since = self._turned(W) if x.structure.model.planar else {}
+
+    def of(self, owner: Any, what: str, F: int, M: int) -> Any:
+        """The angle of frame M to frame F that a term of that owner measures; None if it has no closed form."""
+        s, S = self.x.structure, self.x.system
+        if isinstance(owner, Joint):
+            row = coordinate_row(s, owner.name, what)
+            if row is not None:
+                return owner.coordinates[what].sign * self.q[S.tree.q[row]]
+        if not s.model.planar:
+            return None
+        here, there = (self._heading(k) + self._since[int(S.frame_body[k])] for k in (F, M))
+        if isinstance(owner, Body | Frame):
+            return there
+        drawn_here, drawn_there = (self._heading(k) + self._drawn(int(S.frame_body[k])) for k in (F, M))
+        whole = math.floor((_real(drawn_there) - _real(drawn_here)) / FULL_TURN + 0.5)
+        return there - here - FULL_TURN * whole
+
+    def _turned(self, W: Any) -> dict[int, Any]:
+        """Angle of every body of a planar mechanism: where it is drawn, and what coordinates have turned it since."""
+        S, x = self.x.system, self.x
+        since: list[Any] = []
+        for b in range(len(S.tree.parent)):
+            total = since[S.tree.parent[b]] if S.tree.parent[b] >= 0 else 0.0
+            for i in range(S.tree.nv[b]):
+                at = S.tree.q[b] + i
+                total = total + twist_column(S, W, b, i)[0][2] * (self.q[at] - x.q[at])
+            since.append(total)
+        out: dict[int, Any] = {-1: 0.0}
+        for name, b in x.structure.place.items():
+            if b >= 0:
+                out[b] = x.bodies[name].angle + since[b]
+        return out
+
+    def _drawn(self, b: int) -> Any:
+        names = {at: name for name, at in self.x.structure.place.items()}
+        return 0.0 if b < 0 else self.x.bodies[names[b]].angle
+
+    def _heading(self, frame: int) -> Any:
+        """The way that a frame's x axis points in its body."""
+        R = self.x.system.frames.rotation[frame]
+        return atan2(R[3], R[0])
+
+
+def _real(x: Any) -> float:
+    return float(x.real)
+
+
+class TurnElimination:
+    """Expressions without the counting of turns, and with other nodes in place of some.
+
+    Parameters
+    ----------
+    graph : Graph
+    new : mapping from nodes to what stands in their place
+    unknown : nodes of remembered angles that have no closed form
+    """
+
+    def __init__(self, graph: Graph, new: Sequence[tuple[Node, Any]], unknown: Sequence[Node]) -> None:
+        self.graph = graph
+        self._known: dict[int, Node] = {x.index: graph.node(y) for x, y in new}
+        self._unknown = {x.index for x in unknown}
+
+    def __call__(self, array: np.ndarray) -> np.ndarray:
+        """The same array, cleaned."""
+        out = np.empty(array.shape, object)
+        flat = array.ravel().tolist()
+        for x in nodes_in_order(flat):
+            if x.index not in self._known:
+                self._known[x.index] = self._constructed(x)
+        out.ravel()[:] = [self._known[x.index] if isinstance(x, Node) else x for x in flat]
+        return out
+
+    def _constructed(self, x: Node) -> Node:
+        args = tuple(self._known[a.index] for a in x.args)
+        if x.op == "rounded" and not x.moving:  # whole turns as drawn
+            return self.graph.number(x.value)
+        if x.op == ADD:
+            found = _unwrapped(*args) or _unwrapped(args[1], args[0])
+            if found is not None:
+                theta, near = found
+                lost = any(s.index in self._unknown for s in nodes_in_order([near]))
+                return theta if lost else near
+        return x if all(a is b for a, b in zip(args, x.args, strict=True)) else self.graph.rebuilt(x, args)
+
+
+def _unwrapped(theta: Node, turns: Node) -> tuple[Node, Node] | None:
+    """Of theta + 2 pi rounded((near - theta) / 2 pi): theta and near."""
+    factor, inner = _factored(turns)
+    if inner.op != "rounded" or abs(factor - FULL_TURN) > 1e-12:
+        return None
+    share, way = _factored(inner.args[0])
+    if abs(share * FULL_TURN - 1.0) < 1e-12:
+        if way.op != ADD:
+            return None
+        for near, other in (way.args, way.args[::-1]):
+            if other is -theta:
+                return theta, near
+    if abs(share * FULL_TURN + 1.0) < 1e-12 and way is theta:
+        return theta, theta.graph.number(0.0)
+    return None
+
+
+def _factored(x: Node) -> tuple[float, Node]:
+    if x.op == MULTIPLY and x.args[0].op == NUMBER:
+        return x.args[0].value, x.args[1]
+    return 1.0, x
+
+
+@dataclass
+class CurveParameter:
+    """Where a follower is on its curve: a symbol, the equation that it fulfils, and how fast it moves."""
+
+    symbol: Node
+    equation: Any  # zero there
+    rate: Any
+    term: int
+
+
+@dataclass
+class NamedEquations:
+    """Equations of motion in a mechanism's own names. All arrays are of nodes or numbers."""
+
+    values: Values  # its tables hold objects
+    traced: TracedEquations  # with the rows of prescribed coordinates, which the engine has not
+    user_q: list[Any]  # the engine's coordinates: those of `trace_equations` less what they are as drawn
+    drawn: list[Any]  # that
+    vdot: list[Node]
+    places: list[CurveParameter]
+    cleaned: TurnElimination
+    named: dict[str, Node]  # every symbol by its name
+
+
+def trace_named_equations(x: Values, graph: Graph) -> NamedEquations:
+    """Trace a mechanism and tell its equations in its own names.
+
+    Parameters
+    ----------
+    x : Values
+        Filled in with numbers or with expressions of ``graph``.
+    graph : Graph
+    """
+    s = x.structure
+    S = x.system if x.system.const.dtype == object else object_tables(x.system)
+    x = replace(x, system=S)
+    S, more = with_whole_turns(x, S)
+    names = mechanism_symbols(x)
+    drawn = _reference_values(S, s.nq)
+    hints = [Symbol(f"turns of term {k}", "state") for k in more]
+    nr = len(s.rows)
+    wanted: Names = (names.q, names.v, [*names.z, *hints], names.lam[:nr], names.loads)
+    T = trace_equations(s, S, graph, wanted, drawn)
+    own_q = [q - at for q, at in zip(T.q, drawn, strict=True)]
+    places, feet = _curve_parameters(x, T)
+    new = [(foot, place.symbol) for foot, place in zip(feet, places, strict=True)]
+    cleaned = _cleaner(x, T, own_q, more, new)
+    lam = [*T.lam, *(graph.symbol(e) for e in names.lam[nr:])]
+    T = _cleaned_arrays(_prescribed(T, S, lam), cleaned)
+    places = [
+        replace(p, equation=_cleaned_entry(cleaned, p.equation), rate=_cleaned_entry(cleaned, p.rate)) for p in places
+    ]
+    vdot = [graph.symbol(a) for a in names.vdot]
+    named = {n.data.name: n for n in (T.t, *T.q, *T.v, *vdot, *lam, *T.loads, *(p.symbol for p in places))}
+    return NamedEquations(x, T, own_q, drawn, vdot, places, cleaned, named)
+
+
+def _reference_values(S: Any, nq: int) -> list[Any]:
+    """Values of the coordinates as drawn, where the engine's are zero."""
+    out: list[Any] = [0.0] * nq
+    for b in range(len(S.tree.parent)):
+        if S.bodies.offset[b] != 0.0:
+            out[S.tree.q[b]] = S.bodies.offset[b]
+    return out
+
+
+def _curve_parameters(x: Values, T: TracedEquations) -> tuple[list[CurveParameter], list[Node]]:
+    """Places on curves with their equations, and the iterations that find them in the engine."""
+    S, W = T.system, T.work
+    places, feet = [], []
+    for k, t in enumerate(x.structure.terms):
+        kind = t.formula.of_kind
+        if kind.foot is None or kind.progress is None:
+            continue
+        F, M, par = load_record(W.FK, t.F), load_record(W.FK, t.M), row_parameters(S.term_parameters, k)
+        symbol = T.z[S.terms.hint[k]]
+        p = mtv(F[1], sub(M[0], F[0]))
+        x0, x1, _, y0, y1, _ = point(par, symbol, S.const)
+        feet.append(kind.foot(par, F, M, symbol, S.const))
+        rate = kind.progress(par, F, M, symbol, S.const)[0]
+        places.append(CurveParameter(symbol, (p[0] - x0) * x1 + (p[1] - y0) * y1, rate, k))
+    return places, feet
+
+
+def _cleaner(
+    x: Values, T: TracedEquations, user_q: list[Any], more: list[int], new: list[tuple[Node, Any]]
+) -> TurnElimination:
+    angles = ClosedFormAngles(x, user_q, T.work)
+    s, unknown = x.structure, []
+    owners = {f"{t.owner.name}.{t.what}": t for t in s.terms if t.owner is not None}
+    for name, at in s.state_at.items():
+        if name.endswith((".work", ".place")):
+            continue
+        t = owners.get(name)
+        found = None if t is None else angles.of(t.owner, t.what, t.F, t.M)
+        if found is None:
+            unknown.append(T.z[at])
+        else:
+            new.append((T.z[at], found))
+    for n, k in enumerate(more):
+        t, z = s.terms[k], T.z[len(s.states) + n]
+        found = angles.of(t.owner, t.what, t.F, t.M)
+        if found is None:
+            unknown.append(z)
+        else:
+            new.append((z, found))
+    return TurnElimination(T.graph, new, unknown)
+
+
+def _prescribed(T: TracedEquations, S: Any, lam: list[Node]) -> TracedEquations:
+    """Coordinates that drivers prescribe as constraints: q = f(t), of which the multiplier is the effort."""
+    s = T.structure
+    order = sorted(s.prescribed, key=lambda k: s.slices[k].start)
+    g, nu, G, gamma = [], [], np.zeros((len(order), s.nv), object), []
+    for k, name in enumerate(order):
+        b = s.prescribed[name]
+        f = evaluate_jet(S.code, S.const, S.tree.law[b], T.work.stack, T.t, T.work.sensed, BY_TIME)
+        g.append(T.q[S.tree.q[b]] - f[0])
+        nu.append(f[1])
+        gamma.append(f[2])
+        G[k] = 0.0
+        G[k, S.tree.v[b]] = 1.0
+        if S.tree.work[b] >= 0:
+            T.powers[S.tree.work[b]] = lam[len(s.rows) + k] * T.v[S.tree.v[b]]
+    return replace(
+        T,
+        lam=lam,
+        g=np.r_[T.g, object_vector(g)],
+        nu=np.r_[T.nu, object_vector(nu)],
+        G=np.vstack([T.G, G]),
+        gamma=np.r_[T.gamma, object_vector(gamma)],
+    )
+
+
+ARRAYS = ("T", "M", "f", "g", "nu", "G", "gamma", "measured", "gradients", "powers", "returned")
+
+
+def _cleaned_arrays(T: TracedEquations, cleaned: TurnElimination) -> TracedEquations:
+    new: dict[str, Any] = {name: cleaned(getattr(T, name)) for name in ARRAYS}
+    return replace(T, **new)
+
+
+def _cleaned_entry(cleaned: TurnElimination, x: Any) -> Any:
+    return cleaned(object_vector([x]))[0]
+
+
+def quaternions(x: NamedEquations) -> list[list[Node]]:
+    """The symbols of every quaternion, four each."""
+    out = []
+    tree = x.traced.system.tree
+    for kind, q in zip(tree.joint.tolist(), tree.q.tolist(), strict=True):
+        if kind in (FREE, SPHERICAL):
+            first = q + (3 if kind == FREE else 0)
+            out.append(list(x.traced.q[first : first + 4]))
+    return out
+
+
+CURVE_SAMPLES = 20  # of a curve between two of its breaks that are looked at first
+
+
+def state_by_symbol(x: NamedEquations, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, Any]:
+    """The engine's arrays by the names of the symbols."""
+    T = x.traced
+    out: dict[str, Any] = {T.t.data.name: t}
+    for symbol, drawn, value in zip(T.q, x.drawn, q, strict=True):
+        out[symbol.data.name] = _python_number(value + drawn.real)
+    return out | {symbol.data.name: _python_number(value) for symbol, value in zip(T.v, v, strict=True)}
+
+
+def _python_number(x: Any) -> Any:
+    """A number as Python's own."""
+    return x.item() if isinstance(x, np.generic) else x
+
+
+def curve_parameters_at(
+    x: NamedEquations, places: Sequence[CurveParameter], values: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Places on curves of followers: the points of the curves nearest to them, at one instant.
+
+    Raises
+    ------
+    ModelError
+        If the values are arrays, of which each instant would have places of its own.
+    """
+    S, W, out = x.traced.system, x.traced.work, {}
+    if any(np.ndim(v) for v in values.values()):
+        names = [p.symbol.data.name for p in places]
+        raise ModelError(
+            f"give {', '.join(names)} too: places on curves are found for one instant only, not for arrays"
+        )
+    for place in places:
+        t = x.values.structure.terms[place.term]
+        records = [c for k in (t.F, t.M) for part in load_record(W.FK, k)[:2] for c in part]
+        given = [*x.cleaned(object_vector([*records, *row_parameters(S.term_parameters, place.term)])), *S.const]
+        numbers = [float(np.real(n)) for n in evaluate(given, values)]
+        F, M = ((tuple(n[:3]), tuple(n[3:])) for n in (numbers[:12], numbers[12:24]))
+        out[place.symbol.data.name] = nearest_curve_parameter(
+            t.formula.of_kind, tuple(numbers[24:32]), F, M, np.array(numbers[32:])
+        )
+    return out
+
+
+def nearest_curve_parameter(kind: Kind, par: tuple[float, ...], F: tuple, M: tuple, data: np.ndarray) -> float:
+    """Parameter of the point of a curve that is nearest to M: of points on it the nearest, then by Newton's method."""
+    at = int(par[1])
+    breaks = data[at + BREAKS : at + BREAKS + int(data[at + 1])]
+    s = np.linspace(breaks[0], breaks[-1], CURVE_SAMPLES * len(breaks))
+    x, _, _, y, _, _ = point(par, s, data)
+    p = mtv(F[1], sub(M[0], F[0]))
+    guess = s[np.argmin((x - p[0]) ** 2 + (y - p[1]) ** 2)]
+    assert kind.foot is not None
+    return float(kind.foot(par, F, M, float(guess), data))
+
+
+def generalised_forces(x: NamedEquations) -> list[tuple[str, np.ndarray]]:
+    """(what, forces along the velocities) of inertia, of gravity and of every force."""
+    T = x.traced
+    S, W = T.system, T.work
+    W = W._replace(FB=np.array([[0.0] * W.FB.shape[1]] * len(W.FB), object).reshape(W.FB.shape))
+    turning = _gathered_forces(S._replace(gravity=np.array([0.0] * 3, object)), W, None)
+    out = [("Centrifugal, Coriolis and gyroscopic forces", turning)]
+    if any(c != 0.0 for c in S.gravity):
+        out.append(("Weight", _gathered_forces(S, W, None) - turning))
+    for k, e in enumerate(T.structure.forces):
+        own = map_arrays(lambda _, x: x[k : k + 1], S.forces)  # noqa: B023
+        one = S._replace(forces=own, force_parameters=S.force_parameters[k : k + 1], force_code=S.force_code[k : k + 1])
+        out.append((f"{e.name} ({type(e).__name__})", _gathered_forces(one, W, T.t)))
+    return [(title, x.cleaned(f)) for title, f in out]
+
+
+def _gathered_forces(S: System, W: Work, t: Any) -> np.ndarray:
+    """Forces along the velocities: of inertia and weight, or of the elements in the tables."""
+    f = np.empty(W.velocities.solved.shape[0], object)
+    f[:] = 0.0
+    W.FB[:] = 0.0
+    rates = np.zeros(len(S.forces.F) + W.y.size, object)
+    if t is None:
+        inertial_wrenches(S, W)
+        gather_forces(S, W, f)
+        return f
+    apply_forces(S, W, t, rates)
+    gather_forces(S, W, f)
+    apply_efforts(S, W, t, rates, f)
+    return f

@@ -1,0 +1,450 @@
+"""Constraint rows and measured quantities of joints, couplings, drivers, events and switches.
+
+Switches (stops, friction, ropes, ratchets, locks, contacts) are rows with modes of a fixed pattern, and guards:
+functions whose zeros end a mode. Only the tables of a motion have them (`Choices.switches`); for questions
+about positions they are no constraints. Events add rows that actions lock and release, and guards of their
+expressions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..compiler.kernels import CodeTable, code_table
+from ..constraints.blocks import ANGLE, ConstraintRow, Row, point_coordinate
+from ..constraints.registry import SIGNATURES
+from ..constraints.switch_kinds import BRANCH, EDGE, ELASTIC, FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
+from ..model.body import Body, Driver, Frame, Initial
+from ..model.contact_point import Touch
+from ..model.element import Element, LawOf
+from ..model.event import Event, Impulse, Lock, Release
+from ..model.event_validation import coordinate_of, lock_target
+from ..model.expressions import Expression
+from ..model.force import Force, Switch
+from ..model.joint import Coordinate, Joint
+from ..model.model import Model
+from .forest import coordinate_row
+from .structure_definition import RowSpec, Structure, TermSpec, frame_index, integer_table
+from .table_definitions import (
+    ARTICULATED,
+    COUPLED,
+    EITHER,
+    FALLING,
+    G_BACK,
+    G_CONE,
+    G_CORNER,
+    G_EDGE,
+    G_HOLDS,
+    G_LAW,
+    G_LOWER,
+    G_PRESS_LOWER,
+    G_PRESS_UPPER,
+    G_PULL,
+    G_SHARED,
+    G_SLIDES,
+    G_TURNS,
+    G_UPPER,
+    RISING,
+    SCHUR,
+    TERM_KINDS,
+    Angles,
+    Forces,
+    Guards,
+    Rows,
+    Sizes,
+    Switches,
+    SwitchNumbers,
+)
+
+
+def add_constraint_rows(s: Structure, holds: Sequence[Initial]) -> None:
+    """Rows of joints, couplings, drivers and held coordinates; states that count the turns of angles."""
+    for joint in s.model.joints:
+        _add_joint_rows(s, joint)
+    for coupling in s.model.couplings:
+        first = len(s.rows)
+        for k, text in enumerate(coupling.coupled()):
+            term = coordinate_term(s, text, coupling, first, with_turns=True)
+            term.index = k
+        s.rows.append(RowSpec(coupling, "coupling"))
+        s.slices[coupling.name] = slice(first, first + 1)
+    for driver in s.model.drivers:
+        _add_driver(s, driver)
+    for hold in holds:
+        _add_coordinate_row(s, hold, hold.name, s.law(Expression.parse("0"), ()))
+    _count_joint_turns(s)
+
+
+def _add_joint_rows(s: Structure, joint: Joint) -> None:
+    F, M = frame_index(s, joint, "F"), frame_index(s, joint, "M")
+    first = len(s.rows)
+    tree = joint.name in s.tree_joints
+    for row in joint.loose(s.model.planar) if tree else joint.rows(s.model.planar):
+        if not (row.holonomic or not s.positions):
+            continue
+        used = row.far if s.far and row.far is not None else row
+        term = TermSpec(len(s.rows), F, M, used, 1.0, joint)
+        if used.of_kind.place:
+            term.hint = s.state(f"{joint.name}.place")
+        s.terms.append(term)
+        for what in row.plus:
+            coordinate_term(s, f"{joint.name}.{what}", joint, len(s.rows), with_turns=True)
+        s.rows.append(RowSpec(joint, ("n" if row.world else "") + row.axes, holonomic=row.holonomic))
+    s.slices[joint.name] = slice(first, len(s.rows))
+
+
+def _add_driver(s: Structure, driver: Driver) -> None:
+    law = s.model.law(driver.law, LawOf(s.model.unit(driver.coordinate, driver)), f"law of {driver.title}", driver=True)
+    at = s.law(law, (), driver, derivatives=True)
+    sensors = tuple(sorted({s.slots[name] for name in law.names & set(s.slots)}))
+    link = _prescribed_row(s, driver)
+    if link is not None and not sensors:
+        s.prescribed[driver.name] = link
+        tree = s.tables["tree"]
+        tree.law[link], tree.work[link] = at, s.state(f"{driver.name}.work")
+        return
+    row = _add_coordinate_row(s, driver, driver.coordinate, at)
+    row.sensors = sensors
+    if not s.far:
+        row.work = s.state(f"{driver.name}.work")
+
+
+def _prescribed_row(s: Structure, driver: Driver) -> int | None:
+    """Row of the body table whose one coordinate a driver prescribes; none for coordinates that rows must drive."""
+    owner, what = s.model.coordinate(driver.coordinate, driver)
+    if not isinstance(owner, Joint) or sum(d.coordinate == driver.coordinate for d in s.model.drivers) > 1:
+        return None
+    return coordinate_row(s, owner.name, what)
+
+
+def _add_coordinate_row(s: Structure, e: Driver | Initial, text: str, law: int) -> RowSpec:
+    """The row of a coordinate that follows a law."""
+    first = len(s.rows)
+    term = coordinate_term(s, text, e, first)
+    s.rows.append(RowSpec(e, text, law, wrap=term.formula.of_kind.turns))
+    s.slices[e.name] = slice(first, first + 1)
+    return s.rows[-1]
+
+
+def coordinate_frames(s: Structure, owner: Joint, what: str) -> tuple[int, int, Coordinate]:
+    """Frames that a joint's coordinate is measured between."""
+    c = owner.coordinates[what]
+    first, second = (frame_index(s, owner, role, what if len(getattr(c, f"turn_{role}")) else "") for role in c.frames)
+    return first, second, c
+
+
+def coordinate_term(
+    s: Structure, text: str, e: Element, row: int, *, with_turns: bool = False, measured: bool = False
+) -> TermSpec:
+    """Add a coordinate to a row or to a measured quantity; ``with_turns``: with the whole turns of angles."""
+    owner, what = s.model.coordinate(text, e)
+    if isinstance(owner, Joint):
+        F, M, c = coordinate_frames(s, owner, what)
+        formula, sign = c.row, c.sign
+    else:
+        F, M, sign = 0, frame_index(s, owner, "M"), 1.0
+        formula = ANGLE if what == "angle" else point_coordinate(what)
+    term = TermSpec(row, F, M, formula, sign, e, owner, what, measured)
+    if formula.of_kind.turns and (with_turns or measured):
+        term.hint = turn_state(s, owner, what, F, M)
+    s.terms.append(term)
+    return term
+
+
+def turn_state(s: Structure, owner: Any, what: str, F: int, M: int) -> int:
+    """The state that counts the turns of an angle."""
+    name = f"{owner.name}.{what}"
+    known = name in s.state_at
+    at = s.state(name)
+    if not known:
+        s.angles.append((F, M, at))
+    return at
+
+
+def _count_joint_turns(s: Structure) -> None:
+    """In space the turns of every joint angle are counted; in the plane the bodies' own angles count them, unless
+    somebody says how many there are at the start. Angles that are coordinates of the forest count their own.
+    """
+    told = {d.coordinate for d in s.model.drivers} | {i.name for i in s.model.initial}
+    for joint in s.model.joints:
+        for what, c in joint.measured(s.model.planar).items():
+            needed = not s.model.planar or f"{joint.name}.{what}" in told
+            if c.row.of_kind.turns and needed and coordinate_row(s, joint.name, what) is None:
+                turn_state(s, joint, what, *coordinate_frames(s, joint, what)[:2])
+
+
+def measured_term(s: Structure, m: int, F: int, M: int, formula: Row, sign: float, e: Element) -> None:
+    """Add a term to a measured quantity."""
+    s.terms.append(TermSpec(m, F, M, formula, sign, e, measured=True))
+    if formula.of_kind.place:
+        s.terms[-1].hint = s.state(f"{e.name}.place")
+
+
+def reacting_element(t: TermSpec) -> Element:
+    """The element that carries what the row of a term does: where an event locks a joint's coordinate, that joint."""
+    return t.owner if isinstance(t.element, Event) and isinstance(t.owner, Joint) else t.element
+
+
+def term_from_side_M(s: Structure, k: int) -> int:
+    """Number of a term of a joint's rows, and the number of terms more where it is seen from the joint's other side."""
+    return k if s.frames[s.terms[k].M].role == "M" else len(s.terms) + k
+
+
+def sort_terms(s: Structure) -> None:
+    """Terms by kind, frames on ground first, those that no loop asks for last; offsets of every kind."""
+    used = _used_frames(s)
+    order = sorted(range(len(s.frames)), key=lambda k: 0 if s.frames[k].body < 0 else 1 if k in used else 2)
+    new = np.empty(len(order), np.int64)
+    new[order] = np.arange(len(order))
+    s.frames = [s.frames[k] for k in order]
+    s.terms.sort(key=lambda t: t.formula.kind)
+    s.term_code = [_user_formula(t.formula) for t in s.terms]
+    for t in s.terms:
+        t.F, t.M = int(new[t.F]), int(new[t.M])
+        if t.measured:
+            t.row += len(s.rows)
+    for k, t in enumerate(s.terms):
+        if not t.measured:
+            s.terms_of.setdefault(reacting_element(t).name, []).append(k)
+    angles = integer_table(Angles, s.angles)
+    s.frame_at = {key: int(new[k]) for key, k in s.frame_at.items()}
+    s.tables["angles"] = Angles(new[angles.F], new[angles.M], angles.state)
+    for k, name in enumerate(sorted(s.prescribed, key=s.prescribed.__getitem__)):
+        s.slices[name] = slice(len(s.rows) + k, len(s.rows) + k + 1)
+    s.tables["frame_body"] = np.array([f.body for f in s.frames], np.int64)
+    s.tables["rows"] = integer_table(Rows, [(r.law, r.wrap, r.work) for r in s.rows])
+    terms = np.searchsorted([t.formula.kind for t in s.terms], np.arange(TERM_KINDS + 1))
+    ground = int((s.tables["frame_body"] < 0).sum())
+    absolute = not s.tree_joints and not s.coupled
+    solver = SCHUR if absolute else COUPLED if s.rows or s.coupled else ARTICULATED
+    moving = ground + sum(s.frames[new[k]].body >= 0 for k in used)
+    s.tables["kind_terms"] = terms.astype(np.int64)
+    s.tables["sizes"] = np.array([solver, s.nq, moving, ground], np.int64).view(Sizes)
+    _renumber_force_frames(s, new)
+
+
+def _user_formula(row: Row) -> CodeTable | None:
+    """The formula of a row of a user's own."""
+    return code_table(type(row), SIGNATURES, SIGNATURES) if isinstance(row, ConstraintRow) else None
+
+
+def force_frames(s: Structure, e: Force) -> tuple[np.ndarray, ...]:
+    """Fields of the force table in which a force has frames; others have what is measured there."""
+    table: Forces = s.tables["forces"]
+    return () if isinstance(e, Touch) else (table.M,) if hasattr(e, "effort") else (table.F, table.M)
+
+
+def _used_frames(s: Structure) -> set[int]:
+    """Frames that the compiled loops ask for; those of tree joints often only results do."""
+    used = {k for t in s.terms for k in (t.F, t.M)} | {k for angle in s.angles for k in angle[:2]}
+    for k, e in enumerate(s.forces):
+        used |= {int(column[k]) for column in force_frames(s, e)}
+    return used - {-1}  # forces along a measured quantity that have no frame of their own
+
+
+def _renumber_force_frames(s: Structure, new: np.ndarray) -> None:
+    """New numbers of frames in the force table."""
+    for k, e in enumerate(s.forces):
+        for column in force_frames(s, e):
+            if column[k] >= 0:
+                column[k] = new[column[k]]
+
+
+DIRECTIONS = {"rising": RISING, "falling": FALLING, "either": EITHER}
+
+
+def lock_switches(model: Model) -> list[tuple[Event, Switch]]:
+    """A row for each coordinate that some event locks or releases: the first of these events has it."""
+    out: dict[str, tuple[Event, Switch]] = {}
+    for e in model.events:
+        for a in e.do:
+            if isinstance(a, (Lock, Release)):
+                for text in lock_target(model, e, a).coordinates:
+                    out.setdefault(text, (e, Switch(LOCK, label=text, along=(text,))))
+    return list(out.values())
+
+
+def released_joints(model: Model) -> list[Joint]:
+    """Joints that some event releases: their own rows let go, so that they cannot be tree joints."""
+    found = [lock_target(model, e, a).joint for e in model.events for a in e.do if isinstance(a, (Lock, Release))]
+    return [model[name] for name in dict.fromkeys(found) if name]
+
+
+def joint_row_name(joint: Joint, k: int) -> str:
+    """Name of the measured quantity that is the k-th row of a joint."""
+    return f"{joint.name}:row {k}"
+
+
+def measure_released_rows(s: Structure) -> None:
+    """Measure what the rows of joints that may let go hold."""
+    for joint in released_joints(s.model):
+        F, M = frame_index(s, joint, "F"), frame_index(s, joint, "M")
+        for k, row in enumerate(joint.rows(s.model.planar)):
+            m = s.measured[joint_row_name(joint, k)] = len(s.measured)
+            term = TermSpec(m, F, M, row, 1.0, joint, measured=True)
+            if hasattr(joint, "nearest"):
+                term.hint = s.state(f"{joint.name}.place")
+            s.terms.append(term)
+            for what in row.plus:
+                coordinate_term(s, f"{joint.name}.{what}", joint, m, measured=True)
+
+
+def event_names(model: Model) -> dict[str, Event]:
+    """Every name in expressions of events, coordinates that they strike too, and an event that uses it."""
+    out: dict[str, Event] = {}
+    for e in model.events:
+        for where, law in e.laws():
+            out |= dict.fromkeys(model.law(law, e.of, where).names, e)
+        for a in e.do:
+            if isinstance(a, Impulse) and not isinstance(model.find(a.on), (Body, Frame)):
+                out[coordinate_of(model, e, a)] = e
+    return out
+
+
+def add_event_guards(s: Structure) -> None:
+    """Watch the expressions of events; `Structure.events` says which guard is whose."""
+    for e in s.model.events:
+        if not e.at_start:
+            s.events[len(s.guards)] = e
+            at = s.law(s.model.law(e.law, e.of, f"when of {e.title}"), ())
+            s.guards.append((G_LAW, at, DIRECTIONS[e.direction]))
+
+
+GUARD_KINDS = {
+    STOP: (G_LOWER, G_UPPER, G_PULL),
+    FRICTION: (G_HOLDS, G_SLIDES),
+    ONE_WAY: (G_BACK, G_PULL),
+    ELASTIC: (G_PRESS_LOWER, G_PRESS_UPPER),
+    RATCHET: (G_LOWER, G_SLIDES, G_PULL),
+    BRANCH: (G_CORNER,),
+    SLIP: (G_CONE, G_TURNS),
+    EDGE: (G_EDGE,),
+}
+"""What is watched of each kind of switch."""
+
+
+@dataclass
+class SwitchSpec:
+    """One switch of a structure."""
+
+    element: Element
+    switch: Switch
+    row: int = -1
+    measured: int = -1
+    force: int = -1
+    law: int = -1
+    other: int = -1
+    partner: int = -1
+    held: bool = False  # from the start
+
+
+def declared_switches(model: Model) -> list[tuple[Element, Switch]]:
+    """All that the model's elements declare."""
+    return [*((e, w) for e in model.elements() for w in e.switches()), *lock_switches(model)]
+
+
+def switch_quantity(e: Element, w: Switch) -> str:
+    """Name of the quantity that a switch acts along, among what is measured."""
+    if w.along and not w.summed:
+        return w.along[0]
+    return f"{e.name}:{w.label or 'length'}"
+
+
+def measure_switches(s: Structure) -> None:
+    """Number the quantities that switches act along, before those of forces."""
+    for e, w in declared_switches(s.model):
+        key = switch_quantity(e, w)
+        if key in s.measured:
+            continue
+        m = s.measured[key] = len(s.measured)
+        for k, text in enumerate(w.along):
+            coordinate_term(s, text, e, m, measured=True).index = k
+            s.terms[-1].switch = w.label if w.summed else None
+        for a, b, formula in w.seen or w.path:
+            measured_term(s, m, frame_index(s, e, a), frame_index(s, e, b), formula, 1.0, e)
+
+
+def add_switch_rows(s: Structure) -> None:
+    """The rows, behind all others."""
+    for e, w in declared_switches(s.model):
+        if w.kind in (ELASTIC, EDGE):
+            s.switches.append(SwitchSpec(e, w, -1, s.measured[switch_quantity(e, w)]))
+            continue
+        row, first = len(s.rows), len(s.rows)
+        for k, text in enumerate(w.along):
+            coordinate_term(s, text, e, row, with_turns=True).index = k
+            s.terms[-1].switch = w.label if w.summed else None
+        for a, b, formula in w.path:
+            measured_term(s, row, frame_index(s, e, a), frame_index(s, e, b), formula, 1.0, e)
+            s.terms[-1].measured = False
+        s.rows.append(RowSpec(e, w.label or "switch", holonomic=all(x.holonomic for _, _, x in w.path)))
+        s.slices[e.name] = slice(s.slices[e.name].start if e.name in s.slices else first, len(s.rows))
+        s.switches.append(SwitchSpec(e, w, row, s.measured[switch_quantity(e, w)]))
+    for k, spec in enumerate(s.switches):
+        if spec.switch.other:
+            one = [i for i, x in enumerate(s.switches) if x.element is spec.element]
+            spec.other = next(i for i in one if s.switches[i].switch.label == spec.switch.other)
+            like = [i for i in one if i != k and s.switches[i].switch.kind == spec.switch.kind == SLIP]
+            spec.partner = like[0] if like else -1
+
+    for joint in released_joints(s.model):
+        at = s.slices[joint.name]
+        for k, row in enumerate(range(at.start, at.stop)):
+            spec = SwitchSpec(joint, Switch(LOCK, f"row {k}"), row, s.measured[joint_row_name(joint, k)])
+            spec.held = True
+            s.switches.append(spec)
+
+
+def fill_switch_tables(s: Structure) -> None:
+    """The integers of switches and guards, when forces are numbered."""
+    for k, spec in enumerate(s.switches):
+        if spec.switch.slides:
+            spec.force = next(i for i, f in enumerate(s.forces) if f is spec.element)
+            s.tables["forces"].switch[spec.force] = k
+        s.guards += [(kind, k, FALLING) for kind in _guards_of(k, spec)]
+    if _may_be_indeterminate(s):
+        s.guards.append((G_SHARED, 0, FALLING))
+    s.tables["switches"] = integer_table(
+        Switches, [(x.row, x.measured, x.switch.kind, x.force, x.law, x.partner, x.other) for x in s.switches]
+    )
+    s.tables["guards"] = integer_table(Guards, s.guards)
+
+
+def _may_be_indeterminate(s: Structure) -> bool:
+    """Whether what holds by friction may have company: then how they share what they hold can be open."""
+    gaps = {x.other for x in s.switches if x.switch.kind == SLIP}
+    holding = [x for k, x in enumerate(s.switches) if x.row >= 0 and k not in gaps and not -1 < x.partner < k]
+    return len(holding) > 1 and any(x.switch.kind in (FRICTION, SLIP) for x in holding)
+
+
+def _guards_of(k: int, x: SwitchSpec) -> tuple[int, ...]:
+    """What is watched of a switch: of two tangents of a place, the first is watched for both."""
+    if x.switch.kind == SLIP and -1 < x.partner < k:
+        return ()
+    return GUARD_KINDS.get(x.switch.kind, ())
+
+
+NUMBER_FIELDS = {SLIP: ("static_friction", "kinetic_friction"), RATCHET: ("tooth", "pitch", "restitution")}
+"""Which of `SwitchNumbers` an element's ``switched`` gives, by the kind of switch; others: the first of them."""
+
+
+def fill_switch_numbers(s: Structure, of: Any, table: SwitchNumbers, asks: Any, separation: Any) -> None:
+    """Numbers of the switches, from those of their elements; ``separation``: how far points of each are apart."""
+    for k, spec in enumerate(s.switches):
+        kind = spec.switch.kind
+        if kind != BRANCH and not asks(spec.element):
+            continue
+        given = (
+            ()
+            if kind == BRANCH
+            else spec.element.switched(of[spec.element.name], spec.switch.label, separation(spec.element))
+        )
+        named = dict(zip(NUMBER_FIELDS.get(kind, SwitchNumbers._fields), given, strict=False))
+        if kind == RATCHET:  # it begins between these teeth
+            named |= {"lower": named["tooth"], "upper": named["tooth"] + named["pitch"]}
+        for name, column in zip(table._fields, table, strict=True):
+            column[k] = named.get(name, {"lower": -np.inf, "upper": np.inf}.get(name, 0.0))

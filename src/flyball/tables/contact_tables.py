@@ -1,0 +1,352 @@
+"""Contact of a model in arrays: the bodies that carry shapes, the shapes, and the properties of their surfaces.
+
+Shapes that are only described are finished here: hulls of points, closed surfaces in convex parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from ..collision import shape_kinds
+from ..collision import tables as ct
+from ..collision.convex_decomposition import MAX_PARTS, PART_TOLERANCE, ConvexParts, Hull, convex_hull, convex_parts
+from ..collision.shapes.solid import SUPPORT_SIGNATURES
+from ..collision.tables import Movers
+from ..compiler.kernels import CodeTable, code_table, table_addresses
+from ..errors import ModelError, PerformanceNotice, warn_user
+from ..model.body import GROUND, Bodies, Body, Ground, frame_of
+from ..model.contact import Owner
+from ..model.element import resolve
+from ..model.model import Model
+from ..model.shapes.geometry import ConvexPart, polygon_outline
+from ..model.shapes.solid import ConvexSolid, Solid
+from .contact_surfaces import ContactGroups, Surface, check_curvature, contact_groups, surface_motion, surface_pairs
+from .element_numbers import ElementNumbers
+from .table_definitions import Surfaces
+
+
+@dataclass(frozen=True)
+class Carriers:
+    """Bodies, and many bodies, in the order in which they were asked for.
+
+    A mover's origin is its centre of mass, its axes are those of its reference frame.
+
+    Attributes
+    ----------
+    names : tuple of str
+    slices : dict
+        Name -> the movers that it is.
+    movers : Movers
+        As drawn and told; velocities are those of the centres of mass.
+    mass : (n,) [kg]
+    inertia : (n, 3, 3) [kg m^2]
+        About the centre of mass, in the mover's axes.
+    com : dict
+        Name -> its centre of mass [m] in its reference frame; of many bodies, with ``scale`` 1.
+    """
+
+    names: tuple[str, ...]
+    slices: dict[str, slice]
+    movers: Movers
+    mass: np.ndarray
+    inertia: np.ndarray
+    com: dict[str, np.ndarray]
+
+    def name(self, mover: int) -> str:
+        """What a mover is called in messages and results: ``"crank"`` or ``"balls[17]"``; ``"ground"`` for -1."""
+        for name, at in self.slices.items():
+            if at.start <= mover < at.stop:
+                return name if name in self.single else f"{name}[{mover - at.start}]"
+        return "ground"
+
+    single: frozenset[str] = frozenset()
+
+
+def contact_carriers(model: Model, given: ElementNumbers, names: Sequence[str]) -> Carriers:
+    """The bodies of these names, one after the other, each of many bodies at its place.
+
+    Raises
+    ------
+    ModelError
+        If there is no such body.
+    """
+    parts, slices, com, at = [], {}, {}, 0
+    for name in names:
+        e = model.find(name)
+        part, com[name] = _many_bodies(e, model, given) if isinstance(e, Bodies) else _single_body(name, given)
+        slices[name] = slice(at, at + len(part[0]))
+        at = slices[name].stop
+        parts.append(part)
+    if not parts:
+        parts = [tuple(np.zeros((0, *s)) for s in ((3,), (3, 3), (3,), (3,), (), (3, 3)))]
+    p, R, v, w, mass, inertia = (np.concatenate(x) for x in zip(*parts, strict=True))
+    movers = Movers(np.hstack([p, R.reshape(-1, 9)]), np.hstack([v, w]))
+    single = frozenset(name for name in names if not isinstance(model.find(name), Bodies))
+    return Carriers(tuple(names), slices, movers, mass, inertia, com, single)
+
+
+def _single_body(name: str, given: ElementNumbers) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    if name not in given.bodies:
+        raise ModelError(f"there is no body named {name!r}")
+    b = given.bodies[name]
+    inertia = np.real(b.inertia).reshape(3, 3)
+    row = (b.c, b.R, b.v, b.w, b.mass, inertia)
+    return tuple(np.real(np.asarray(x, float))[None] for x in row), np.real(b.com)
+
+
+def _many_bodies(e: Bodies, model: Model, given: ElementNumbers) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    """Lengths grow with the scale, masses with its cube, inertias with its fifth power."""
+    one = e.weight(given.of[e.name], given.env, model.planar)
+    p, R, v, w = e.start(model.planar)
+    s = e.sizes()
+    com = np.real(one.com)
+    arm = s[:, None] * (R @ com)
+    mass = np.real(one.mass) * s**3
+    inertia = (s**5)[:, None, None] * np.real(one.inertia)
+    return (p + arm, R, v + np.cross(w, arm), w, mass, inertia), com
+
+
+def finished_forms(form: ConvexPart) -> list[ConvexPart]:
+    """The form as the tables of contact take it: one or several.
+
+    Raises
+    ------
+    ModelError
+        If points or a surface have no solid inside.
+    """
+    if form.kind == "HULL" and len(form.par) == 1:
+        return [_hull_form(convex_hull(form.vertex), form, form.par[0])]
+    if form.kind == "MESH":
+        return [_hull_form(h, form, 0.0) for h in _convex_parts(form).hulls]
+    return [form]
+
+
+def outline_forms(form: ConvexPart) -> list[ConvexPart]:
+    """The same in a planar mechanism: each part as seen along z."""
+    if form.kind == "MESH":
+        return [polygon_outline(h.vertices) for h in _convex_parts(form).hulls]
+    return [form]
+
+
+def _hull_form(h: Hull, form: ConvexPart, rounding: float) -> ConvexPart:
+    """A hull about the middle of its corners."""
+    middle = (h.vertices.min(axis=0) + h.vertices.max(axis=0)) / 2
+    h = Hull(h.vertices - middle, h.normals, h.sides)
+    face, edges = h.table(0)
+    return ConvexPart(
+        "HULL",
+        (rounding, float(edges)),
+        np.sqrt((h.vertices**2).sum(axis=1)).max() + rounding,
+        form.place + form.axes @ middle,
+        form.axes,
+        h.rows,
+        face,
+        len(h.vertices),
+        len(h.sides),
+    )
+
+
+def _convex_parts(form: ConvexPart) -> ConvexParts:
+    """Convex parts of a surface; what they take is told where they are poor."""
+    v = np.ascontiguousarray(form.vertex, float)
+    found = _cached_parts(v.tobytes(), np.ascontiguousarray(form.face, np.int64).tobytes())
+    size = float(np.linalg.norm(np.ptp(v, axis=0)))
+    if found.beyond > PART_TOLERANCE * size:
+        warn_user(
+            f"a surface of {form.face.size // 3} triangles is {MAX_PARTS} convex parts where it touches others, and these "
+            f"still fill up to {found.beyond:.3g} m of its hollows; describe it by simpler shapes where that matters",
+            PerformanceNotice,
+        )
+    return found
+
+
+@lru_cache(maxsize=64)
+def _cached_parts(vertices: bytes, faces: bytes) -> ConvexParts:
+    return convex_parts(np.frombuffer(vertices).reshape(-1, 3), np.frombuffer(faces, np.int64).reshape(-1, 3))
+
+
+@dataclass(frozen=True)
+class ContactTables:
+    """All that contact needs to know of a model.
+
+    Attributes
+    ----------
+    geometry : contact.tables.Geometry
+    surfaces : contact.surfaces.Surfaces
+    carriers : Carriers
+        The movers of the geometry.
+    parts : tuple of str
+        Names of what the shapes are of.
+    part : (ns,)
+        Of each shape, its place in ``parts``.
+    code : list of CodeTable or None
+        Of each shape of a user's own, its support function: their addresses stand in the geometry.
+    """
+
+    geometry: ct.Geometry
+    surfaces: Surfaces
+    carriers: Carriers
+    parts: tuple[str, ...]
+    part: np.ndarray
+    code: list[CodeTable | None]
+
+    def name(self, shape: int) -> str:
+        """What carries a shape, for messages: ``"floor"``, ``"crank"``, ``"balls[17]"``."""
+        mover = int(self.geometry.shape_i[shape, ct.MOVER])
+        return self.parts[self.part[shape]] if mover < 0 else self.carriers.name(mover)
+
+
+def contact_tables(model: Model, given: ElementNumbers, names: Sequence[str]) -> ContactTables:
+    """Tables of a model's contact.
+
+    Parameters
+    ----------
+    model : Model
+    given : Numbers
+        Numbers of its elements.
+    names : sequence of str
+        Bodies and many bodies that move, in the order that their movers are to have. Shapes of others, and of ground,
+        are left out or stand still.
+
+    Raises
+    ------
+    ModelError
+        If a shape has no form that contact knows, what touches has no mass, or nothing says the friction of a pair.
+    """
+    at = contact_carriers(model, given, names)
+    owners: list[Owner] = [*model.ground, *(e for name in names if isinstance(e := model.find(name), (Body, Bodies)))]
+    owners = [e for e in owners if any(s.touches for s in e.shapes())]
+    _refuse_massless(owners, at)
+    g = contact_groups(model, owners)
+    rows = _ShapeRows(model, given, at, g)
+    for k, e in enumerate(owners):
+        rows.add(k, e)
+    own = _concatenated(rows.own, (0, 2, 3))
+    surfaces = Surfaces(surface_pairs(model, given, g, rows.surfaces), own[:, 0].copy(), own[:, 1].copy())
+    apart = np.array(sorted(sorted((at.slices[a].start, at.slices[b].start)) for a, b in g.apart), np.int64).reshape(
+        -1, 2
+    )
+    geometry = ct.Geometry(
+        _concatenated(rows.ints, (0, 9), np.int64),
+        _concatenated(rows.reals, (0, 24)),
+        _concatenated(rows.vertex, (0, 3)),
+        _concatenated(rows.face, (0,), np.int64),
+        apart,
+        table_addresses(rows.code),
+    )
+    check_curvature(geometry, surfaces.pair, [m or "" for _, m in rows.surfaces], model.planar)
+    part = _concatenated(rows.part, (0,), np.int64)
+    return ContactTables(geometry, surfaces, at, tuple(e.name for e in owners), part, rows.code)
+
+
+def _refuse_massless(owners: list[Owner], at: Carriers) -> None:
+    """Refuse what impulses would give any velocity."""
+    for e in owners:
+        if not isinstance(e, Ground) and not at.mass[at.slices[e.name].start] > 0.0:
+            raise ModelError(
+                f"{e.title}: it touches and has no mass; give it one, or contact=False to its shapes and put such that "
+                f"touch on the bodies that it joins"
+            )
+
+
+def _concatenated(parts: list[np.ndarray], empty: tuple[int, ...], dtype: type = float) -> np.ndarray:
+    return np.ascontiguousarray(np.concatenate([np.zeros(empty, dtype), *parts]), dtype)
+
+
+class _ShapeRows:
+    """Rows of the shape tables, grown owner by owner."""
+
+    def __init__(self, model: Model, given: ElementNumbers, at: Carriers, g: ContactGroups) -> None:
+        self.model, self.given, self.at, self.groups = model, given, at, g
+        self.surfaces: dict[Surface, set[str]] = {}  # what carries each; of ground there is one
+        self.ints: list[np.ndarray] = []
+        self.reals: list[np.ndarray] = []
+        self.own: list[np.ndarray] = []
+        self.part: list[np.ndarray] = []
+        self.vertex: list[np.ndarray] = []
+        self.face: list[np.ndarray] = []
+        self.code: list[CodeTable | None] = []
+        self._corners = self._places = 0
+
+    def add(self, k: int, e: Owner) -> None:
+        """The shapes of one owner; of many bodies, those of the first, of the second, and so on."""
+        where, movers, sizes, com = self._frame(e)
+        forms = [(s, f) for s in e.shapes() if s.touches for f in self._forms(e, s)]
+        count, n = len(movers), len(forms)
+        ints, reals = np.zeros((count, n, 9), np.int64), np.zeros((count, n, 24))
+        mine = np.zeros((n, 2, 3))
+        for j, (s, form) in enumerate(forms):
+            f = form if where is None else form.carried(*where)
+            reals[:, j] = _shape_numbers(f, com, sizes, self._places)
+            ints[:, j] = self._ints(e, s, f, sizes)
+            mine[j] = self._own(e, s, where)
+        ints[:, :, ct.MOVER] = movers[:, None]
+        self.ints.append(ints.reshape(-1, 9))
+        self.reals.append(reals.reshape(-1, 24))
+        self.own.append(np.broadcast_to(mine, (count, n, 2, 3)).reshape(-1, 2, 3))
+        self.part.append(np.full(count * n, k))
+        self.code += [None if f.owner is None else code_table(f.owner, SUPPORT_SIGNATURES) for _, f in forms] * count
+
+    def _frame(self, e: Owner) -> tuple:
+        """Frame in the world of what stands still, movers, sizes, centre of mass."""
+        if isinstance(e, Ground):
+            return frame_of(e, self.given.of[e.name]), np.array([-1]), np.ones(1), np.zeros(3)
+        at = self.at.slices[e.name]
+        sizes = e.sizes() if isinstance(e, Bodies) else np.ones(1)
+        return None, np.arange(at.start, at.stop), sizes, self.at.com[e.name]
+
+    def _forms(self, e: Owner, s: Solid) -> list[ConvexPart]:
+        """The parts of a shape, in the body's reference frame."""
+        n = resolve(s, self.given.env)
+        try:
+            if isinstance(s, ConvexSolid):
+                code_table(type(s), SUPPORT_SIGNATURES, SUPPORT_SIGNATURES)
+            if self.model.planar:
+                return [g for f in s.outlines(n) for g in outline_forms(f)]
+            p, R = s.pose(n)
+            return [g.carried(p, R) for f in s.forms(n) for g in finished_forms(f)]
+        except ModelError as error:
+            raise type(error)(f"{e.title}: {error}") from None
+
+    def _ints(self, e: Owner, s: Solid, f: ConvexPart, sizes: np.ndarray) -> np.ndarray:
+        """Kind, places of corners and faces, groups and surface; corners of other sizes are corners of their own."""
+        group, material = self.groups.of[e.name], s.material or e.material
+        row = np.zeros((len(sizes), 9), np.int64)
+        row[:, ct.KIND] = getattr(shape_kinds, f.kind)
+        row[:, ct.COUNT] = len(f.vertex) if f.corners is None else f.corners
+        row[:, ct.FACE_COUNT] = f.sides
+        row[:, ct.FIRST], row[:, ct.FACE_FIRST] = self._corners, self._places
+        if len(f.vertex):
+            other = (sizes != sizes[0]).any()
+            row[:, ct.FIRST] += len(f.vertex) * np.arange(len(sizes)) if other else 0
+            self.vertex.append(f.grown(sizes if other else sizes[:1])[1])
+            self.face.append(np.asarray(f.face, np.int64))
+            self._corners += len(self.vertex[-1])
+            self._places += len(f.face)
+        row[:, ct.MEMBER], row[:, ct.MASK] = 1 << group, self.groups.meets(group)
+        surface = group, material
+        on = self.surfaces.setdefault(surface, set())
+        on |= {GROUND} if isinstance(e, Ground) else {e.name, f"{e.name}[1]"} if len(sizes) > 1 else {e.name}
+        row[:, ct.MATERIAL] = list(self.surfaces).index(surface)
+        return row
+
+    def _own(self, e: Owner, s: Solid, where: tuple | None) -> np.ndarray:
+        name = s.material or e.material
+        out = surface_motion(self.model.find(name) if name else None, self.given.of)  # type: ignore[arg-type]
+        return out if where is None else out @ where[1].T
+
+
+def _shape_numbers(f: ConvexPart, com: np.ndarray, sizes: np.ndarray, places: int) -> np.ndarray:
+    """Origin from the mover's, axes, parameters, radius around it; the edges of a hull are counted from all faces."""
+    row = np.zeros((len(sizes), 24))
+    row[:, ct.PLACE : ct.PLACE + 3] = sizes[:, None] * (np.real(f.place) - com)
+    row[:, ct.AXES : ct.AXES + 9] = np.real(f.axes).ravel()
+    row[:, ct.PAR : ct.PAR + len(f.par)] = replace(f, vertex=np.zeros((0, 3))).grown(sizes)[0]
+    if f.kind == "HULL" and f.par[1] >= 0:
+        row[:, ct.PAR + 1] += places
+    row[:, ct.RADIUS] = sizes * np.real(f.reach)
+    return row

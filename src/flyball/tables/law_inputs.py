@@ -1,0 +1,278 @@
+"""What laws read besides sensors: states of controllers, forces named by events, sides of nonsmooth points.
+
+States of controllers are the first of all states, each with the law of its rate. Forces that events name have
+columns after the loads of joints: a joint has eight (`quantities.WRENCH`), other elements two (the effort, and its
+negative); they are filled in `equations.readings` from the rows of `LoadTerms`. A nonsmooth point of a law
+where the state decides (`abs`, `max`, `where`, a table's knot) is a switch, whose guard is a law of its own;
+the law reads the side as if measured.
+
+Columns are known only when all quantities are numbered: until then, places stand in the bytecode as negative
+numbers, from `CONTROLLER_STATE_CODE` and `FORCE_READING_CODE` downwards; `resolve_columns` writes the final
+ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..constraints.blocks import DISTANCE
+from ..constraints.switch_kinds import BRANCH
+from ..laws.bytecode import SENSOR
+from ..laws.compilation import CornerLookup, calls_python, compile_decision, has_corners, may_be_steep, node_key
+from ..laws.interval_evaluation import table_corners
+from ..math.spline import pack_spline
+from ..model.body import Driver
+from ..model.controller import Controller
+from ..model.controller_signals import controller_states, input_law, signal_law
+from ..model.element import Element, LawOf, fields_with
+from ..model.expression_parser import SyntaxNode
+from ..model.expressions import Expression
+from ..model.force import CoordinateForce, Switch, TwoPointForce
+from ..model.joint import Joint
+from ..model.model import Model
+from ..model.quantities import EFFORTS, WRENCH, TransmittedForce, transmitted_force
+from .constraint_rows import SwitchSpec, event_names, measured_term, term_from_side_M
+from .structure_definition import Structure, frame_index
+
+CONTROLLER_STATE_CODE = -1_000_000_000
+"""Place of the first state until columns are known; below those of switches' ways."""
+
+
+def add_controller_states(s: Structure) -> None:
+    """Give every state of a controller its number, before all other states."""
+    s.controls = controller_states(s.model)
+    for x in s.controls:
+        s.state(x.name)
+
+
+def controller_names(model: Model) -> dict[str, Controller]:
+    """Every name in laws and signals of controllers, and a controller that uses it."""
+    out: dict[str, Controller] = {}
+    for e in model.controllers:
+        laws = [x.law for x in controller_states(model) if x.controller is e] + [
+            signal_law(model, e, name) for name in e.signals()
+        ]
+        laws += [input_law(model, e, name) for name in e.ordered() or ()]
+        out |= dict.fromkeys((name for law in laws for name in law.names), e)
+    return out
+
+
+def add_controller_slots(s: Structure) -> None:
+    """Have laws find the states."""
+    s.slots |= {x.name: CONTROLLER_STATE_CODE - k for k, x in enumerate(s.controls)}
+
+
+def add_controller_laws(s: Structure) -> None:
+    """The laws of the rates."""
+    laws, s.sampled, s.ordered = [], [], []
+    for k, x in enumerate(s.controls):
+        at = s.law(x.law, (), None if x.controller.sampled else x.controller)
+        laws.append(-1 if x.controller.sampled else at)
+        if x.controller.sampled:
+            s.sampled.append((x.controller.name, k, at, not x.signal))
+    s.tables["control_laws"] = np.array(laws, np.int64)
+    for e in s.model.controllers:
+        if ordered := e.ordered():
+            s.ordered += [(e, ordered, [s.law(input_law(s.model, e, name), ()) for name in ordered])]
+
+
+def initial_controller_states(s: Structure, numbers: Mapping[str, Any]) -> list[Any]:
+    """What the states begin with; ``numbers`` are those of elements, by name."""
+    found = {e.name: {x.name: x.initial for x in e.states(numbers[e.name])} for e in s.model.controllers}
+    return [found[x.controller.name].get(x.state, 0.0) for x in s.controls]
+
+
+FORCE_READING_CODE = -2_000_000_000
+"""Place of the first column until it is known; below those of controllers' states."""
+
+
+def forces_in_events(model: Model) -> dict[str, TransmittedForce]:
+    """Every name in expressions of events that is one of a force, and what it means."""
+    found = {name: transmitted_force(model, name) for name in event_names(model) if "." in name}
+    return {name: x for name, x in sorted(found.items()) if x is not None}
+
+
+def number_force_readings(s: Structure) -> None:
+    """Number the columns."""
+    for name, x in forces_in_events(s.model).items():
+        first = s.reads.setdefault(x.element.name, force_reading_count(s))
+        s.slots[name] = FORCE_READING_CODE - first - x.column
+
+
+def force_reading_count(s: Structure) -> int:
+    """How many columns there are."""
+    return sum(len(WRENCH if isinstance(s.model[name], Joint) else EFFORTS) for name in s.reads)
+
+
+def force_reading_entries(s: Structure) -> list[tuple[int, int]]:
+    """What each is made of: (column, term or other)."""
+    first = 2 * len(s.measured) + len(s.loads)
+    return [(first + at, what) for name, at in s.reads.items() for what in _reading_terms(s, s.model[name])]
+
+
+def _reading_terms(s: Structure, e: Element) -> list[int]:
+    rows, forces = len(s.rows), len(s.forces)
+    if isinstance(e, Joint):
+        return [term_from_side_M(s, k) for k in s.terms_of.get(e.name, ())]
+    if isinstance(e, Driver):
+        if e.name in s.prescribed:
+            return [-2 - rows - forces - int(s.tables["tree"].v[s.prescribed[e.name]])]
+        return [-2 - s.slices[e.name].start]
+    own = [-2 - x.row for x in s.switches if x.element is e and x.row >= 0]
+    return own + [-2 - rows - k for k, f in enumerate(s.forces) if f is e]
+
+
+def element_laws(model: Model) -> Iterator[tuple[Element, Expression, tuple[str, ...]]]:
+    """The laws of forces, controllers and drivers: whose, and of which inputs besides time."""
+    for x in controller_states(model):
+        if not x.controller.sampled:
+            yield x.controller, x.law, ()
+    for e in model.forces:
+        for name, of in fields_with(e.__class__, LawOf).items():
+            value = getattr(e, name)
+            for law in value if isinstance(value, tuple) else (value,):
+                if law is not None and not isinstance(law, float):
+                    yield e, model.law(law, of, f"{name} of {e.title}"), of.inputs
+    for driver in model.drivers:
+        law = LawOf(model.unit(driver.coordinate, driver))
+        yield driver, model.law(driver.law, law, f"law of {driver.title}", driver=True), ()
+
+
+def nonsmooth_elements(model: Model) -> list[Element]:
+    """Elements whose laws have corners where the state decides."""
+    return (
+        model.kept.get("bent laws", None, 1, lambda: _nonsmooth_elements(model))
+        if model.frozen
+        else _nonsmooth_elements(model)
+    )
+
+
+def _nonsmooth_elements(model: Model) -> list[Element]:
+    sensors = {x.name for x in model.sensors}
+    out = []
+    for e, law, inputs in element_laws(model):
+        moving = {name for name in law.names if name in sensors or "." in name}
+        if has_corners(law, ("t", *inputs), moving) and _is_nonsmooth(model, law):
+            out.append(e)
+    return out
+
+
+def steep_law_names(model: Model) -> list[str]:
+    """The laws whose slope may be infinite somewhere, as messages name them."""
+    still = {"t", *model.parameters}
+    return [law.where for _, law, _ in element_laws(model) if not calls_python(law) and may_be_steep(law.tree, still)]
+
+
+def _is_nonsmooth(model: Model, law: Expression) -> bool:
+    """Tables without corners are no reason to watch a law."""
+    smooth = {x.name for x in model.tables if not len(table_corners(np.array(x.data()), 0))}
+    if not law.tables or any(n.kind in _NONSMOOTH for n in law.tree.walk()):
+        return True
+    return bool(law.tables - smooth)
+
+
+_NONSMOOTH = frozenset({"where", "abs", "sign", "min", "max", "step", "step5"})
+
+
+class NonsmoothPoints:
+    """The corners of one structure."""
+
+    def __init__(self, s: Structure) -> None:
+        self.s = s
+        self.known: dict[Any, int] = {}
+
+    def quantities(self) -> None:
+        """Number the lengths and rates that bent laws of forces between frames depend on."""
+        for e in nonsmooth_elements(self.s.model):
+            if not isinstance(e, TwoPointForce) or self.key(e) in self.s.measured:
+                continue
+            m = self.s.measured[self.key(e)] = len(self.s.measured)
+            measured_term(self.s, m, frame_index(self.s, e, "F"), frame_index(self.s, e, "M"), DISTANCE, 1.0, e)
+
+    def key(self, e: Any) -> str:
+        """Name of the quantity that a force's laws depend on."""
+        return (e.coordinate_text() if isinstance(e, CoordinateForce) else "") or f"{e.name}:length"
+
+    def of(self, e: Any, law: Expression, inputs: tuple[str, ...]) -> CornerLookup | None:
+        """Where the sides of a law's corners are found; None for what has none."""
+        if calls_python(law):
+            return None
+        s = self.s
+        slots = {name: s.slots[name] for name in law.names if name in s.slots}
+        if inputs and self.key(e) in s.measured:
+            m = s.measured[self.key(e)]
+            slots |= {inputs[0]: m, inputs[1]: len(s.measured) + m}
+
+        def corner(u: SyntaxNode) -> tuple[int, float]:
+            data = self.zigzag(u.value) if u.kind == "table" else []
+            if data is None:
+                return 0, 1.0
+            key = _resolved(u, slots)
+            if key not in self.known:
+                tables = dict(s.table_at)
+                if u.kind == "table":
+                    tables[u.value] = len(s.const)
+                    s.const += data
+                at, depth = compile_decision(law, u, list(s.model.parameters), s.code, s.const, slots, tables)
+                s.depth = max(s.depth, depth)
+                s.laws[at] = law.where
+                self.known[key] = len(s.switches)
+                s.switches.append(SwitchSpec(e, Switch(BRANCH, label=law.where), law=at))
+            return -1 - self.known[key], 1.0
+
+        return corner
+
+    def zigzag(self, name: str) -> list[float] | None:
+        """A curve that passes zero at each corner of a table, and only there; None where there are none."""
+        table = next(x for x in self.s.model.tables if x.name == name)
+        data = np.array(table.data())
+        x = table_corners(data, 0)
+        if not len(x):
+            return None
+        repeat = table.beyond == "repeat"
+        if repeat:
+            x = np.r_[x, x + data[0]] if len(x) % 2 == 1 else x  # of an odd number the sign is back after two periods
+            x = np.r_[x, x[0] + data[0] * np.ceil((x[-1] - x[0]) / data[0] + 1e-12)]
+        middle = 0.5 * (x[:-1] + x[1:])
+        height = 0.5 * np.diff(x) * (-1.0) ** np.arange(len(middle))
+        at = np.sort(np.r_[x, middle])
+        value = np.zeros(len(at))
+        value[1::2] = height
+        if len(at) == 1:
+            at, value = np.r_[at, at + 1.0], np.r_[0.0, 1.0]
+        straight = np.column_stack([value[:-1], np.diff(value) / np.diff(at), *np.zeros((2, len(at) - 1))])
+        return pack_spline(at, value, straight, "repeat" if repeat else "line").tolist()
+
+
+def _resolved(u: SyntaxNode, slots: dict[str, int]) -> tuple[Any, ...]:
+    """What a node means, with the places of what is measured for names."""
+    kind, value, *args = node_key(u)
+    if kind == "name" and value in slots:
+        return ("slot", slots[value])
+    return (kind, value, *(_resolved(arg, slots) for arg in u.args))
+
+
+def resolve_columns(s: Structure) -> None:
+    """Write the columns of ways, and of controllers' states, into the code, when all that is measured is numbered."""
+    read = 2 * len(s.measured) + len(s.loads)
+    first = read + force_reading_count(s)
+
+    def column(place: int) -> int:
+        if place >= 0:
+            return place
+        if place <= FORCE_READING_CODE:
+            return read + FORCE_READING_CODE - place
+        return (
+            first + CONTROLLER_STATE_CODE - place
+            if place <= CONTROLLER_STATE_CODE
+            else first + len(s.controls) - 1 - place
+        )
+
+    for at in s.laws:
+        for i in range(at + 2, at + 2 + 2 * s.code[at], 2):
+            if s.code[i] == SENSOR:
+                s.code[i + 1] = column(s.code[i + 1])
+    s.slots = {name: column(place) for name, place in s.slots.items()}

@@ -1,1 +1,0 @@
-"""The engine's own loops run in plain Python on expressions."""

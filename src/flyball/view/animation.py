@@ -1,0 +1,369 @@
+"""Animations: recordings made from results, and the pages of a motion, an equilibrium and mode shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.body import GROUND, Body, Frame
+from ..model.controller import Controller
+from ..model.geometry import matrix_to_quaternion, vector
+from ..model.model import suggest
+from .body_shapes import BodyShapes
+from .event_marks import event_marks
+from .motion_with_events import add_event_states
+from .page import animation_page
+from .recording import (
+    SHOW_OPTIONS,
+    Channel,
+    RecordedBody,
+    RecordedCurve,
+    RecordedFrame,
+    RecordedJoint,
+    RecordedLine,
+    RecordedPath,
+    Recording,
+)
+from .scene import contact_arrows, force_arrows, ground_bodies, recorded_sets, rope_ends
+from .symbols import AttachedFrames, GearWheel, SymbolPart, coordinate_spring_line, element_symbols, float_triple
+
+if TYPE_CHECKING:
+    from ..results.equilibrium import Equilibrium
+    from ..results.result import Result
+
+
+def part_facts(result: Result) -> dict[str, tuple[str, ...]]:
+    """Lines about every part, by its name: its kind, what it joins, a body's mass."""
+    out: dict[str, tuple[str, ...]] = {}
+    for e in result.model.elements():
+        if e.category == "bodies":
+            mass = float(np.real(result.values.bodies[e.name].mass))
+            out[e.name] = ("Body", f"{mass:.4g} kg")
+        elif e.category != "initial":
+            out[e.name] = tuple(x for x in (type(e).__name__, attachment_text(e)) if x)
+    return out
+
+
+def attachment_text(e: Any) -> str:
+    """What an element joins or acts on, in words."""
+    if hasattr(e, "body_i"):
+        return f"{e.body_i} – {e.body_j}"
+    if hasattr(e, "bodies"):
+        return " – ".join(e.bodies)
+    if hasattr(e, "body"):
+        return f"on {e.body}"
+    if hasattr(e, "law") and hasattr(e, "coordinate"):
+        return f"{e.coordinate} = {e.law}"
+    coupled = getattr(e, "coupled", None)
+    if callable(coupled):
+        return ", ".join(coupled())
+    about = getattr(e, "joint", None) or getattr(e, "coordinate", None)
+    if isinstance(about, str):
+        return f"on {about}"
+    measured = getattr(e, "of", None) or getattr(e, "frame", None)
+    return f"of {measured}" if isinstance(measured, str) else ""
+
+
+MAX_TIMES = 2000  # times in a recording, about
+MAX_SET_POSES = 1_500_000  # of members of sets in a recording, at most
+MAX_CURVES = 60
+DEFAULT_SHOW = ("loads", "moments", "grid")
+
+PathRequest = str | tuple[str, Any]
+
+
+def animation_html(result: Result, *, paths: Iterable[PathRequest] = (), show: Collection[str] = DEFAULT_SHOW) -> str:
+    """The animation page of a result: one HTML document that needs nothing else.
+
+    Parameters
+    ----------
+    result : Result
+    paths : names, or (body, point) pairs
+        Whose paths are drawn: the origins of bodies or frames of these names, or points [m] of bodies, counted from
+        their reference frames: ``paths=["P", ("coupler", (0.1, 0.2))]``.
+    show : names
+        What is switched on when the page opens; see `flyball.view.recording.SHOW_OPTIONS`.
+
+    Raises
+    ------
+    ModelError
+        If there is no output time, no such part, or nothing of that name to show.
+    """
+    from .page import animation_page
+
+    return animation_page(record_motion(result, paths=paths, show=show))
+
+
+def record_motion(
+    result: Result,
+    *,
+    paths: Iterable[PathRequest] = (),
+    show: Collection[str] = DEFAULT_SHOW,
+    curves: bool = True,
+    with_notes: bool = True,
+) -> Recording:
+    """Make the recording that pictures and pages read; see `animation_html`.
+
+    Without ``curves`` it has no curves and arrows, unless ``with_notes`` no notes and facts of parts.
+
+    Bodies are placed by their reference frames, so that shapes lie on them as the user gave them. Bodies without
+    shapes get some that follow from their joints and inertia.
+    """
+    if not len(result.t):
+        raise ModelError(f"the result of {result.model.name!r} has no output time: there is nothing to draw")
+    motion = result
+    result, every, near, instead = motion_to_show(motion)
+    members = sum(map(len, result.bulk.values()))
+    places = AttachedFrames(result)
+    looks = BodyShapes(result, places)
+    drawn = list(_symbols_and_lines(result, places, looks, every))
+    channels = _recorded_channels(result, every) if curves else ()
+    bodies = tuple(
+        RecordedBody(b.name, looks.shapes(b.name), *_body_poses(result, b.name, every), b.color)
+        for b in result.model.bodies
+    )
+    joints = tuple(d for d in drawn if isinstance(d, RecordedJoint))
+    sets = recorded_sets(result, every)
+    contacts, left_out = contact_arrows(motion, near) if curves else (None, "")
+    notes = dict(motion.health.lines()) if with_notes else {}
+    if len(every) < len(result.t) and members:
+        notes["pictures"] = f"{len(every)} of {len(result.t)} output times: {members} bodies in sets"
+    if left_out:
+        notes["contact arrows"] = left_out
+    return Recording(
+        name=result.model.name,
+        planar=result.planar,
+        t=result.t[every],
+        bodies=(*bodies, *ground_bodies(result, every, (*bodies, *sets))),
+        lines=tuple(d for d in drawn if isinstance(d, RecordedLine)),
+        joints=joints,
+        channels=channels,
+        shown=initial_channels(result, [c.name for c in channels]),
+        size=looks.size,
+        notes=notes,
+        curves=tuple(d for d in drawn if isinstance(d, RecordedCurve)),
+        arrows=force_arrows(result, places, every, instead) if curves else (),
+        frames=tuple(_recorded_frames(result, places)),
+        paths=tuple(_recorded_path(result, p) for p in paths),
+        show=_checked_show(show),
+        facts=part_facts(result) if with_notes else {},
+        down=_gravity_direction(result),
+        sets=sets,
+        contacts=contacts,
+        marks=event_marks(motion) if with_notes else (),
+    )
+
+
+class DisplayedMotion(NamedTuple):
+    """A motion with the states around its events, and which of its times are shown.
+
+    ``every`` are their indices, ``near`` those of the nearest output times of the motion as it was given, ``instead``
+    these in the motion itself.
+    """
+
+    motion: Result
+    every: np.ndarray
+    near: np.ndarray
+    instead: np.ndarray
+
+
+def motion_to_show(result: Result) -> DisplayedMotion:
+    """What is shown of a motion; all that is around events."""
+    chosen = thinned_times(len(result.t), sum(map(len, result.bulk.values())))
+    whole, near, more = add_event_states(result)
+    every = np.flatnonzero(more | np.isin(near, chosen))
+    return DisplayedMotion(whole, every, near[every], np.flatnonzero(~more)[near[every]])
+
+
+def thinned_times(n: int, members: int = 0) -> np.ndarray:
+    """Indices of the times that are shown: all, or about 2000 evenly chosen, first and last among them.
+
+    Fewer of so many members of sets of bodies that the page would become too large.
+    """
+    most = max(2, min(MAX_TIMES, MAX_SET_POSES // max(members, 1)))
+    return np.arange(n) if n <= most * 1.25 else np.unique(np.linspace(0, n - 1, most).round().astype(int))
+
+
+def _checked_show(show: Collection[str]) -> tuple[str, ...]:
+    for name in show:
+        if name not in SHOW_OPTIONS:
+            known = ", ".join(SHOW_OPTIONS)
+            raise ModelError(f"there is nothing to show named {name!r}{suggest(name, SHOW_OPTIONS)}; choose of {known}")
+    return tuple(show)
+
+
+def _gravity_direction(result: Result) -> tuple[float, float, float]:
+    g = np.asarray(result.values.system.gravity).real
+    size = float(np.sqrt(g @ g))
+    return float_triple(g / size if size > 0.0 else g)
+
+
+def _body_poses(result: Result, name: str, every: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Position and quaternion of a body's reference frame."""
+    view = result[name]
+    p = np.zeros((len(every), 3))
+    p[:, : 2 if result.planar else 3] = view.position[every]
+    if not result.planar:
+        return p, view.quaternion[every]
+    half = 0.5 * view.angle[every]
+    return p, np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
+
+
+def _symbols_and_lines(
+    result: Result, places: AttachedFrames, looks: BodyShapes, every: np.ndarray
+) -> Iterator[SymbolPart]:
+    """Symbols of joints and couplings; lines of springs, dampers, ropes and links."""
+    m = result.model
+    wheels: list[GearWheel] = []
+    for e in (*m.joints, *m.couplings):
+        for drawn in element_symbols(e, places, every, wheels):
+            worn = looks.fit_symbol(drawn) if isinstance(drawn, RecordedJoint) else drawn
+            if worn is not None:
+                yield worn
+    for e in m.forces:
+        if e.drawn == "bushing":
+            yield from (
+                replace(d, scale=1.0) for d in element_symbols(e, places, every, wheels) if isinstance(d, RecordedJoint)
+            )
+        elif (
+            found := _force_line(e, places, every) or coordinate_spring_line(e, places, every, looks.size)
+        ) is not None:
+            yield found
+
+
+def _force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLine | None:
+    """A force element along a line: a rope with its free length, a spring, or a damper where nothing is stiff."""
+    ends = rope_ends(places, e.name)
+    numbers = places.result.values.numbers[e.name]
+    if len(ends) > 1:
+        points = [places.track(end)[0] for end in ends]
+        return RecordedLine(e.name, "rope", tuple(p[every] for p in points), rest=_free_length(numbers, points)[every])
+    pair = places.ends(e)
+    if pair is None or e.drawn not in ("spring", "damper"):
+        return None
+    kind = "spring" if getattr(numbers, "stiffness", 0.0) != 0.0 else "damper"
+    return RecordedLine(e.name, kind, tuple(places.track(end)[0][every] for end in pair))
+
+
+def _free_length(numbers: Any, points: list[np.ndarray]) -> np.ndarray:
+    """Free length of a rope: as given, else as drawn, for which the first time has to serve."""
+    if getattr(numbers, "length", None) is not None:
+        return np.full(len(points[0]), float(numbers.length))
+    steps = [b[:1] - a[:1] for a, b in pairwise(points)]
+    return np.full(len(points[0]), sum(float(np.sqrt((d * d).sum())) for d in steps))
+
+
+def _recorded_frames(result: Result, places: AttachedFrames) -> Iterator[RecordedFrame]:
+    """Axes of joints, on their first body, and of named frames."""
+    for joint in result.model.joints:
+        F = places.end(joint.name, "F")
+        if F is not None:
+            turn = tuple(matrix_to_quaternion(F.R).tolist())
+            yield RecordedFrame(joint.name, "joint", F.body, float_triple(F.p), turn)
+    x = result.values
+    for e in result.model.frames:
+        p, R = x.poses.named(e.name)
+        body = x.bodies[e.body]
+        turn = tuple(matrix_to_quaternion((body.R.T @ R).real).tolist())
+        yield RecordedFrame(e.name, "frame", e.body, float_triple((body.R.T @ (p - body.p)).real), turn)
+
+
+def _recorded_path(result: Result, path: PathRequest) -> RecordedPath:
+    """A path as asked for: the origin of a body or frame, or a point of a body."""
+    m = result.model
+    if isinstance(path, str):
+        part = m[path]
+        if isinstance(part, Body):
+            return RecordedPath(path, path)
+        if isinstance(part, Frame) and part.body != GROUND:
+            x = result.values
+            body = x.bodies[part.body]
+            p, _ = x.poses.named(path)
+            return RecordedPath(path, part.body, float_triple((body.R.T @ (p - body.p)).real))
+        raise ModelError(f"paths: {part.title} has no path; name a body, a frame on a body, or a (body, point) pair")
+    if not (isinstance(path, (tuple, list)) and len(path) == 2 and isinstance(path[0], str)):
+        remedy = "name a body or frame, or give a pair such as ('rod', (0.1, 0.2))"
+        raise ModelError(f"paths: {path!r} is no path; {remedy}")
+    name, point = path
+    if not isinstance(m[name], Body):
+        raise ModelError(f"paths: {m[name].title} is no body, so it has no points; name it alone, or name a body")
+    p = vector(point, result.planar, f"path of {name!r}")
+    where = ", ".join(f"{c:g}" for c in p[: 2 if result.planar else 3])
+    return RecordedPath(f"{name} ({where})", name, float_triple(p))
+
+
+def _recorded_channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]:
+    """All curves of a small mechanism; of a big one energies, drivers, forces, joint coordinates, then bodies."""
+    if 8 * (len(result.model.bodies) + len(result.model.joints)) <= 400:
+        curves = result.channels()
+        curves = {k: c for k, c in curves.items() if np.isfinite(c[1]).any()}
+        names = list(curves) if len(curves) <= MAX_CURVES else _main_curves(list(curves), result)
+    else:
+        curves = {f"energy.{k}": c for k, c in result.energy.channels().items()}
+        for e in _parts_with_curves(result):
+            if len(curves) >= MAX_CURVES:
+                break
+            curves |= {
+                f"{e.name}.{k}": c
+                for k, c in result[e.name].channels().items()
+                if _is_main_curve(f"{e.name}.{k}", result)
+            }
+        names = list(curves)[:MAX_CURVES]
+    return tuple(Channel(k, curves[k][0], np.asarray(curves[k][1], float)[every]) for k in names)
+
+
+def _parts_with_curves(result: Result) -> list:
+    m = result.model
+    return [*m.sensors, *m.controllers, *m.drivers, *m.forces, *m.joints, *m.bodies]
+
+
+def _is_main_curve(name: str, result: Result) -> bool:
+    """Whether a curve says where something is, or what a driver, force or controller does: no rate, no reaction."""
+    owner, _, what = name.partition(".")
+    if owner == "energy" or result.model[owner].category in ("drivers", "forces", "sensors"):
+        return True
+    if isinstance(e := result.model[owner], Controller):
+        return what in (*e.compared, *e.output_names)
+    return what in ("x", "y", "z", "angle") or what in (getattr(result.model[owner], "coordinates", None) or ())
+
+
+def _main_curves(names: list[str], result: Result) -> list[str]:
+    """At most as many names as are shown, those that say most; in their order."""
+    rank = {k: (not _is_main_curve(k, result), i) for i, k in enumerate(names)}
+    chosen = set(sorted(names, key=rank.__getitem__)[:MAX_CURVES])
+    return [k for k in names if k in chosen]
+
+
+def initial_channels(result: Result, names: Collection[str]) -> tuple[str, ...]:
+    """The curves on show when a page opens.
+
+    What is measured; what a controller is to follow, what follows, and what it says; what a driver needs; a joint's
+    coordinate of each kind (else a position); energies.
+    """
+    m = result.model
+    measured = [f"{s.name}.value" for s in m.sensors][:2]
+    compared = {str(getattr(c, k)) for c in m.controllers[:1] for k in c.compared}  # shown beside one another
+    kinds: dict[str, str] = {}
+    for j in m.joints:
+        for k, c in j.coordinates.items():
+            if f"{j.name}.{k}" in set(names) - compared:
+                kinds.setdefault(c.unit, f"{j.name}.{k}")
+    told = [f"{c.name}.{k}" for c in m.controllers[:1] for k in c.compared]
+    told += [f"{c.name}.{c.output_names[0]}" for c in m.controllers][:2]
+    efforts = [f"{d.name}.effort" for d in m.drivers if f"{d.name}.effort" in names][:1]
+    first = [*measured, *told, *efforts, *kinds.values()] or [f"{b.name}.{k}" for b in m.bodies for k in ("x", "z")][:1]
+    energies = ("energy.kinetic", "energy.potential", "energy.total")
+    return (*(k for k in first if k in names), *(k for k in energies if k in names))
+
+
+def equilibrium_page(found: Equilibrium) -> str:
+    """The page's text."""
+    notes: dict[str, str] = {}
+    for label, text in found.lines():
+        notes[label] = f"{notes[label]}; {text}" if label in notes else text
+    return animation_page(replace(record_motion(found.result), notes=notes))

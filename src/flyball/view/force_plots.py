@@ -1,0 +1,161 @@
+"""Plots of contact forces, convergence of contact solves, efforts of drives and reactions over time.
+
+Components that redundancy leaves undetermined are named, not drawn.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ModelError
+from .figures import MAX_PANEL_CURVES, panels_by_unit
+from .plotting import LEGEND_BESIDE, PALETTE, finish_figure, new_figure, panels_over_time, plot_style, set_title
+from .recording import Channel, Panel
+
+if TYPE_CHECKING:
+    from ..results.contacts import Contacts, Convergence
+    from ..results.inverse_dynamics import InverseDynamics
+
+
+MAX_PAIRS = 8  # pairs that are drawn where none are named
+
+
+def plot_contacts(
+    contacts: Contacts, pairs: Sequence[Sequence[str]] = (), path: str | os.PathLike | None = None
+) -> Any:
+    """Draw normal and tangential contact forces over time.
+
+    Parameters
+    ----------
+    contacts : Contacts
+    pairs : pairs of names
+        Who and whom, as `Contacts.between` has them; if none are named, those of the largest forces, eight at most.
+    path : path, optional
+        Write a PNG, SVG or PDF file, by the suffix, instead of returning the figure.
+
+    Raises
+    ------
+    ModelError
+        If nothing touched and no pair is named, a name is unknown, or the file cannot be written.
+    """
+    if any(isinstance(p, str) or len(p) != 2 for p in pairs):
+        raise ModelError("contacts: name pairs of two names, such as plot(('ball', 'ground'), ('ball', 'wall'))")
+    chosen = [tuple(p) for p in pairs] or _largest_pairs(contacts)
+    if not chosen:
+        raise ModelError("nothing touched at any output time: there are no contact forces to draw")
+    found = [contacts.between(a, b) for a, b in chosen]
+    parts = [
+        Panel(label, tuple(Channel(f"{f.by}, {f.on}", "N", getattr(f, what)) for f in found))
+        for label, what in (("normal force", "normal_force"), ("tangential force", "tangential_force"))
+    ]
+    with plot_style():
+        drawing = panels_over_time(contacts.t, parts)
+        set_title(drawing, "contact forces")
+        return finish_figure(drawing, path)
+
+
+def _largest_pairs(contacts: Contacts) -> list[tuple[str, ...]]:
+    """The pairs with the largest normal forces, in their order."""
+    if not len(contacts):
+        return []
+    every, which = np.unique(contacts.pair, axis=0, return_inverse=True)
+    size = np.zeros(len(every))
+    np.maximum.at(size, which.ravel(), contacts.normal_force)
+    best = np.sort(np.argsort(-size)[:MAX_PAIRS])
+    return [(contacts.sides.name(a), contacts.sides.name(b)) for a, b in every[best].tolist()]
+
+
+def plot_convergence(histories: Sequence[Convergence], path: str | os.PathLike | None = None) -> Any:
+    """Draw residuals as velocities and as forces, in logarithmic scale; several solvers beside each other.
+
+    Raises
+    ------
+    ModelError
+        If they are over different things, or the file cannot be written.
+    """
+    over = {h.over for h in histories}
+    if len(over) != 1:
+        raise ModelError("convergence: give histories that are all over time, or all over iterations")
+    unit = "time [s]" if over == {"time"} else "iteration"
+    with plot_style():
+        drawing = new_figure(5.4)
+        axes = drawing.subplots(2, 1, sharex=True)
+        for ax, what, label in zip(axes, ("velocity", "force"), ("residual [m/s]", "residual force [-]"), strict=True):
+            for k, h in enumerate(histories):
+                values = np.where(np.asarray(getattr(h, what)) > 0.0, getattr(h, what), np.nan)
+                ax.semilogy(h.x, values, label=h.solver or "solves", color=PALETTE[k % len(PALETTE)])
+            ax.set_ylabel(label)
+            ax.legend(**LEGEND_BESIDE)
+        axes[-1].set_xlabel(unit)
+        set_title(drawing, "residuals of contact solves")
+        return finish_figure(drawing, path)
+
+
+ROUNDING_PART = 1e-9  # reactions below this part of the largest are rounding
+MAX_NAMED_JOINTS = 8
+NOTE_WIDTH = 120  # letters of a line
+
+
+def plot_efforts(found: InverseDynamics, path: str | os.PathLike | None = None) -> Any:
+    """Draw what drives do, and the components of reactions that the motion determines.
+
+    Parameters
+    ----------
+    found : InverseDynamics
+    path : path, optional
+        Write a PNG, SVG or PDF file, by the suffix, instead of returning the figure.
+
+    Returns
+    -------
+    Figure, or None where a file was written.
+
+    Raises
+    ------
+    ModelError
+        If there is nothing to draw, or the file cannot be written.
+    """
+    curves = found.channels()
+    drives = [Channel(f"{k}.effort", curves[k][0], curves[k][1]) for k in found.drives]
+    rest = {k: c for k, c in curves.items() if k not in found.drives}
+    parts = panels_by_unit(drives)
+    for unit, what in (("N", "reaction force"), ("N*m", "reaction torque")):
+        sizes = {k: np.nanmax(np.abs(v), initial=0.0) for k, (u, v) in rest.items() if u == unit}
+        least = ROUNDING_PART * _force_scale(found) * (1.0 if unit == "N" else found.result.values.length)
+        shown = [k for k, size in sizes.items() if size > least][: 2 * MAX_PANEL_CURVES]
+        if shown:
+            parts.append(Panel(what, tuple(Channel(k, unit, rest[k][1]) for k in shown)))
+    if not parts:
+        raise ModelError(
+            f"{found.result.model.name!r}: there is no drive, and the motion determines no reaction to draw"
+        )
+    with plot_style():
+        drawing = panels_over_time(found.result.t, parts)
+        if note := _undetermined_note(rest):
+            drawing.supxlabel(note, fontsize=8, x=0.012, ha="left")
+        set_title(drawing, f"{found.result.model.name}: inverse dynamics")
+        return finish_figure(drawing, path)
+
+
+def _undetermined_note(curves: dict[str, tuple[str, np.ndarray]]) -> str:
+    """What is undetermined, joint by joint."""
+    free: dict[str, list[str]] = {}
+    for name, (_, values) in curves.items():
+        if np.isnan(values).any():
+            joint, _, what = name.rpartition(".")
+            free.setdefault(joint, []).append(what)
+    if not free:
+        return ""
+    told = "; ".join(f"{joint} {', '.join(what)}" for joint, what in list(free.items())[:MAX_NAMED_JOINTS])
+    more = f"; and {len(free) - MAX_NAMED_JOINTS} more joints" if len(free) > MAX_NAMED_JOINTS else ""
+    return "\n".join(wrap(f"undetermined by redundancy, not drawn: {told}{more}", NOTE_WIDTH))
+
+
+def _force_scale(found: InverseDynamics) -> float:
+    """The largest force of a joint, which says what is no more than rounding."""
+    forces = (found.reaction(j.name).one[:, :3] for j in found.result.model.joints)
+    return max((float(np.abs(f).max(initial=0.0)) for f in forces), default=0.0)

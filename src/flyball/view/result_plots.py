@@ -1,0 +1,180 @@
+"""Plots of a result over time: the standard pictures, and panels of any named quantities with marks at events."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..model.body import GROUND
+from .event_marks import event_marks
+from .figures import centre, count_note, evenly_chosen, hidden_counts, moving_bodies, panels_by_unit, standard_figures
+from .motion_with_events import motion_with_event_states
+from .plotting import (
+    DASH_STYLES,
+    LEGEND_BESIDE,
+    PALETTE,
+    finish_figure,
+    new_figure,
+    panels_over_time,
+    plot_style,
+    set_title,
+)
+from .recording import Channel, Figure, Picture, PointPaths
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
+
+    from ..results.result import Result
+
+
+def write_pictures(pictures: Sequence[Picture], folder: Path) -> list[Path]:
+    """Write pictures into a folder that is there, as PNG files; returns their paths.
+
+    Raises
+    ------
+    ModelError
+        If a file cannot be written.
+    """
+    written = [folder / f"{p.name}.png" for p in pictures]
+    with plot_style():
+        for picture, path in zip(pictures, written, strict=True):
+            shown = picture.shown
+            drawing = _curves_figure(picture, shown) if isinstance(shown, Figure) else _paths_figure(shown)
+            set_title(drawing, picture.title)
+            finish_figure(drawing, path)
+    return written
+
+
+def _curves_figure(picture: Picture, figure: Figure) -> Drawing:
+    """A figure of curves over time; the balance of energies takes less room than they do."""
+    ratios = [*([1.6] if len(figure.panels) == 2 else [1.0] * (len(figure.panels) - 1)), 0.8]
+    drawing = panels_over_time(picture.t, figure.panels, ratios if figure.name == "energy" else [], picture.marks)
+    if figure.note:
+        drawing.supxlabel(figure.note, fontsize=8, x=0.012, ha="left")
+    return drawing
+
+
+def _paths_figure(paths: PointPaths) -> Drawing:
+    """Paths of points: in the plane, or from the front, the side and above."""
+    points, note = paths.points, paths.note
+    if paths.planar:
+        every = np.concatenate(list(points.values()))
+        finite = np.isfinite(every).all(axis=1)
+        extent = np.ptp(every[finite], axis=0) if finite.any() else every[0]
+        ratio = extent[1] / max(extent[0], 1e-12)
+        drawing = new_figure(1.0 + 6.0 * min(max(ratio, 0.3), 1.0))
+        ax = drawing.subplots()
+        _plot_paths(ax, points, "xy")
+        ax.set_title(note)
+        ax.legend(**LEGEND_BESIDE)
+        return drawing
+    drawing = new_figure(7.2)
+    axes = drawing.subplots(2, 2)
+    for ax, (seen, across) in zip(axes.flat, (("front", "xz"), ("side", "yz"), ("top", "xy")), strict=False):
+        _plot_paths(ax, points, across)
+        ax.set_title(seen)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    axes[1, 1].axis("off")
+    axes[1, 1].legend(handles, labels, loc="upper left", title=note, alignment="left")
+    return drawing
+
+
+def _plot_paths(ax: Axes, points: dict[str, np.ndarray], across: str) -> None:
+    """Paths seen along one axis, to scale; a path on top of another one is dashed."""
+    i, j = ("xyz".index(c) for c in across)
+    flat = [p[:, [i, j]].ravel() for p in points.values()]
+    for k, ((name, p), under) in enumerate(zip(points.items(), hidden_counts(flat), strict=True)):
+        color, style = PALETTE[k % len(PALETTE)], DASH_STYLES[max(under, k // len(PALETTE)) % len(DASH_STYLES)]
+        ax.plot(p[:, i], p[:, j], label=name, color=color, linestyle=style)
+        ax.plot(p[0, i], p[0, j], "o", color=color, markersize=4.5)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.08)
+    ax.set_xlabel(f"{across[0]} [m]")
+    ax.set_ylabel(f"{across[1]} [m]")
+
+
+PICTURE_ORDER = (
+    "energy",
+    "coordinates",
+    "positions",
+    "paths",
+    "contacts",
+    "reactions",
+    "actuation",
+    "sensors",
+    "controllers",
+)
+
+
+def standard_pictures(result: Result) -> list[Picture]:
+    """The pictures that tell most of a motion, of those that have something to show.
+
+    ``energy``, ``coordinates`` (of joints), ``positions`` (of spatial bodies over time), ``paths`` (of points, seen
+    in the plane or from three sides), ``contacts``, ``reactions``, ``actuation``, ``sensors`` and ``controllers``.
+    """
+    whole = motion_with_event_states(result)
+    found: dict[str, Figure | PointPaths] = {f.name: f for f in standard_figures(whole)}
+    if len(result.t):
+        found["paths"] = _mass_centre_paths(whole)
+    when, name = event_marks(result), result.model.name
+    return [Picture(k, f"{name}: {k}", whole.t, found[k], when) for k in PICTURE_ORDER if k in found]
+
+
+def _mass_centre_paths(result: Result) -> PointPaths:
+    """Paths of centres of mass and named frames."""
+    every = moving_bodies(result)
+    bodies = evenly_chosen(every)
+    points = {name: centre(result, name) for name in bodies}
+    for frame in result.model.frames if len(points) < 6 else ():
+        if frame.body != GROUND:
+            p = result[frame.name].position
+            points[frame.name] = np.column_stack([p, np.zeros((len(p), 3 - p.shape[1]))])
+    note = "; ".join(x for x in (count_note(len(bodies), len(every), "bodies"), "dots: start") if x)
+    return PointPaths(points, result.planar, note)
+
+
+def plot_curves(result: Result, *names: str, path: str | os.PathLike | None = None) -> Any:
+    """Plot curves over time; those of equal unit share an axis.
+
+    Parameters
+    ----------
+    result : Result
+    *names : str
+        Curves such as ``"slider.x"``, or parts such as ``"slider"`` for all their curves; the energies if none is
+        given.
+    path : path, optional
+        Write a PNG, SVG or PDF file, by the suffix, instead of returning the figure.
+
+    Returns
+    -------
+    Figure, or None where a file was written.
+
+    Raises
+    ------
+    ModelError
+        If there is no such curve or part, the suffix is of no known kind, or the file cannot be written.
+    """
+    whole = motion_with_event_states(result)
+    curves = {c.name: c for name in names or ("energy",) for c in _curves_of(whole, name)}
+    with plot_style():
+        drawing = panels_over_time(
+            whole.t, tuple(panels_by_unit(list(curves.values()), len(curves))), marks=event_marks(result)
+        )
+        set_title(drawing, result.model.name)
+        return finish_figure(drawing, path)
+
+
+def _curves_of(result: Result, name: str) -> list[Channel]:
+    if "." in name:
+        return [Channel(name, *result.channel(name))]
+    return [Channel(f"{name}.{k}", unit, values) for k, (unit, values) in result[name].channels().items()]
+
+
+def write_standard_plots(result: Result, folder: str | os.PathLike) -> list[Path]:
+    """Write the pictures that tell most of a motion into a folder that is there; returns their paths."""
+    return write_pictures(standard_pictures(result), Path(folder))
