@@ -291,11 +291,11 @@ from flyball.collision.narrow_phase.primitives import SCRATCH_ROWS
 from flyball.collision.shapes.height_field import height_field_rows
 from flyball.collision.tables import Movers
 from tests.contact.scenes import geometry
-rows, par = field(np.zeros((5, 5)), 1.0, 1.0)
+rows, par = height_field_rows(np.zeros((5, 5)), 1.0, 1.0)
 out = []
 for ground, at in (((PLANE, []), (0, 0, 0)), ((FIELD, par, rows), (-2.2, -2.3, 0))):
     pose = np.array([[*at, *np.eye(3).ravel()], [0, 0, 0.29, *np.eye(3).ravel()]])
-    G, room = geometry(ground, (12, [1.0, 0.7])), np.full((ROOM, 8), np.nan)
+    G, room = geometry(ground, (12, [1.0, 0.7])), np.full((SCRATCH_ROWS, 8), np.nan)
     count = collide(G, Movers(pose, np.zeros((2, 6))), 0, 1, 0.1, room)
     out.append(room[:count, :7].tolist())
 print(json.dumps(out))

@@ -79,7 +79,7 @@ def test_the_files_used_longest_ago_are_removed(tmp_path, monkeypatch):
 FACTOR = """
 import numpy as np
 from flyball.numerics.sparse_factorisation import analyse_ldl, ldl_factor_kernel
-P, _ = analyse(1, np.zeros(0, int), np.zeros(0, int))
+P, _ = analyse_ldl(1, np.zeros(0, int), np.zeros(0, int))
 L, D, Y = np.zeros(len(P.Li)), np.zeros(1), np.zeros(1)
 """
 
@@ -97,7 +97,7 @@ def small(package, tmp_path):
 
 def test_an_edited_formula_is_never_served_from_the_cache(small):
     """A formula in another file than the kernel's."""
-    script = FACTOR + "says = factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)\n"
+    script = FACTOR + "says = ldl_factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)\n"
     script += "print(json.dumps(cache_counts() | {'says': int(says), 'inverse': D[0]}))\n"
     first = small.run(script)
     assert (first["misses"], first["says"], first["inverse"]) == (1, 0, 0.25)
@@ -116,7 +116,7 @@ def test_damaged_cache_files_are_compiled_anew(small, damage):
     script = (
         FACTOR
         + """
-factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)
+ldl_factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)
 print(json.dumps(cache_counts() | {"inverse": D[0]}))
 """
     )
@@ -136,10 +136,9 @@ def test_a_folder_that_cannot_be_written_is_said(small):
         FACTOR
         + """
 import os, warnings
-from flyball.compiler import store
 with warnings.catch_warnings(record=True) as told:
     warnings.simplefilter("always")
-    factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)
+    ldl_factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)
 print(json.dumps(cache_counts() | {"inverse": D[0], "told": [str(w.message) for w in told]}))
 """
     )

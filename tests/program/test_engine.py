@@ -119,5 +119,5 @@ def test_a_kernel_with_its_structures_bound_to_it():
 def test_a_kernel_is_bound_to_structures_of_its_layout_only():
     _, S, W, R, clock, sheet = desk(fb.load("examples/slider_crank.toml"), "absolute")
     for other in (sheet._replace(rows=sheet.rows.astype(complex)), sheet._replace(rows=np.asfortranarray(sheet.rows))):
-        with pytest.raises(TypeError, match=r"Sheet\.rows: an array of float64 with 2 dimensions"):
+        with pytest.raises(TypeError, match=r"OutputBuffer\.rows: an array of float64 with 2 dimensions"):
             BoundKernel(engine, *map(StructBuffer, (S, W, R, clock, other)))

@@ -155,7 +155,7 @@ before = attributes()
 from flyball.compiler.object_code import compile_kernel
 from flyball.compiler.object_code import baseline
 from flyball.numerics.sparse_factorisation import ldl_factor_kernel
-object_code(factor_kernel, (baseline(),))
+compile_kernel(ldl_factor_kernel, (baseline(),))
 after = attributes()
 print(json.dumps([str(k) for k in before if before[k] != after.get(k)]))
 """
@@ -172,11 +172,11 @@ from flyball.compiler.object_code import baseline
 from flyball.compiler.object_code import compile_kernel
 from flyball.numerics.sparse_factorisation import analyse_ldl, ldl_factor_kernel
 if SHIP:
-    write(SHIPPED / file_name(factor_kernel, baseline()), object_code(factor_kernel, (baseline(),))[0])
-P, _ = analyse(1, np.zeros(0, int), np.zeros(0, int))
+    write_object(SHIPPED / file_name(ldl_factor_kernel, baseline()), compile_kernel(ldl_factor_kernel, (baseline(),))[0])
+P, _ = analyse_ldl(1, np.zeros(0, int), np.zeros(0, int))
 L, D, Y = np.zeros(len(P.Li)), np.zeros(1), np.zeros(1)
-factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)
-print(json.dumps({"origin": factor_kernel.origin, "inverse": D[0]}))
+ldl_factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)
+print(json.dumps({"origin": ldl_factor_kernel.origin, "inverse": D[0]}))
 """
     assert copy.run(script.replace("SHIP:", "True:")) == {"origin": "shipped", "inverse": 0.25}
     was, becomes = "return lambda x: not (x.real == 0.0 or x.real != x.real)", "return lambda x: x.real != x.real"

@@ -31,7 +31,7 @@ class Code:
 
 @dataclass
 class Maker:
-    """What `special` offers; ``price`` [ns] of code that is not there yet."""
+    """What `codegen` offers; ``price`` [ns] of code that is not there yet."""
 
     price_of_making: float = 1e9
     where: str = ""
@@ -68,7 +68,7 @@ class Maker:
 @pytest.fixture
 def maker(monkeypatch) -> Maker:
     found = Maker()
-    monkeypatch.setattr(solver_switching, "special", found)
+    monkeypatch.setattr(solver_switching, "codegen", found)
     monkeypatch.setattr(solver_switching, "SPENT", CostAccount())
     return found
 
@@ -98,7 +98,7 @@ def test_partitioning_has_no_made_code(maker):
 
 
 def test_not_wanted_is_not_looked_for(monkeypatch):
-    monkeypatch.setattr(solver_switching, "special", None)
+    monkeypatch.setattr(solver_switching, "codegen", None)
     assert four_bar().simulate(0.1, specialize=False).health.engine == "table-driven: asked for"
 
 

@@ -10,6 +10,7 @@ import pytest
 
 import flyball as fb
 from flyball.codegen import machine_code
+from flyball.compiler.object_code import object_code_of_text
 from flyball.expression_graph.graph import Graph
 from flyball.expression_graph.printers.llvm import Module, Procedure
 from flyball.math.scalar import choose
@@ -191,7 +192,7 @@ def test_a_branch_that_is_nan_is_a_value_like_any_other():
     stores = [(("b", k), f) for k, f in enumerate((choose(x, np.nan + 0.0 * x, x), choose(x, 2.0 * x, np.nan)))]
     module = Module(machine_code.ARGUMENTS, lambda base: [])
     module.add(Procedure("A", {x.index: ("a", 0)}, stores))
-    loaded = machine_code.LoadedProcedures(machine_code.object_code_of_text(str(module)), ["A"])
+    loaded = machine_code.LoadedProcedures(object_code_of_text(str(module)), ["A"])
     pointer, number = ctypes.c_void_p, ctypes.c_double
     call = ctypes.CFUNCTYPE(number, pointer, pointer, number, *[pointer] * 4)(loaded.addresses["A"])
     for value in (-1.0, 1.0):

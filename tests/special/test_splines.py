@@ -10,6 +10,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from flyball.codegen import machine_code
+from flyball.compiler.object_code import object_code_of_text
 from flyball.expression_graph.graph import Graph
 from flyball.expression_graph.printers.llvm import Module, Procedure
 from flyball.math.spline import pack_spline, spline
@@ -42,7 +43,7 @@ def text_of(data):
 
 def running(text):
     """The procedure as a Python function of two numbers."""
-    loaded = machine_code.LoadedProcedures(machine_code.object_code_of_text(text), ["A"])
+    loaded = machine_code.LoadedProcedures(object_code_of_text(text), ["A"])
     pointer, number = ctypes.c_void_p, ctypes.c_double
     kind = ctypes.CFUNCTYPE(number, pointer, pointer, number, pointer, pointer, pointer, pointer)
     call = kind(loaded.addresses["A"])

@@ -38,15 +38,14 @@ from ..math.scalar import choose
 from ..tables.structure_definition import Structure
 from ..tables.table_definitions import (
     ARTICULATED,
+    BEYOND_ROUNDING,
     BIAS,
     COUPLED,
     LAW_INPUT,
     LOAD,
-    LOAD_RESIDUAL,
-    LOAD_SIZE,
     LOADED,
     RATE,
-    ROW_SIZE,
+    ROW_RESIDUAL,
     SCHUR,
     TERMS,
     VALUE,
@@ -271,14 +270,14 @@ class SolveProcedures(ProcedureRecorder):
         x, lam = x.copy(), lam.copy()
         if S.sizes.solver == SCHUR:
             pass_schur(S, W, W.velocities.scratch_2, x, lam, self.semidefinite)
-            off, *sizes = remainder_schur(S, W, gamma, x, lam, W.velocities.scratch_2, self.semidefinite)
+            worst, *rows = remainder_schur(S, W, gamma, x, lam, W.velocities.scratch_2, self.semidefinite)
         else:
             is_loaded = self.graph.symbol("loaded")
             reads[is_loaded.index] = ("W_flat", LOADED)
             f = np.array([choose(is_loaded, y, 0.0) for y in f] or [0.0], object)[: self.nv]
-            off, *sizes = pass_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
-        places = [("W_flat", k) for k in (ROW_SIZE, LOAD_RESIDUAL, LOAD_SIZE)]
-        self.add("REFINE", reads, self.solution(x, lam) + list(zip(places, sizes, strict=True)), off)
+            worst, *rows = pass_coupled(S, W, f, gamma, x, lam, W.velocities.scratch_2, True)
+        places = [("W_flat", k) for k in (ROW_RESIDUAL, BEYOND_ROUNDING)]
+        self.add("REFINE", reads, self.solution(x, lam) + list(zip(places, rows, strict=True)), worst)
 
     def drifted(self) -> None:
         """What is missing of the velocities' constraints."""

@@ -15,7 +15,7 @@ W, t, a, b, c, d), four arrays among them, and returns a float:
     FACTOR, REUSE                               `factor`, 0 or 1 + the singular unknown; `reuse_factor`
     STEP           a: f, b: gamma, c: x, d: lam  begin of a solve; without rows all of it
     STEP_UNLOADED  the same with f = 0
-    REFINE         the same                     a pass; `remainder_coupled`: one returned, the others in W.flat
+    REFINE         the same                     a pass; returns and leaves in W.flat what `remainder_coupled` returns
     FINISH         a: state, b: derivative, c: x, d: lam  the derivative from the solution; 0, or it is not finite
     SHOW           a: q                         poses of frames that are needed only at ends of steps
     SAMPLED        no address: where those of the laws that `sample_law` evaluates begin in `System.flat`, in the

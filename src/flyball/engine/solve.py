@@ -21,13 +21,12 @@ from ..math.scalar import choose, larger, magnitude, minimum
 from ..math.vec import load9, mv
 from ..numerics.sparse_factorisation import ldl_factor, ldl_solve
 from ..tables.table_definitions import (
+    BEYOND_ROUNDING,
     COUPLED,
     FACTOR,
-    LOAD_RESIDUAL,
-    LOAD_SIZE,
     REFINE,
     REUSE,
-    ROW_SIZE,
+    ROW_RESIDUAL,
     SCHUR,
     STEP,
     STEP_UNLOADED,
@@ -202,17 +201,24 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
 def solve_generated(S, W, f, gamma, x, lam, loaded, refinements):
     """By code made for the mechanism: passes for what is left, until that passes or stops falling."""
     worst = call_generated(W.made[(STEP if loaded else STEP_UNLOADED)], S, W, 0.0, f, gamma, x, lam)
-    last = 1e300
-    wide = size = 1e-300
+    last = last_off = 1e300
     for _ in range(refinements + 1 if W.made[REFINE] != 0 else 0):
-        off = call_generated(W.made[REFINE], S, W, 0.0, f, gamma, x, lam)
-        wide = larger(wide, W.flat[ROW_SIZE].real)
-        size = larger(size, W.flat[LOAD_SIZE].real)
-        worst = larger(off / wide, W.flat[LOAD_RESIDUAL].real / size)
-        if not worst > W.options.solve_tolerance or worst > STALLED * last:
+        worst = call_generated(W.made[REFINE], S, W, 0.0, f, gamma, x, lam)
+        off, beyond = W.flat[ROW_RESIDUAL].real, W.flat[BEYOND_ROUNDING].real
+        if not worst > W.options.solve_tolerance or is_stalled(worst, last, off, last_off, beyond):
             break
-        last = worst
+        last, last_off = worst, off
     return worst
+
+
+@formula
+def is_stalled(worst, last, off, last_off, beyond):
+    """Whether another pass is of no use; arguments as `remainder_coupled` returns them, now and after the last pass.
+
+    Where all accelerations are zero but for what is left, as at rest, what is left relative to its terms does not fall
+    however near zero they come: there it is its size that has to fall.
+    """
+    return worst > STALLED * last and (not beyond > 0.0 or off > STALLED * last_off)
 
 
 @formula
@@ -229,16 +235,12 @@ def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
             W.rows.scratch_1[k] = gamma[k] - row_times(S, W, k, x)
     pass_schur(S, W, rhs, x, lam, semidefinite)
     worst = 0.0
-    last = 1e300
-    wide = size = 1e-300
+    last = last_off = 1e300
     for _ in range(refinements):
-        off, row_size, short, load_size = remainder_schur(S, W, gamma, x, lam, rhs, semidefinite)
-        wide = larger(wide, row_size)
-        size = larger(size, load_size)
-        worst = larger(off / wide, short / size)
-        if not worst > W.options.solve_tolerance or worst > STALLED * last:
+        worst, off, beyond = remainder_schur(S, W, gamma, x, lam, rhs, semidefinite)
+        if not worst > W.options.solve_tolerance or is_stalled(worst, last, off, last_off, beyond):
             break
-        last = worst
+        last, last_off = worst, off
         pass_schur(S, W, rhs, x, lam, semidefinite)
     return worst
 
@@ -274,20 +276,17 @@ def pass_schur(S, W, rhs, x, lam, loaded):
 def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
     """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving."""
     rhs = W.velocities.scratch_2
-    worst, last = 1.0, 1e300
-    wide = size = 1e-300
+    worst = 1.0
+    last = last_off = 1e300
     for d in range(x.shape[0]):
         rhs[d] = 0.0
     if loaded:
         remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded)
-    for attempt in range(refinements):
-        off, row_size, short, load_size = pass_coupled(S, W, f, gamma, x, lam, rhs, loaded)
-        wide = larger(wide, row_size)
-        size = larger(size, load_size)
-        worst = larger(off / wide, short / size)
-        if not worst > W.options.solve_tolerance or (attempt > 0 and worst > STALLED * last):
+    for _ in range(refinements):
+        worst, off, beyond = pass_coupled(S, W, f, gamma, x, lam, rhs, loaded)
+        if not worst > W.options.solve_tolerance or is_stalled(worst, last, off, last_off, beyond):
             break
-        last = worst
+        last, last_off = worst, off
     return worst
 
 
@@ -310,27 +309,26 @@ def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
 
 @formula
 def remainder_schur(S, W, gamma, x, lam, rhs, semidefinite):
-    """What a pass through S leaves of both lines, in the form of `remainder_coupled`."""
-    off, wide = row_residual(S, W, gamma, x, lam)
-    short, size = 0.0, 1e-300
+    """What a pass through S leaves of both lines; returns what `remainder_coupled` does."""
+    worst, off, beyond = row_residual(S, W, gamma, x, lam)
     if semidefinite:
-        short, size = excess_mass_residual(S, W.velocities.scratch_1, rhs, x)
-    return off, wide, short, size
+        worst = larger(worst, excess_mass_residual(S, W.velocities.scratch_1, rhs, x))
+    return worst, off, beyond
 
 
 @formula
 def beyond_rounding(W, k, residual, lam):
-    """Size of what is left of row k, less the rounding of what its multiplier does to it."""
+    """Size of what is left of row k, less the rounding of what its multiplier does to x = M^-1 (f + G^T lam) along it."""
     return magnitude(residual) - MULTIPLIER_ROUNDING * magnitude(W.rows.diagonal[k] * lam[k])
 
 
 @formula
 def row_residual(S, W, gamma, x, lam):
-    """R = gamma - G x into `W.rows.scratch_1`; returns its largest entry and the largest sum of its terms' sizes.
+    """R = gamma - G x into `W.rows.scratch_1`.
 
-    An entry counts by what it has beyond the rounding of x = M^-1 (f + G^T lam).
+    Returns its largest entry relative to its terms, that entry, and what it has beyond rounding.
     """
-    worst = 0.0
+    off = beyond = 0.0
     size = 1e-300
     for k in range(gamma.shape[0]):
         s = gamma[k]
@@ -340,17 +338,19 @@ def row_residual(S, W, gamma, x, lam):
             s -= p
             a += magnitude(p)
         W.rows.scratch_1[k] = s
-        worst = larger(worst, beyond_rounding(W, k, s, lam))
+        off = larger(off, magnitude(s))
+        beyond = larger(beyond, beyond_rounding(W, k, s, lam))
         size = larger(size, a)
-    return worst, size
+    return off / size, off, beyond
 
 
 @formula
 def remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded):
     """Both lines of the coupled equations: gamma - G x into `W.rows.scratch_1`, f - M x + G^T lam into rhs.
 
-    Returns the largest entry and the size of the terms, of the first line and of the second. What is left in the lines
-    of prescribed velocities is what their drivers have to do: it goes to `W.velocities.effort`.
+    Returns the largest entry of either relative to its terms, that of the first line, and what this has beyond
+    rounding. What is left in the lines of prescribed velocities is what their drivers have to do: it goes to
+    `W.velocities.effort`.
     """
     size = 1e-300
     for d in range(x.shape[0]):
@@ -364,7 +364,7 @@ def remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded):
         if i != j:
             rhs[j] -= W.M[e] * x[i]
     wide = 1e-300
-    off = 0.0
+    off = beyond = 0.0
     for k in range(lam.shape[0]):
         s = gamma[k]
         a = magnitude(s)
@@ -377,7 +377,8 @@ def remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded):
             s -= p
             a += magnitude(p)
         W.rows.scratch_1[k] = s
-        off = larger(off, beyond_rounding(W, k, s, lam))
+        off = larger(off, magnitude(s))
+        beyond = larger(beyond, beyond_rounding(W, k, s, lam))
         wide = larger(wide, a)
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:
@@ -387,12 +388,12 @@ def remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded):
     worst = 0.0
     for d in range(x.shape[0]):
         worst = larger(worst, magnitude(rhs[d]))
-    return off, wide, worst, size
+    return larger(worst / size, off / wide), off, beyond
 
 
 @formula
 def excess_mass_residual(S, dx, rhs, x):
-    """Rhs = E dx: what the regularised mass of the last step has to give back. Returns its size and that of M x."""
+    """Rhs = E dx: what the regularised mass of the last step has to give back. Returns its size relative to M x."""
     worst = 0.0
     size = 1e-300
     for b in range(S.tree.parent.shape[0]):
@@ -411,7 +412,7 @@ def excess_mass_residual(S, dx, rhs, x):
             rhs[v0 + i] = S.bodies.excess_mass[b] * dx[v0 + i]
             worst = larger(worst, magnitude(rhs[v0 + i]) * S.scales.length)
             size = larger(size, S.bodies.mass[b] * magnitude(x[v0 + i]) * S.scales.length)
-    return worst, size
+    return worst / size
 
 
 EXCHANGE_RATIO = 4.0  # a dependent coordinate that moves by more than this times an independent one takes its place

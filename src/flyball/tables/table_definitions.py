@@ -39,8 +39,8 @@ SCRATCH, PREPARE, PLACE, MOVE, LOADS, FACTOR, REUSE, STEP, STEP_UNLOADED, REFINE
     range(15)
 )
 # entries of Work.flat with a meaning of their own: size of the terms that `DRIFT` has met; whether the solve that goes
-# on is loaded; inputs of a law; the sizes and the remainder that `REFINE` has met beside the one that it returns
-TERMS, LOADED, LAW_INPUT, LAW_INPUT_RATE, ROW_SIZE, LOAD_RESIDUAL, LOAD_SIZE, FIRST_FREE = range(8)
+# on is loaded; inputs of a law; what `REFINE` leaves of the rows, and what this has beyond rounding
+TERMS, LOADED, LAW_INPUT, LAW_INPUT_RATE, ROW_RESIDUAL, BEYOND_ROUNDING, FIRST_FREE = range(7)
 
 # how the equations are solved: `System.solver`
 SCHUR, COUPLED, ARTICULATED = range(3)
