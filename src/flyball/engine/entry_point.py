@@ -219,13 +219,8 @@ def perform_task(S, W, R, clock, out, task):
         force_slopes(S, W, t, out)
         return 0
     if task == INTEGRATE:
-        callbacks = (
-            run_explicit_task,
-            (derivative, project_and_evaluate, project_error, inspect_step),
-            report_state,
-            no_segment_start,
-            finish_step,
-        )
+        calls = derivative, project_and_evaluate, project_error, inspect_step
+        callbacks = run_explicit_task, calls, report_state, no_segment_start, finish_step
         return advance(callbacks, S, W, R, clock, out)
     return 0
 
