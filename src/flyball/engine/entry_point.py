@@ -204,8 +204,7 @@ def perform_task(S, W, R, clock, out, task):
         residual(S, W, t, W.y[0], out[1], out[2], out[0])
         return 0
     if task == SOLVE:
-        nv = W.velocities.solved.shape[0]
-        nr = S.rows.law.shape[0]
+        nv, nr = W.velocities.solved.shape[0], S.rows.law.shape[0]
         solve_response(S, W, out[0, :nv], out[1, :nr], out[2, :nv], out[3, :nr])
         return 0
     if task == TANGENT:
