@@ -1,6 +1,6 @@
 """Derivatives of the equations of motion at a state, their reduction to independent coordinates, and eigenvalues.
 
-Statics, linear models, sensitivities and implicit integration stand on this package. It imports the engine, tables,
+Statics, linear models, sensitivities and implicit integration use this package. It imports the engine, tables,
 assembly, mobility and results. Derivatives are taken by complex steps through the compiled formulas, so a new element
-needs no entry here.
+type needs no code here.
 """
