@@ -415,9 +415,7 @@ def perturbed_states(x: MechanismState) -> Iterator[MechanismState]:
 
 COEFFICIENT_ROUNDING = 2e-14  # uncertainty of coefficients, relative to the largest term of the equation
 DIRECTION_ROUNDING = 1e-15  # the same, relative to the largest term of all equations of the same bodies
-SLOWEST_FRACTION = (
-    1e-3  # of the speed that the terms would give if nothing cancelled: that of the fastest motion at least
-)
+SLOWEST_FRACTION = 1e-3  # lower bound of the fastest rate, relative to the rate that the uncancelled terms would give
 
 
 class TermSizes(NamedTuple):
