@@ -3,7 +3,6 @@
 Closed contacts and active stops, ropes and friction are replaced by joints and constraints. For the end of a motion
 each switching element keeps the mode that it has at that time.
 """
-"""
 
 from __future__ import annotations
 
@@ -230,8 +229,9 @@ def _equilibrium_at(at: Assembly) -> Equilibrium:
     """Wrap an assembly in an `Equilibrium` of which only the position is used."""
     none: Any = None
     return Equilibrium(
-        t=at.t, stability=NOT_JUDGED, freedoms=(), stiffness=np.zeros((0, 0)), weakest={}, least=float("nan"), unbalanced=0.0,
-        method="", parameters=dict(at.compiled.parameters), result=none, assembly=at, speeds=motion_speed(at),
+        t=at.t, stability=NOT_JUDGED, freedoms=(), stiffness=np.zeros((0, 0)), weakest={}, least=float("nan"),
+        unbalanced=0.0, method="", parameters=dict(at.compiled.parameters), result=none, assembly=at,
+        speeds=motion_speed(at),
     )  # fmt: skip
 
 
