@@ -1,4 +1,4 @@
-"""Force elements: one file each, found by itself. A new force is a new file here, and a line below for editors."""
+"""Force elements: one file each, found automatically. A new force is a new file here, and a line below for editors."""
 
 import importlib
 import pkgutil
