@@ -212,8 +212,8 @@ class _Settling:
         who = max(speed, key=lambda k: speed[k])
         return NotConverged(
             f"{name!r} does not come to rest: after {SETTLING_STEPS * self.h:.3g} s {who!r} still moves at "
-            f"{speed[who]:.3g} m/s: it falls, slides or rolls away. Hold it by friction, a stop or a spring, or begin nearer to "
-            f"where it rests",
+            f"{speed[who]:.3g} m/s: it falls, slides or rolls away. Hold it by friction, a stop or a spring, "
+            f"or begin nearer to where it rests",
             speed,
         )
 

@@ -693,8 +693,8 @@ def _refuse_changing_states(other: AuxiliaryModel, x: MechanismState, off: np.nd
     name = [*rates][int(np.argmax(left))]
     raise AnalysisError(
         f"the controllers are not in equilibrium where the mechanism is: {rate_description(other, rates, name)}. Find "
-        f"an equilibrium first and linearise about it: about=m.equilibrium(); or ask about the end of a motion that has "
-        f"settled"
+        f"an equilibrium first and linearise about it: about=m.equilibrium(); or ask about the end of a motion that "
+        f"has settled"
     )
 
 
