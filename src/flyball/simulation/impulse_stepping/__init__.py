@@ -1,15 +1,9 @@
-"""Time stepping by impulses, for mechanisms with contact: all contacts and joints of a step in one cone problem.
+"""Impulse time stepping for mechanisms with contact: one cone problem per step for all contacts and joints.
 
-`impulse_motion` is the motion from the model to its result; `setup` makes the scene and the tables; `stepper`
-calls the compiled loop (`step_loop`). The formulas: `free_bodies`, `contact_constraints`, `compliant_contact`,
-`restitution`, and of the jointed mechanism `mechanism_step`, `mechanism_rows`, `implicit_springs`. Cone solvers
+`impulse_motion` simulates a model and builds its result; `setup` creates contact scene and tables; `stepper` calls the
+compiled loop (`step_loop`). The formulas are in `free_bodies`, `contact_constraints`, `compliant_contact` and
+`restitution`, and for the jointed mechanism in `mechanism_step`, `mechanism_rows` and `implicit_springs`. Cone solvers
 are in `numerics/complementarity/`, contact search is in `collision/`.
-
-Contacts that go on act along rows at the middle of the step and do no work; new ones along those of the start. Overlap
-and gaps are removed by displacements that are no velocities. Restitution is over before the step begins, in rounds of
-what touches. The mechanism is evaluated half a step on, at mean velocities, which makes it of second order; stiff
-springs join the masses by an operator of low rank. A step is taken as a whole or has changed nothing: a full table is
-enlarged and the step repeated.
 """
 
 from __future__ import annotations
