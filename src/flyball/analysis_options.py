@@ -1,7 +1,7 @@
-"""Options of analyses: frozen classes made by the methods of `Mechanism`, checked here.
+"""Options of analyses: frozen classes, created by the methods of `Mechanism`, whose values are checked here.
 
-An analysis declares the fields of its own class, one for each argument of its method. Defaults and meanings stand
-with the method alone (`flyball.mechanism_methods`); ``tests/program/test_options.py`` holds the two together.
+The options class of an analysis has one field for each argument of its method. Defaults and descriptions are given
+only at the method (`flyball.mechanism_methods`); ``tests/program/test_options.py`` checks that both agree.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ import numpy as np
 from .errors import ModelError
 from .model.expressions import number
 
-LARGEST = np.iinfo(np.int64).max  # whole number that compiled code counts to
+LARGEST = np.iinfo(np.int64).max  # largest integer that compiled code can count to
 TIMES = ("t", "t_start", "t_end")
 _LISTS = (list, tuple, np.ndarray)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """Options of an analysis. Times are numbers [s], lists of names are tuples, whatever they were given as."""
+    """Base class of the options of an analysis; times are converted to numbers [s], lists of names to tuples."""
 
     @classmethod
     def asked(cls, given: Mapping[str, Any]) -> Self:
-        """From the arguments of a method: its ``locals()``."""
+        """Create options from ``locals()`` of the method."""
         return cls(**{name: given[name] for name in names_of(cls)})
 
     def known(self, **values: Any) -> Self:
-        """The same with values that need no check."""
+        """Create options from values that need no check."""
         out = object.__new__(type(self))
         vars(out).update(vars(self))
         vars(out).update(values)
@@ -45,21 +45,21 @@ class Options:
 
 
 Check = Callable[[Any, str], Any]
-"""Takes what was given for an option, and its name; returns what it is from then on, or refuses it."""
+"""Check of an option: takes the given value and the option's name, returns the converted value or raises ModelError."""
 
 
 class _OptionSpec(NamedTuple):
-    """What a class of options asks."""
+    """Checks of the fields of an options class."""
 
     names: tuple[str, ...]
-    checks: tuple[tuple[str, Check], ...]  # of those of which more is asked than that they are there
+    checks: tuple[tuple[str, Check], ...]  # fields that need a check besides being present
 
 
 _OPTION_SPECS: dict[type, _OptionSpec] = {}
 
 
 def _option_spec(cls: type[Options]) -> _OptionSpec:
-    """The same for all of a class."""
+    """Return the checks of an options class (cached)."""
     if cls not in _OPTION_SPECS:
         every = fields(cls)
         checks = ((f.name, _check_of_field(f)) for f in every)
@@ -69,12 +69,12 @@ def _option_spec(cls: type[Options]) -> _OptionSpec:
 
 
 def names_of(cls: type[Options]) -> tuple[str, ...]:
-    """Names of the options of a class."""
+    """Return the names of the options of a class."""
     return _option_spec(cls).names
 
 
 def _check_of_field(f: Field[Any]) -> Check | None:
-    """What is asked of an option."""
+    """Return the check of a field."""
     kind = str(f.type)
     optional = "None" in kind
     if f.name in TIMES:
@@ -146,7 +146,7 @@ def _parameters(value: Any, _: str) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class AssembleOptions(Options):
-    """What `Mechanism.assemble` is asked."""
+    """Options of `Mechanism.assemble`."""
 
     t: float
     parameters: Mapping[str, float] | None
@@ -154,18 +154,18 @@ class AssembleOptions(Options):
 
 @dataclass(frozen=True, kw_only=True)
 class MobilityOptions(AssembleOptions):
-    """What `Mechanism.mobility` is asked."""
+    """Options of `Mechanism.mobility`."""
 
     inertia: bool
 
 
 def seconds(value: Any, name: str) -> float:
-    """A time from a number or a quantity such as ``"5 ms"``.
+    """Convert a number or a quantity such as ``"5 ms"`` to a time in seconds.
 
     Raises
     ------
     ModelError
-        If it is none.
+        If the value is not a time.
     """
     if type(value) is float and value - value == 0.0:
         return value
@@ -176,12 +176,12 @@ def seconds(value: Any, name: str) -> float:
 
 
 def name_list(value: Any, name: str) -> tuple[str, ...]:
-    """A sequence of names; a single text is refused, which Python would take letter by letter.
+    """Convert a sequence of names to a tuple; a single string is refused, since Python would iterate over its letters.
 
     Raises
     ------
     ModelError
-        If it is none.
+        If the value is not a sequence of names.
     """
     if not isinstance(value, (str, bytes)) and isinstance(value, (Sequence, Mapping, set)):
         found = tuple(value)
@@ -191,12 +191,12 @@ def name_list(value: Any, name: str) -> tuple[str, ...]:
 
 
 def number_array(value: Any, name: str) -> np.ndarray:
-    """A sequence of finite numbers as an array; which there must be, the analysis says.
+    """Convert a sequence of finite numbers to an array; the analysis itself checks its length.
 
     Raises
     ------
     ModelError
-        If it is none.
+        If the value is not a sequence of finite numbers.
     """
     try:
         found = np.array(np.nan) if np.iscomplexobj(value) else np.array(value, float)
@@ -208,12 +208,12 @@ def number_array(value: Any, name: str) -> np.ndarray:
 
 
 def require_positive(value: Any, name: str) -> None:
-    """Refuse what is no number greater than 0.
+    """Refuse a value that is not a number greater than 0.
 
     Raises
     ------
     ModelError
-        If it is none.
+        If it is not.
     """
     if type(value) is float and value > 0.0:
         return
@@ -223,12 +223,12 @@ def require_positive(value: Any, name: str) -> None:
 
 
 def require_count(value: Any, name: str, least: int = 1) -> None:
-    """Refuse what is no whole number of at least ``least``.
+    """Refuse a value that is not a whole number of at least ``least``.
 
     Raises
     ------
     ModelError
-        If it is none.
+        If it is not.
     """
     try:
         whole = operator.index(value)

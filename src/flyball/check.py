@@ -1,6 +1,6 @@
-"""Check of a description before any motion: freedoms, redundancy, assembly, warnings; and mass properties.
+"""Check of a description without simulation: degrees of freedom, redundancy, assembly, warnings; mass properties.
 
-Mass properties are those of every body as used, and of the mechanism as a whole where it starts.
+Mass properties are given for every body and for the whole mechanism in its initial position.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ from .tables.values import Values, values
 
 @dataclass(frozen=True, kw_only=True)
 class MassOptions(Options):
-    """What `Mechanism.mass_properties` is asked."""
+    """Options of `Mechanism.mass_properties`."""
 
     drawn: bool
     parameters: Mapping[str, float] | None
 
 
 def mass_properties(model: Model, o: MassOptions) -> MassReport:
-    """Mass properties of every body and of all together: see `Mechanism.mass_properties`."""
+    """Return the mass properties of every body and of the mechanism: see `Mechanism.mass_properties`."""
     if o.drawn:
         model = model.snapshot()
         x = values(structure(model), model.environment(o.parameters))
@@ -52,7 +52,7 @@ def mass_properties(model: Model, o: MassOptions) -> MassReport:
 
 
 def mass_report(model: Model, x: Values, q: np.ndarray) -> MassReport:
-    """The report for coordinates ``q``."""
+    """Return the mass report for coordinates ``q``."""
     still = np.zeros((1, x.structure.nv))
     records = RecordedMotion(x, q[None], still, still)
     bodies = {}
@@ -77,7 +77,7 @@ def mass_report(model: Model, x: Values, q: np.ndarray) -> MassReport:
 
 
 def _combined_mass(at: Carriers) -> tuple[float, np.ndarray, np.ndarray]:
-    """Mass, centre and inertia about it of many bodies as drawn, in the world."""
+    """Return mass, centre of mass and inertia about it of several bodies, in world axes."""
     p, R = at.movers.pose[:, :3], at.movers.pose[:, 3:].reshape(-1, 3, 3)
     mass = float(at.mass.sum())
     com = at.mass @ p / mass
@@ -98,18 +98,18 @@ def _mass_properties(
 
 
 def _gyration_radii(w: np.ndarray, mass: float) -> np.ndarray:
-    """Radii of gyration; none where there is no mass."""
+    """Return the radii of gyration; None if there is no mass."""
     return np.sqrt(np.maximum(w, 0.0) / mass) if mass > 0.0 else 0.0 * w
 
 
-SIZE_RATIO = 30.0  # a radius of gyration this many times the body's size, or this part of it, is worth a look
+SIZE_RATIO = 30.0  # a radius of gyration this many times larger or smaller than the body's size gives a warning
 TRIANGLE_SLACK = (
-    1e-3  # slack of the triangle inequality, as part of the largest moment, below which a body is all but flat
+    1e-3  # slack of the triangle inequality, relative to the largest moment, below which a body counts as almost flat
 )
 
 
 def check(model: Model) -> Report:
-    """Look a mechanism over without simulating it.
+    """Check a mechanism without simulating it.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def check(model: Model) -> Report:
     Raises
     ------
     ModelError
-        If the description is wrong: no bodies, or a body that can move without inertia.
+        If the description is wrong: no bodies, or a movable body without inertia.
     AssemblyError
         If no position or velocity fulfils all constraints.
     """
@@ -173,7 +173,7 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], m: Mobil
         example = "(0, -9.81)" if model.planar else "(0, 0, -9.81)"
         yield f"no gravity; if that is not meant, give gravity={example}"
     freedoms = m.freedoms
-    # a mechanism that is locked anyway makes its drivers redundant
+    # in a locked mechanism every driver is redundant
     if model.drivers and freedoms == 0 and m.redundancy and _locked(model):
         yield "no freedom is left even without the drivers: it is locked as it is drawn and will not move"
     elif model.drivers and freedoms == 0:
@@ -189,17 +189,17 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], m: Mobil
 
 
 def _locked(model: Model) -> bool:
-    """Whether nothing can move where drivers ask for nothing."""
+    """Return whether the mechanism cannot move when all drivers are at rest."""
     trial = model.copy()
     trial.drivers = []
     try:
         return mobility(trial, assemble(trial), inertia=False).freedoms == 0
-    except FlyballError:  # what drivers hold may have no inertia, or need them to be placed
+    except FlyballError:  # driven bodies may have no inertia, or may need the drivers for their position
         return False
 
 
 def _connected_bodies(model: Model) -> tuple[set[str], set[str]]:
-    """Bodies that some joint or driver holds, and bodies that some force acts on."""
+    """Return the bodies that a joint or driver constrains, and the bodies that a force acts on."""
     held, pushed = set(), set()
     for joint in model.joints:
         held |= {model.carrier(name, joint) for name in (joint.body_i, joint.body_j)}
@@ -215,7 +215,10 @@ def _connected_bodies(model: Model) -> tuple[set[str], set[str]]:
 
 
 def _inertia_warnings(x: Values, name: str, b: BodyReport) -> Iterator[str]:
-    """Inertia against the body's size: where joints, forces and shapes attach, how far from the centre of mass."""
+    """Return warnings on inertia that does not fit the body's size.
+
+    The size is the largest distance from the centre of mass to a point where joints, forces or shapes attach.
+    """
     k = x.structure.place[name]
     arms = x.system.frames.position[x.system.frame_body == k]
     size = float(np.sqrt((arms**2).sum(axis=1)).max(initial=0.0))
@@ -245,12 +248,12 @@ def _inertia_warnings(x: Values, name: str, b: BodyReport) -> Iterator[str]:
 
 
 def _has_inertia_of_shapes(x: Values, name: str) -> bool:
-    """Whether its inertia was computed from shapes, so that flatness is meant."""
+    """Return whether the body's inertia was computed from shapes; a flat body is then intended."""
     return x.numbers[name].inertia is None
 
 
 def _names_used(model: Model) -> set[str]:
-    """Every word in every text of the description: parameters that are used are among them."""
+    """Return every word in every string of the description; used parameters are among them."""
     import re
 
     from .model.element import written_fields
@@ -264,7 +267,7 @@ def _names_used(model: Model) -> set[str]:
 
 
 def _law_functions(model: Model) -> Iterator[Callable]:
-    """Python functions that are laws."""
+    """Return the Python functions that are used as laws."""
     for e in model.elements():
         for name in fields_with(e.__class__, LawOf):
             value = getattr(e, name)

@@ -1,10 +1,10 @@
-"""What elements of a user's own are made of: base classes, types of fields, and the mark of formulas.
+"""Base classes, field types and decorator for user-defined elements.
 
-A force is a class with `element` above it that derives from one of the base classes. Its formula is a static method:
+A force is a class decorated with `element` that derives from one of the base classes. Its formula is a static method:
 ``wrench(par, F, M, laws, values)`` of a `BodyForce`, `TwoPointForce` or `TwoFrameForce`, ``effort(par, x, rate, laws,
-load)`` of a `CoordinateForce` or `JointForce`. A joint derives from `Joint` and names its `blocks`: constraint rows of
+load)`` of a `CoordinateForce` or `JointForce`. A joint derives from `Joint` and lists its `blocks`: constraint rows of
 flyball, or a `ConstraintRow` with a formula ``row(par, F, M)``. A shape derives from `ConvexSolid` and has a support
-function ``support(par, d)``. `flyball.math.vec` and `flyball.math.scalar` hold the functions that formulas may use.
+function ``support(par, d)``. `flyball.math.vec` and `flyball.math.scalar` contain the functions that formulas may use.
 ``flyball.testing`` tests an element. `runge_kutta` defines a method of integration.
 """
 

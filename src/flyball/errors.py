@@ -1,4 +1,4 @@
-"""The errors a user can meet. Each message names the element, the value, the rule and a remedy."""
+"""Exceptions and warnings of flyball. Each message states the element, the value, the rule and a remedy."""
 
 from __future__ import annotations
 
@@ -14,40 +14,40 @@ PACKAGE = Path(__file__).parent
 HEAD_LENGTH, TAIL_LENGTH = (
     1200,
     500,
-)  # characters of a long message that are kept: where it is, and what the rule and the remedy are
+)  # characters kept of a long message: at its beginning (the place) and at its end (the rule and the remedy)
 _LONG_WORD = re.compile(r"\S{201,}")
 
 
 def shortened_message(message: str) -> str:
-    """A message whose longest words, and as a whole what is longest, are shortened in the middle.
+    """Shorten long words of a message, and then the whole message, in the middle.
 
-    Names, formulas and lists that a user wrote may have any length.
+    Names, formulas and lists written by the user may have any length.
     """
     text = _LONG_WORD.sub(lambda m: f"{m[0][:120]}...{m[0][-60:]}", message)
     return text if len(text) <= HEAD_LENGTH + TAIL_LENGTH else f"{text[:HEAD_LENGTH]} ... {text[-TAIL_LENGTH:]}"
 
 
 class FlyballError(Exception):
-    """Any error raised by flyball on purpose."""
+    """Base class of all errors that flyball raises on purpose."""
 
     def __init__(self, message: str = "") -> None:
         super().__init__(shortened_message(message))
 
 
 class ModelError(FlyballError, ValueError):
-    """The description of a mechanism is wrong."""
+    """The description of a mechanism is invalid."""
 
 
 class UnitError(ModelError):
-    """A quantity has a unit that does not exist or does not fit what is wanted."""
+    """A quantity has an unknown unit, or one of the wrong dimension."""
 
 
 class ExpressionError(ModelError):
-    """An expression cannot be read, or uses a name that is not known."""
+    """An expression cannot be parsed, or uses an unknown name."""
 
 
 def cannot_write(path: str | os.PathLike, error: OSError) -> ModelError:
-    """The error to raise where a file cannot be written."""
+    """Return the error to raise if a file cannot be written."""
     path = Path(path)
     if not path.parent.is_dir():
         why = f"there is no folder {os.fspath(path.parent)!r}; make it first, or write elsewhere"
@@ -59,7 +59,7 @@ def cannot_write(path: str | os.PathLike, error: OSError) -> ModelError:
 
 
 def warn_user(text: str, category: type[Warning]) -> None:
-    """Warn at the line outside flyball that asked."""
+    """Issue a warning at the line of the user's code that called flyball."""
     depth, frame = 1, sys._getframe(0)
     while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(PACKAGE):
         depth, frame = depth + 1, frame.f_back
@@ -67,12 +67,12 @@ def warn_user(text: str, category: type[Warning]) -> None:
 
 
 def import_optional(package: str, extra: str) -> Any:
-    """A package that not everybody has.
+    """Import an optional package.
 
     Raises
     ------
     ImportError
-        With what to install, if it is not there.
+        If it is not installed; the message says what to install.
     """
     try:
         return importlib.import_module(package)
@@ -81,17 +81,17 @@ def import_optional(package: str, extra: str) -> Any:
 
 
 class PerformanceNotice(UserWarning):
-    """Something works, but far slower than it could."""
+    """A calculation works, but far more slowly than possible."""
 
 
 class StartWarning(UserWarning):
-    """A velocity that was described is not the one that a motion starts with: the constraints do not allow it."""
+    """The initial velocity differs from the described one, because the constraints do not allow the latter."""
 
 
 class Interrupted(KeyboardInterrupt):
-    """The user interrupted an analysis. ``result`` holds what was computed up to then.
+    """The user interrupted an analysis. ``result`` contains what was computed up to then.
 
-    It is a ``KeyboardInterrupt``: scripts and loops end by it, as by any other.
+    It is a ``KeyboardInterrupt``: scripts and loops end by it as by any other.
     """
 
     def __init__(self, message: str, result: Any = None) -> None:
@@ -100,7 +100,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 class SingularOrientationError(FlyballError, ValueError):
-    """Coordinates of an orientation do not exist, or have no finite rates, where it was asked for them.
+    """Coordinates of an orientation do not exist, or have no finite rates, at this orientation.
 
     ``sequence`` names the Euler angles ("" for other coordinates), ``angle`` is the middle angle (of other coordinates
     the angle of the turn) and ``distance`` how far it is from the singular one, both in rad.
@@ -116,17 +116,17 @@ class SingularOrientationError(FlyballError, ValueError):
 
 
 class SingularOrientationWarning(UserWarning):
-    """Coordinates of an orientation are not determined by it, and a choice was made."""
+    """The coordinates of an orientation are not unique; one choice was made."""
 
 
 class AnalysisError(FlyballError):
-    """An analysis cannot be done or cannot go on."""
+    """An analysis is not possible or cannot continue."""
 
 
 class AssemblyError(AnalysisError):
-    """No position or velocity fulfils all constraints.
+    """No position or velocity satisfies all constraints.
 
-    ``gaps`` holds, for each element that disagrees, how far it is from closed; ``best`` the best position found.
+    ``gaps`` contains the constraint error of each inconsistent element; ``best`` is the best position found.
     """
 
     def __init__(self, message: str, gaps: dict | None = None, best: Any = None) -> None:
@@ -136,7 +136,7 @@ class AssemblyError(AnalysisError):
 
 
 class SimulationError(AnalysisError):
-    """An integration cannot go on. ``result`` holds what was computed up to then, ``t`` the time it stopped."""
+    """An integration cannot continue. ``t`` is the time it stopped, ``result`` what was computed up to then."""
 
     def __init__(self, message: str, result: object = None, t: float = float("nan")) -> None:
         super().__init__(message)
@@ -145,9 +145,9 @@ class SimulationError(AnalysisError):
 
 
 class MobilityError(AnalysisError):
-    """A mechanism has more or fewer freedoms than an analysis can do with.
+    """A mechanism has more or fewer degrees of freedom than an analysis requires.
 
-    ``free`` names bodies or joints that can still move, ``redundant`` elements that prescribe the same thing twice.
+    ``free`` names bodies or joints that can still move, ``redundant`` elements that prescribe the same motion twice.
     """
 
     def __init__(self, message: str, free: tuple[str, ...] = (), redundant: tuple[str, ...] = ()) -> None:
@@ -157,10 +157,10 @@ class MobilityError(AnalysisError):
 
 
 class SingularityError(AnalysisError):
-    """An analysis was asked for at, or has run into, a singular position.
+    """An analysis was started at, or has reached, a singular position.
 
-    ``where`` is the value of what was varied there (time [s] or a driver's coordinate), ``elements`` names those whose
-    constraints lose their independence, ``result`` holds what was computed up to there, if anything.
+    ``where`` is the value of the varied quantity there (time [s] or a driver's coordinate), ``elements`` names those
+    whose constraints become dependent, ``result`` contains what was computed up to there, if anything.
     """
 
     def __init__(
@@ -173,9 +173,9 @@ class SingularityError(AnalysisError):
 
 
 class NotConverged(AnalysisError):
-    """An iteration found no solution. ``residuals`` holds, for each body or element concerned, what is left.
+    """An iteration found no solution. ``residuals`` gives the remaining residual of each body or element concerned.
 
-    ``series`` holds what a series reached before.
+    ``series`` contains the part of a series that was computed before.
     """
 
     def __init__(self, message: str, residuals: dict | None = None, series: object = None) -> None:

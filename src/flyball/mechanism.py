@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 
 class Mechanism(MotionMethods, StaticsMethods, DesignMethods, MobilityMethods, SymbolicMethods, Model):
-    """A mechanism: described once, then asked anything. See `Model` for what it takes.
+    """A mechanism: one description, on which every analysis can be run. See `Model` for the elements it accepts.
 
-    Nothing that an analysis finds is stored in it, so sweeps are loops.
+    No analysis stores its results in it, so parameter sweeps are plain loops.
     """
 
     def save(self, path: str | os.PathLike) -> None:
@@ -48,7 +48,7 @@ for _family in (
     DesignMethods,
     MobilityMethods,
     SymbolicMethods,
-):  # so that Python's own messages name what the user called
+):  # so that Python's own messages show the name that the user called
     for _name, _method in list(vars(_family).items()):
         if not _name.startswith("_") and callable(_method):
             _method.__qualname__ = f"Mechanism.{_name}"
@@ -58,12 +58,12 @@ for _family in (
 def load(path: str | os.PathLike) -> Mechanism:
     """Read a mechanism from a model file: TOML as `Mechanism.save` writes it, or Python.
 
-    A file ``*.py`` is run, as the command runs it; it defines ``m``, ``mechanism`` or ``mechanism()``.
+    A file ``*.py`` is executed, as on the command line; it defines ``m``, ``mechanism`` or ``mechanism()``.
 
     Raises
     ------
     ModelError
-        If there is no such file or it describes no valid mechanism; the message names the file, the line and the
+        If there is no such file or it does not describe a valid mechanism; the message names the file, the line and the
         element.
     """
     try:
@@ -80,12 +80,12 @@ def load(path: str | os.PathLike) -> Mechanism:
 
 
 def load_result(path: str | os.PathLike) -> Result:
-    """Read a result from a NetCDF file, as `Result.save` writes it: nothing is simulated again, nothing compiled.
+    """Read a result from a NetCDF file, as `Result.save` writes it; nothing is simulated or compiled.
 
     Raises
     ------
     ModelError
-        If there is no such file, or it is no result of flyball.
+        If there is no such file, or it is not a result of flyball.
     """
     from .results.result_loading import read_result
 

@@ -1,12 +1,11 @@
-"""The methods of `flyball.Mechanism`: signature, defaults and meaning of every analysis, written once, here.
+"""The methods of `flyball.Mechanism`: the only place with signature, defaults and description of every analysis.
 
-Each hands its arguments over as one frozen object, which checks them; the analysis works with that object, and
-the subcommand of the same name is made from the signature and its docstring. Analyses are imported when they are
-called.
+Each method passes its arguments to the analysis as one frozen options object, which checks them. The subcommand of the
+same name is made from the method's signature and docstring. Analyses are imported when they are called.
 
-Methods run with BLAS on one thread: matrices of mechanisms are small, and threads of BLAS wait for one another
-longer than they work (on a shared machine a singular value decomposition of 400 x 400 takes sixty times as long
-on two).
+Methods run with BLAS on one thread: matrices of mechanisms are small, and BLAS threads would spend more time waiting
+for one another than computing (on a shared machine a singular value decomposition of 400 x 400 takes sixty times as
+long on two threads).
 """
 
 from __future__ import annotations
@@ -30,14 +29,15 @@ if TYPE_CHECKING:
     from .results.result import Result
     from .results.singularities import Branch, Singularities
 else:
-    Model = object  # a mechanism is one; signatures alone load nothing
+    Model = object  # a mixin of Mechanism; this import is for type checkers only
 
 
 def on_one_thread(method: Callable[..., Any], *, by_scipy: bool) -> Callable[..., Any]:
-    """The same with BLAS on one thread; ``by_scipy``: SciPy's will be needed, which is loaded first.
+    """Wrap a method so that it runs with BLAS on one thread; ``by_scipy``: it needs SciPy's BLAS, which is loaded
+    first.
 
-    How many threads BLAS has is a setting of the process, so it is changed by Python's main thread only, and set back
-    when the method ends.
+    The number of BLAS threads is a setting of the process. Only Python's main thread changes it, and restores it when
+    the method ends.
     """
 
     @wraps(method)
@@ -57,22 +57,22 @@ def on_one_thread(method: Callable[..., Any], *, by_scipy: bool) -> Callable[...
 
 @cache
 def _blas_libraries(with_scipy: bool) -> Any:
-    """What sets the threads of NumPy's library, and of SciPy's own, if that is loaded."""
+    """Return the thread controls of NumPy's BLAS, and of SciPy's own, if that is loaded."""
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController().select(user_api="blas")
 
 
 class MobilityMethods(Model):
-    """Positions, freedoms and masses of a mechanism."""
+    """Positions, degrees of freedom and masses of a mechanism."""
 
     def assemble(self, *, t: float | str = 0.0, parameters: Mapping[str, float | str] | None = None) -> Assembly:
-        """Find positions and velocities that fulfil all constraints, near those described.
+        """Find positions and velocities that satisfy all constraints, near those described.
 
         Parameters
         ----------
         t : float or str [s]
-            Time at which laws of drivers are taken.
+            Time at which the laws of drivers are evaluated.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
 
@@ -83,8 +83,8 @@ class MobilityMethods(Model):
         Raises
         ------
         AssemblyError
-            If no closed position, or no consistent velocity, is found; the message names the joints that disagree and
-            by how much.
+            If no closed position, or no consistent velocity, is found; the message names the joints that cannot be
+            closed and their gaps.
         """
         from .analysis_options import AssembleOptions
         from .assembly.assemble import assemble
@@ -93,7 +93,7 @@ class MobilityMethods(Model):
         return assemble(self, t=o.t, parameters=o.parameters)
 
     def check(self) -> Report:
-        """Freedoms, redundant joints, assembly, mass properties and warnings, without simulating.
+        """Report degrees of freedom, redundant joints, assembly, mass properties and warnings, without simulating.
 
         Returns
         -------
@@ -115,17 +115,17 @@ class MobilityMethods(Model):
         parameters: Mapping[str, float | str] | None = None,
         inertia: bool = False,
     ) -> Mobility:
-        """Freedoms by name, redundant constraints and their cures, special dimensions and singular positions.
+        """Degrees of freedom by name, redundant constraints and remedies, special dimensions and singular positions.
 
         Parameters
         ----------
         t : float or str [s]
-            Time at which the mechanism is assembled. One that cannot be is looked at in the best position found: the
-            constraints that contradict one another are those that depend on one another there.
+            Time at which the mechanism is assembled. If assembly fails, the best position found is analysed: the
+            contradicting constraints are those that are linearly dependent there.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         inertia : bool
-            Refuse bodies that can move without any inertia: where forces are to move them, they could not.
+            Refuse bodies that can move without any inertia: forces could not determine their acceleration.
 
         Returns
         -------
@@ -134,9 +134,9 @@ class MobilityMethods(Model):
         Raises
         ------
         ModelError
-            If a body can move without any inertia and may not.
+            If ``inertia`` is true and a body can move without any inertia.
         AssemblyError
-            If velocities disagree though positions do not depend on one another.
+            If velocity conditions contradict one another although the position constraints are independent.
         """
         from .analysis_options import MobilityOptions
         from .mobility.mobility import mobility
@@ -152,7 +152,7 @@ class MobilityMethods(Model):
         Parameters
         ----------
         drawn : bool
-            Where bodies are: as drawn, or (if false) after assembly at t = 0.
+            Positions of bodies: the reference configuration, or (if false) those assembled at t = 0.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
 
@@ -163,7 +163,7 @@ class MobilityMethods(Model):
         Raises
         ------
         AssemblyError
-            If it cannot be assembled; as drawn it can be looked at all the same.
+            If the mechanism cannot be assembled; the reference configuration needs no assembly.
         """
         from .check import MassOptions, mass_properties
 
@@ -182,27 +182,28 @@ class MobilityMethods(Model):
     ) -> Singularities:
         """Follow a driven motion and find every position where the driven Jacobian loses rank.
 
-        From the assembled position the curve of positions is followed by arc length, both ways, with the driver's law
-        replaced by a value of its coordinate, until that leaves the range or the curve closes. Where the driver locks
-        up the curve turns back, and is followed on the other side. Other drivers stay at what they ask for at ``t``.
+        The curve of positions is followed by arc length in both directions from the assembled position, until the
+        driver's coordinate leaves the range or the curve closes; the coordinate is varied freely in place of the
+        driver's law. Where the driver locks up, the curve turns back and is followed further. Other drivers keep their
+        values at ``t``.
 
         Parameters
         ----------
         driver : str
             Name of the driver whose coordinate is varied.
         range : (float or str, float or str)
-            From and to, of the driver's coordinate [rad] or [m], or with a unit: ``("0 deg", "360 deg")``.
+            First and last value of the driver's coordinate [rad] or [m], or with a unit: ``("0 deg", "360 deg")``.
         t : float or str [s]
-            Time at which laws are taken.
+            Time at which laws are evaluated.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         branch : Branch or int, optional
-            Start from the singular position that this branch was found at, along it; where the mechanism is drawn in a
-            singular position, the number of its branch to follow (the first if not told).
+            Start along this branch, from the singular position where it was found. If the reference configuration is
+            singular: the number of the branch to follow (the first if not given).
         step : float [1]
-            The longest step along the curve: radians, and lengths as parts of the mechanism's.
+            Longest step along the curve: radians, and lengths relative to the mechanism's length.
         steps : int
-            The most steps in each direction.
+            Largest number of steps in each direction.
 
         Returns
         -------
@@ -211,13 +212,13 @@ class MobilityMethods(Model):
         Raises
         ------
         ModelError
-            If there is no such driver, no such branch, the range is none, or constraints restrain velocities only.
+            If there is no such driver or branch, the range is invalid, or there are non-holonomic constraints.
         AssemblyError
             If the mechanism cannot be assembled as described.
         MobilityError
-            If freedoms are left besides the driver, or none is left to it.
+            If degrees of freedom remain besides the driver, or the driver has none to move.
         SingularityError
-            If the range is not reached, saying where the mechanism locks up.
+            If the range is not reached; the message says where the mechanism locks up.
         NotConverged
             If the curve cannot be followed.
         """
@@ -236,7 +237,7 @@ if TYPE_CHECKING:
     from .results.result import Result
     from .simulation.integration_options import Stepping
 else:
-    Model = object  # a mechanism is one; signatures alone load nothing
+    Model = object  # a mixin of Mechanism; this import is for type checkers only
 
 
 class MotionMethods(Model):
@@ -267,68 +268,69 @@ class MotionMethods(Model):
     ) -> Result:
         """Integrate the equations of motion.
 
-        Tolerances are of the error of a single step, and errors of steps add up. With the default ``rtol`` of 1e-7 the
-        error at the end is about 1e-6 of the motion or less (displacements and turns by their largest, speeds by the
-        fastest) for motions of some ten swings or turns: more than lengths and masses are ever known to. It grows with
-        the square of the time where a period is slightly off, and faster where the motion itself is sensitive to its
-        start (near singular positions, in chains that fly about, at ropes that go slack), which no tolerance changes.
-        Ten times the tolerance is ten times the error, and costs a quarter less.
+        Tolerances limit the error of a single step; the errors of steps accumulate. With the default ``rtol`` of 1e-7
+        the error at the end is about 1e-6 of the motion or less (relative to the largest displacement, rotation or
+        speed) for motions of some ten oscillations or revolutions: lengths and masses are never known more accurately.
+        It grows with the square of the time where a period is slightly wrong, and faster where the motion is sensitive
+        to its initial state (near singular positions, in free chains, in ropes that go slack); no tolerance changes
+        that. Ten times the tolerance gives ten times the error and costs a quarter less.
 
         Parameters
         ----------
         t_end : float or str [s]
             End of the motion, such as ``10`` or ``"500 ms"``.
         t_start : float or str [s], optional
-            Its start: 0 if not given; where ``start`` ended if that is.
+            Start of the motion. If not given: the end of ``start``, or 0 without ``start``.
         outputs : int or sequence of float [s]
             Number of evenly spaced output times, or the times themselves.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         start : Result, optional
-            Go on from where this result ended.
+            Continue from the end of this result.
         coordinates : {"auto", "absolute", "joint"}
-            Those of the equations; auto: those in which a right-hand side costs less. Results do not depend on it.
+            Coordinates of the equations; auto: those with the cheaper right-hand side. Results do not depend on it.
         method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "variational", "impulse"} or Stepping
             ``dop853``, ``rk45``: explicit Runge-Kutta pairs, of order 8 and 5, for smooth motions. ``radau``: implicit,
             Radau IIA of order 5, for stiff springs and strong damping. ``generalised-alpha``: implicit, of order 2, at
-            fixed steps (``step``), which damps what they do not resolve (``rho_inf``). ``variational``: symplectic, of
-            order 2, at fixed steps, for very long runs: energy and momenta do not drift. ``impulse``, or a `Stepping`
-            with choices of its own: steps of fixed length by impulses, for contact with friction. auto: ``dop853``,
-            which goes from touch to touch, and ``radau`` for as long as a long motion is stiff; steps by impulses
-            where bodies may touch at many places, or in ways that it does not know: ``health.method`` says which,
-            from when on, and why. Or the name of a Runge-Kutta method that `elements.runge_kutta` has defined.
+            fixed steps (``step``), with damping of unresolved frequencies (``rho_inf``). ``variational``: symplectic,
+            of order 2, at fixed steps, for very long runs: energy and momenta do not drift. ``impulse``, or a
+            `Stepping` with its own options: impulse time stepping with fixed steps, for contact with friction. auto:
+            ``dop853`` with event detection, and ``radau`` while a long motion is stiff; impulse time stepping if bodies
+            may touch at many points or in ways that event-driven integration does not support. ``health.method`` states
+            the method, from what time, and why. Or the name of a Runge-Kutta method defined by `elements.runge_kutta`.
         rtol : float [1]
             Tolerance of the error of a step relative to the state; 1e-13 at least, 0.1 at most.
         atol : float [m, rad, m/s, rad/s], optional
-            Tolerance of the error of a step where the state is small. If not given a hundredth of ``rtol``, and less
-            for mechanisms smaller than a metre: that times their length [m]; never less than rounding.
+            Tolerance of the error of a step where the state is small. If not given: ``rtol`` / 100, for mechanisms
+            smaller than a metre times their length [m]; never less than rounding.
         max_step : float or str [s]
-            Longest step. What a law does for less than a 20 000th of the time span can go unseen: give it there.
+            Longest step. Changes of a law that last less than 1/20 000 of the time span can be missed: then limit the
+            step.
         max_steps : int
-            Steps after which the integration gives up.
+            Number of steps after which the integration fails.
         stabilization : str
-            How states are kept on the constraints: ``projection`` (in every stage), ``projection-steps`` (after every
-            step), ``positions`` or ``velocities`` (only these), ``partitioning`` (dependent coordinates are solved
-            for), ``baumgarte``, or ``none``. `compare` shows what they do.
+            How constraint drift is removed: ``projection`` (in every stage), ``projection-steps`` (after every step),
+            ``positions`` or ``velocities`` (only these are projected), ``partitioning`` (dependent coordinates are
+            solved for), ``baumgarte``, or ``none``. `compare` shows their effects.
         alpha : float [1/s], optional
             First rate of Baumgarte's method, 10 if not given.
         beta : float [1/s], optional
             Second rate of Baumgarte's method, 10 if not given.
         specialize : bool or "auto"
-            True: by code that is made for this mechanism alone: three to five times as fast, after the seconds that it
-            takes to make it, once for all values of its parameters, and kept on disk. False: by the engine that serves
-            every mechanism. auto: whichever takes less time; what code is there already is used. Results agree within
-            the tolerance, and not to the last digit, with those of the other; ``health.engine`` says which it was.
+            True: use code generated for this mechanism. It is three to five times as fast; generation takes some
+            seconds, once for all parameter values, and the code is stored on disk. False: use the general engine. auto:
+            whichever takes less time; existing code is used. The results of both agree within the tolerance, not to the
+            last digit; ``health.engine`` says which was used.
         step : float or str [s], optional
-            Steps of this width, whose errors are then not looked at; one ends early at an event, the next begins there.
-            ``rtol`` is then how exactly the equations of a step are solved.
+            Fixed step, without error control; a step ends early at an event, and the next begins there. ``rtol`` is
+            then the tolerance of the solution of a step's equations.
         rho_inf : float [1], optional
-            Of ``generalised-alpha``: what is left of a swing after a step that is far too long for it, 0 to 1; 0.8 if
-            not given. 1 damps nothing.
+            Of ``generalised-alpha``: spectral radius at infinite frequency, 0 to 1 (the factor by which a step reduces
+            an oscillation much faster than the step); 0.8 if not given. 1: no damping.
         checkpoint : path, optional
-            Where the motion is kept while it is computed (a result file): after an interrupt or a crash, which cost a
-            minute of computing at most, the same call goes on from there, to the same digits. Where the motion is
-            there to its end, it is what is returned.
+            Result file to which the motion is saved while it is computed. After an interrupt or a crash (at most a
+            minute of computing is lost) the same call continues from there, with identical digits. If the file contains
+            the whole motion, that is returned.
         progress : bool or callable
             A bar on a terminal and in a notebook from two seconds on; a callable gets the fraction done some twenty
             times a second.
@@ -340,13 +342,13 @@ class MotionMethods(Model):
         Raises
         ------
         ModelError
-            If an option makes no sense, or has no effect beside the others.
+            If an option is invalid, or has no effect in combination with the others.
         AssemblyError
-            If the start cannot be made consistent.
+            If no consistent initial state is found.
         SimulationError
-            If the integration cannot go on; its ``result`` holds the motion up to then.
+            If the integration cannot continue; its ``result`` contains the motion up to then.
         Interrupted
-            If the user interrupts it; its ``result`` holds the motion up to then.
+            If the user interrupts it; its ``result`` contains the motion up to then.
         """
         from .simulation.checkpoints import CheckpointOptions, simulate_with_checkpoints
 
@@ -355,20 +357,20 @@ class MotionMethods(Model):
     def prepare(self, *, coordinates: str = "auto", parameters: Mapping[str, float | str] | None = None) -> Prepared:
         """The equations of motion as functions of plain arrays: mass matrix, accelerations, Jacobians, poses.
 
-        For loops of your own: controllers, estimators, planners. Analyses need it not: what is made ready for one call
-        serves the next, as long as the mechanism is the same.
+        For loops of your own: controllers, estimators, planners. Analyses do not need it: what one call prepares is
+        reused by the next, as long as the mechanism is unchanged.
 
         Parameters
         ----------
         coordinates : {"auto", "absolute", "joint"}
-            Those of the arrays; auto: those in which a right-hand side costs less.
+            Coordinates of the arrays; auto: those with the cheaper right-hand side.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
 
         Returns
         -------
         Prepared
-            It does not change, and threads may share it.
+            Immutable; threads may share it.
 
         Raises
         ------
@@ -402,33 +404,32 @@ class MotionMethods(Model):
         """Integrate the same motion by several formulations: drift, energy and cost of each.
 
         All start from the same consistent state, with the same integrator and the same tolerances, in absolute
-        coordinates unless their name says otherwise. Drivers are followed by integration here, also where they leave
-        no freedom. Where states are not projected they are reported as they are.
+        coordinates unless their name says otherwise. Driven motions are integrated as well, also where drivers leave no
+        degree of freedom. States that are not projected are reported with their drift.
 
         Parameters
         ----------
         t_end : float or str [s]
             End of the motion.
         t_start : float or str [s], optional
-            Its start: 0 if not given; where ``start`` ended if that is.
+            Start of the motion. If not given: the end of ``start``, or 0 without ``start``.
         outputs : int or sequence of float [s]
-            Number of times at which drift and energy are looked at, or the times themselves.
+            Number of times at which drift and energy are evaluated, or the times themselves.
         formulations : sequence of str, optional
             Names out of ``none``, ``baumgarte``, ``positions``, ``velocities``, ``projection-steps``, ``projection``,
-            ``partitioning``, ``coupled matrix`` and ``joint coordinates``; all of them by default. Besides methods that
-            hold motions to the constraints themselves: ``radau``, ``generalised-alpha``, ``radau index 3``,
+            ``partitioning``, ``coupled matrix`` and ``joint coordinates``; all of them by default. Also methods that
+            satisfy the constraints by themselves: ``radau``, ``generalised-alpha``, ``radau index 3``,
             ``generalised-alpha index 3``, ``variational``.
         repeats : int
-            Times that each is run for its cost, fewer where that takes long; 0 for none.
+            Number of runs for measuring the cost, fewer if they take long; 0 for none.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         start : Result, optional
-            Go on from where this result ended.
+            Continue from the end of this result.
         method : {"dop853", "rk45"}
             Explicit Runge-Kutta pair, of order 8 or 5.
         step : float or str [s], optional
-            Width of steps of ``radau``, which chooses it by itself if none is given, and of the other methods of that
-            kind, which have to be given one.
+            Step size of ``radau`` (chosen automatically if not given) and of the other such methods (required).
         rtol : float [1]
             Tolerance of the error of a step relative to the state.
         atol : float [m, rad, m/s, rad/s], optional
@@ -436,7 +437,7 @@ class MotionMethods(Model):
         max_step : float or str [s]
             Longest step.
         max_steps : int, optional
-            Steps after which a formulation is given up; twenty times those of the reference if not given.
+            Number of steps after which a formulation fails; twenty times those of the reference if not given.
         alpha : float [1/s], optional
             First rate of Baumgarte's method, 10 if not given.
         beta : float [1/s], optional
@@ -447,12 +448,12 @@ class MotionMethods(Model):
         Returns
         -------
         Comparison
-            A formulation that fails is in it too, with its message and the motion up to then.
+            Contains failed formulations too, with the message and the motion up to then.
 
         Raises
         ------
         AssemblyError, ModelError
-            If the start cannot be made consistent; for formulations or options that do not exist.
+            If no consistent initial state is found; for formulations or options that do not exist.
         """
         from .studies.formulation_comparison import CompareOptions, compare
 
@@ -469,7 +470,7 @@ class MotionMethods(Model):
         specialize: bool | str = "auto",
         progress: bool | Callable[[float], None] = True,
     ) -> Result:
-        """Positions, velocities and accelerations of a mechanism whose drivers leave no freedom.
+        """Positions, velocities and accelerations of a mechanism whose drivers leave no degree of freedom.
 
         Parameters
         ----------
@@ -478,12 +479,13 @@ class MotionMethods(Model):
         t_end : float or str [s], optional
             End of the motion; needed if ``times`` is a number.
         t_start : float or str [s], optional
-            When the mechanism is assembled as drawn; it is followed from there, so that it stays on its branch and
-            whole turns count. 0 if not given, or the first time where that is earlier.
+            Time at which the mechanism is assembled near the reference configuration. The motion is followed from
+            there, so that it stays on one branch and full turns are counted. If not given: 0, or the first time if
+            earlier.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         coordinates : {"auto", "absolute", "joint"}
-            Those of the equations; auto: those in which a right-hand side costs less.
+            Coordinates of the equations; auto: those with the cheaper right-hand side.
         specialize : bool or "auto"
             As for `simulate`.
         progress : bool or callable
@@ -496,15 +498,14 @@ class MotionMethods(Model):
         Raises
         ------
         MobilityError
-            If drivers leave a freedom (``free`` names it), or prescribe what is prescribed already (``redundant``
-            names the drivers).
+            If drivers leave a degree of freedom (``free`` names it), or are redundant (``redundant`` names them).
         SingularityError
-            If the mechanism locks, or begins where drivers do not decide its motion; ``where`` is the time,
-            ``elements`` those whose constraints lose their independence, ``result`` holds the motion up to there.
+            If the mechanism locks, or begins where drivers do not determine its motion; ``where`` is the time,
+            ``elements`` those whose constraints become dependent, ``result`` contains the motion up to there.
         AssemblyError
-            If no position fulfils all constraints at the start.
+            If no position satisfies all constraints at the start.
         SimulationError
-            If a law cannot be followed, for instance because it jumps; its ``result`` holds the motion up to there.
+            If a law cannot be followed, for instance because it jumps; its ``result`` contains the motion up to there.
         """
         from .kinematics.driven_motion import KinematicsOptions, kinematics
 
@@ -522,19 +523,18 @@ class MotionMethods(Model):
         specialize: bool | str = "auto",
         progress: bool | Callable[[float], None] = True,
     ) -> InverseDynamics:
-        """Forces and torques of drives, and reactions of all joints, for a given motion.
+        """Drive forces and torques, and reactions of all joints, for a given motion.
 
-        Drivers prescribe it, with ``motion`` if that is given. Forces act: motors too, so that a drive has to do what
-        they leave to be done.
+        The motion is prescribed by drivers and by ``motion``. Forces and motors act; a drive supplies the remainder.
 
         Parameters
         ----------
         times : int or sequence of float [s]
             Number of evenly spaced times from ``t_start`` to ``t_end``, or ascending times themselves.
         motion : mapping, optional
-            Coordinate (``"A.angle"``, ``"slider.x"``) or sensor of one -> how it moves [rad] or [m]: an expression such
-            as ``"0.3*sin(2*t)"``; samples at ``times``; or a pair (times of samples [s], samples). Through samples goes
-            a cubic spline, whose second derivative is continuous. Initial conditions then play no part.
+            Coordinate (``"A.angle"``, ``"slider.x"``) or its sensor -> its motion [rad] or [m]: an expression such as
+            ``"0.3*sin(2*t)"``; samples at ``times``; or a pair (times of samples [s], samples). Samples are
+            interpolated by a cubic spline with continuous second derivative. Initial conditions then have no effect.
         t_end : float or str [s], optional
             End of the motion; needed if ``times`` is a number.
         t_start : float or str [s], optional
@@ -542,7 +542,7 @@ class MotionMethods(Model):
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         coordinates : {"auto", "absolute", "joint"}
-            Those of the equations; auto: those in which a right-hand side costs less.
+            Coordinates of the equations; auto: those with the cheaper right-hand side.
         specialize : bool or "auto"
             As for `simulate`.
         progress : bool or callable
@@ -555,7 +555,7 @@ class MotionMethods(Model):
         Raises
         ------
         ModelError
-            If the motion names what does not exist or cannot be driven, or its samples make no curve.
+            If the motion names something that does not exist or cannot be driven, or its samples are invalid.
         MobilityError, SingularityError, AssemblyError, SimulationError
             As for `kinematics`.
         """
@@ -565,7 +565,7 @@ class MotionMethods(Model):
 
 
 class StaticsMethods(Model):
-    """Equilibria of a mechanism, and its small motions about them."""
+    """Equilibria of a mechanism, and small motions about them."""
 
     def equilibrium(
         self,
@@ -577,29 +577,30 @@ class StaticsMethods(Model):
         preload: Sequence[str] = (),
         turning: Sequence[str] = (),
     ) -> Equilibrium:
-        """Find a static equilibrium near the mechanism as drawn, or a steady motion, and whether it is stable.
+        """Find a static equilibrium near the reference configuration, or a steady motion, and whether it is stable.
 
-        Drivers hold their coordinates where they are at ``t``; velocities, dampers and inertia play no part at rest.
-        With contact it is let come to rest from where it is described; ``stable``, ``preload`` and ``turning`` mean
-        nothing then.
+        Drivers hold their coordinates at the values for ``t``; velocities, dampers and inertia have no effect at rest.
+        A mechanism with contact is simulated from the reference configuration until it is at rest; ``stable``,
+        ``preload`` and ``turning`` do not apply then.
 
         Parameters
         ----------
         t : float or str [s]
-            Time at which laws of forces and drivers are taken.
+            Time at which laws of forces and drivers are evaluated.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         start : Equilibrium or Result, optional
-            Guess in place of the drawn positions, and of controllers' initial states: an equilibrium of the same
-            mechanism, or a motion of it, whose end is taken. Described speeds stay; time is ``t``, not the motion's.
+            Initial guess in place of the reference configuration and of controllers' initial states: an equilibrium of
+            the same mechanism, or a motion, whose final state is used. Described speeds are kept; the time is ``t``,
+            not the motion's.
         stable : bool
-            Go on from an unstable equilibrium to a stable one. Not with ``preload`` or ``turning``.
+            Continue from an unstable equilibrium to a stable one. Not with ``preload`` or ``turning``.
         preload : sequence of str
-            Forces, by the names that `linearize` takes for inputs: find what has to be added to them for the mechanism
-            to be in equilibrium where it is drawn. Not with ``turning``.
+            Forces, by the names that `linearize` takes for inputs: find the force offsets that make the reference
+            configuration an equilibrium. Not with ``turning``.
         turning : sequence of str
-            Joints' coordinates that turn evenly while all others stand still, such as the spindle of a governor: a
-            steady motion is found. Speeds stay as described where nothing else decides them.
+            Joint coordinates that rotate at constant speed while all others are constant, such as the spindle of a
+            governor: a steady motion is found. Speeds are as described unless something else determines them.
 
         Returns
         -------
@@ -610,11 +611,11 @@ class StaticsMethods(Model):
         AssemblyError
             If the mechanism cannot be assembled.
         ModelError
-            If a name does not exist, or options say nothing beside each other.
+            If a name does not exist, or options cannot be combined.
         NotConverged
-            If none is found: the message says what is left unbalanced, ``residuals`` the force or torque by name.
+            If none is found: the message gives the largest residuals, ``residuals`` all forces or torques by name.
         SingularityError
-            If it is found where a force jumps, or has a kink whose sides leave its stability open.
+            If a force jumps there, or has a kink and its one-sided derivatives do not decide the stability.
         """
         from .statics.equilibrium import EquilibriumOptions, equilibrium
 
@@ -631,24 +632,25 @@ class StaticsMethods(Model):
         stable: bool = False,
         progress: bool | Callable[[float], None] = True,
     ) -> EquilibriumSeries:
-        """Follow an equilibrium over values of a parameter, each from the one before.
+        """Follow an equilibrium over values of a parameter, each starting from the one before.
 
-        Where the branch ends, the series goes on from where the forces then lead; such jumps are told.
+        Where the branch ends, the series continues at the equilibrium to which the forces then lead; jumps are
+        reported.
 
         Parameters
         ----------
         parameter : str
-            A parameter of the model, or ``"t"``: drivers and forces then change as their laws say.
+            A parameter of the model, or ``"t"``: drivers and forces then follow their laws.
         values : sequence of float
-            Its values in SI units, in the order in which they are gone through.
+            Its values in SI units, in the order of evaluation.
         t : float or str [s]
-            Time at which laws of forces and drivers are taken.
+            Time at which laws of forces and drivers are evaluated.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         start : Equilibrium or Result, optional
-            Guess for the first value, in place of the drawn positions; of a motion its end.
+            Initial guess for the first value, in place of the reference configuration; of a motion its final state.
         stable : bool
-            Leave a branch where it becomes unstable; else it is followed on. Not with controllers.
+            Leave a branch where it becomes unstable; otherwise it is followed further. Not with controllers.
         progress : bool or callable
             A bar on a terminal and in a notebook from two seconds on; a callable gets the fraction done.
 
@@ -659,7 +661,7 @@ class StaticsMethods(Model):
         Raises
         ------
         NotConverged
-            If no equilibrium can be found at a value, or none that is stable; ``series`` holds those before.
+            If no equilibrium can be found at a value, or none that is stable; ``series`` contains those before.
         ModelError
             If there is no such parameter, or a value is not finite.
         AssemblyError
@@ -682,29 +684,30 @@ class StaticsMethods(Model):
     ) -> LinearModel:
         """Linear equations about an equilibrium or a steady motion: x' = A x + B u, y = C x + D u.
 
-        Exact: the stiffness includes what reactions, inertia and gyroscopic terms do when positions change, constraints
-        are eliminated. About a motion that turns evenly the equations are those seen from the evenly turning frame in
-        which it is steady. Closed contacts stay closed: what sticks rolls where it is round, what is smooth slides.
+        The linearisation is exact: the stiffness includes the changes of reactions, inertia forces and gyroscopic terms
+        with position; constraints are eliminated. About a steady rotation the equations are those in the uniformly
+        rotating frame in which the motion is steady. Closed contacts stay closed: sticking round bodies roll,
+        frictionless ones slide.
 
         Parameters
         ----------
         inputs : sequence of str
-            Forces, torques and motors that have a law (``"push.x"`` where it has components): what is added to it;
-            drivers: what is added to their law; parameters.
+            Forces, torques and motors that have a law (``"push.x"`` for one of several components), and drivers: the
+            input is added to the law; parameters.
         outputs : sequence of str
-            Sensors, or curves of a result: ``"A.angle"``, ``"slider.vx"``, ``"A.fx"``, ``"energy.kinetic"``. Works and
-            the energy's balance count from the start of a motion on, and are refused.
+            Sensors, or curves of a result: ``"A.angle"``, ``"slider.vx"``, ``"A.fx"``, ``"energy.kinetic"``. Work and
+            the energy balance are refused, since they are counted from the start of a motion.
         about : Result or Equilibrium, optional
-            Where: the end of a motion, or an equilibrium; else as drawn and assembled at ``t``.
+            Operating point: the end of a motion, or an equilibrium; if not given: the mechanism assembled at ``t``.
         t : float or str [s], optional
-            Time, 0 if not given; ``about`` has its own.
+            Time, 0 if not given; not with ``about``, which has its own.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         coordinates : {"auto", "absolute", "joint"}
-            Those that the states are changes of. With more than 150 freedoms, or 600 velocities, at rest what is dense
-            is made when it is asked for, and `LinearModel.descriptor` is in absolute coordinates.
+            Coordinates whose deviations are the states. At rest, with more than 150 degrees of freedom or 600
+            velocities, dense matrices are computed on demand, and `LinearModel.descriptor` uses absolute coordinates.
         frozen : bool
-            The equations of this very instant, of a motion that need not be steady: their eigenvalues tell little.
+            Linearise at one instant of a motion that need not be steady: the eigenvalues then mean little.
 
         Returns
         -------
@@ -713,11 +716,11 @@ class StaticsMethods(Model):
         Raises
         ------
         AnalysisError
-            If the state is neither an equilibrium nor a steady motion, or an output follows the rate of an input.
+            If the state is neither an equilibrium nor a steady motion, or an output depends on the rate of an input.
         SingularityError
             At a singular position, or where a force has a kink or jumps.
         ModelError
-            If a name does not exist, something moves without inertia, or redundancy leaves an output undetermined.
+            If a name does not exist, a body can move without inertia, or redundancy leaves an output undetermined.
         """
         from .linear.linearize import LinearizeOptions, linearize
 
@@ -738,18 +741,18 @@ class StaticsMethods(Model):
         Parameters
         ----------
         about : Result or Equilibrium, optional
-            Where: the end of a motion, or an equilibrium; else as drawn and assembled at ``t``.
+            Operating point: the end of a motion, or an equilibrium; if not given: the mechanism assembled at ``t``.
         t : float or str [s], optional
-            Time, 0 if not given; ``about`` has its own.
+            Time, 0 if not given; not with ``about``, which has its own.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         coordinates : {"auto", "absolute", "joint"}
-            Those that the linear equations are made in; absolute ones with more than 600 velocities at rest,
-            or 150 freedoms where ``count`` is given and few of them.
+            Coordinates of the linear equations; absolute ones are used at rest with more than 600 velocities, or with
+            more than 150 degrees of freedom if ``count`` is given and small.
         count : int, optional
-            How many, slowest first; all, or of large mechanisms the ten slowest, if not given.
+            Number of modes, slowest first; if not given all, or the ten slowest of large mechanisms.
         frozen : bool
-            The modes of this very instant, of a motion that need not be steady: they tell little.
+            Modes at one instant of a motion that need not be steady: they then mean little.
 
         Returns
         -------
@@ -779,9 +782,9 @@ class StaticsMethods(Model):
     ) -> RootLocus:
         """Eigenvalues over values of a parameter, as branches, and where stability changes.
 
-        Between two values every change of where eigenvalues lie (in the left or right half plane, on an axis, at zero)
-        is bracketed and found to rounding; where branches meet, values are added. What leaves a half plane and comes
-        back between two values goes unseen, unless the branch heads for the axis: give more values.
+        Every change in the location of eigenvalues (left or right half plane, on an axis, at zero) between two values
+        is bracketed and found to rounding; values are added where branches meet. An eigenvalue that leaves a half plane
+        and returns between two values can be missed, unless its branch heads for the axis: give more values.
 
         Parameters
         ----------
@@ -790,17 +793,17 @@ class StaticsMethods(Model):
         values : sequence of float
             Its values in SI units.
         equilibrium : bool
-            About the equilibrium at each value, each following from the one before; else as drawn at each value.
+            Linearise about the equilibrium at each value, found from the one before; else about the assembled position.
         about : Result, optional
-            About the end of this motion at every value.
+            Linearise about the end of this motion at every value.
         t : float or str [s], optional
-            Time, 0 if not given; ``about`` has its own.
+            Time, 0 if not given; not with ``about``, which has its own.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         coordinates : {"auto", "absolute", "joint"}
-            Those that the linear equations are made in.
+            Coordinates of the linear equations.
         frozen : bool
-            The eigenvalues of this very instant, of a motion that need not be steady: they tell little.
+            Eigenvalues at one instant of a motion that need not be steady: they then mean little.
         progress : bool or callable
             A bar on a terminal and in a notebook from two seconds on; a callable gets the fraction done.
 
@@ -811,9 +814,9 @@ class StaticsMethods(Model):
         Raises
         ------
         NotConverged
-            If the mechanism cannot be linearised at a value; ``series`` holds what was found before.
+            If the mechanism cannot be linearised at a value; ``series`` contains what was found before.
         ModelError
-            If there is no such parameter, or ``about`` is an equilibrium, which is one of other values.
+            If there is no such parameter, or ``about`` is an equilibrium (it would not be one at other values).
         """
         from .linear.root_locus import RootLocusOptions, root_locus
 
@@ -830,11 +833,11 @@ if TYPE_CHECKING:
     from .results.study import Study
     from .simulation.integration_options import Stepping
 else:
-    Model = object  # a mechanism is one; signatures alone load nothing
+    Model = object  # a mixin of Mechanism; this import is for type checkers only
 
 
 class DesignMethods(Model):
-    """Derivatives by parameters, the best of them, and many runs."""
+    """Parameter derivatives, optimisation, and studies of many runs."""
 
     def sensitivity(
         self,
@@ -852,19 +855,20 @@ class DesignMethods(Model):
         coordinates: str = "auto",
         verify: bool = False,
     ) -> Sensitivity:
-        """Derivatives of kinematics, reactions, equilibria, eigenvalues or a motion by parameters.
+        """Derivatives of kinematics, reactions, equilibria, eigenvalues or a motion with respect to parameters.
 
-        Exact: complex steps through the formulas, along the change that the linearised equations prescribe. How the
-        matrix behind eigenvalues changes, and a start that assembly had to find, comes from differences of sixth order.
+        Derivatives are exact: complex steps through the formulas, along the change of state given by the linearised
+        equations. The derivative of the matrix whose eigenvalues are computed, and that of an assembled initial state,
+        use finite differences of sixth order.
 
         Parameters
         ----------
         of : sequence of str
-            Sensors, or curves of a result (``"slider.x"``). For ``"modes"`` none: all eigenvalues.
+            Sensors, or curves of a result (``"slider.x"``). None for ``"modes"``: all eigenvalues are taken.
         to : sequence of str
             Parameters; all of the model's if none is named.
         analysis : {"instant", "motion", "equilibrium", "modes"}
-            At ``t``; from ``t`` to ``t_end``; at the equilibrium; of the eigenvalues.
+            State at ``t``; motion from ``t`` to ``t_end``; equilibrium; eigenvalues.
         t : float or str [s]
             Time of an instant, start of a motion.
         t_end : float or str [s], optional
@@ -874,16 +878,16 @@ class DesignMethods(Model):
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         about : {"equilibrium"}, optional
-            For modes: about the static equilibrium; else where the mechanism is drawn.
+            For modes: about the static equilibrium; else about the assembled position.
         rtol : float [1], optional
             Tolerance of the error of a step of a motion relative to the state, 1e-9 if not given.
         atol : float [m, rad, m/s, rad/s], optional
-            Tolerance of the error of a step of a motion where the state is small, 1e-11 if not given. Both go for the
-            motion and for what a change of a parameter by the whole of it changes.
+            Tolerance of the error of a step of a motion where the state is small, 1e-11 if not given. Both tolerances
+            apply to the motion and to its change for a relative parameter change of 1.
         coordinates : {"auto", "absolute", "joint"}
-            In which a motion is computed, as for `simulate`.
+            Coordinates in which a motion is computed, as for `simulate`.
         verify : bool
-            Also by central differences of the whole analysis.
+            Also compute the derivatives by central differences of the whole analysis.
 
         Returns
         -------
@@ -895,7 +899,7 @@ class DesignMethods(Model):
             If a name does not exist, an option has no effect in this analysis, a reaction is left undetermined by
             redundancy, or a law jumps during a motion.
         SingularityError
-            If what is asked has no derivative there: at a kink of a force, for instance.
+            If the derivative does not exist there, for instance at a kink of a force.
         """
         from .sensitivity.sensitivity import SensitivityOptions, sensitivity
 
@@ -922,7 +926,7 @@ class DesignMethods(Model):
         tolerance: float = 1e-10,
         progress: bool | Callable[[float], None] = True,
     ) -> Optimum:
-        """Find parameters for which quantities come nearest to a target, or a function of them is smallest.
+        """Find parameters that bring quantities closest to a target, or minimise a function of them.
 
         Least squares by a trust region with the exact Jacobian (Branch, Coleman and Li 1999), minimisation by L-BFGS-B
         (Byrd et al. 1995), both SciPy's; derivatives as in `sensitivity`.
@@ -934,12 +938,12 @@ class DesignMethods(Model):
         to : sequence of str, or mapping of str to (lowest, highest)
             Parameters to be changed, with their bounds (None: none).
         target : array
-            What the quantities should be, in SI units or with units: one number each, or (times, quantities) of a
+            Target values of the quantities, in SI units or with units: one number each, or (times, quantities) of a
             motion. Eigenvalues [1/s] in any order, one of each complex pair.
         minimize : callable, in place of ``target``
-            A smooth function of the quantities (times, of) that is to be smallest.
+            A smooth function of the quantities (times, of) to be minimised.
         weights : float or array
-            Multiply the differences from the target.
+            Factors of the differences from the target.
         analysis : {"instant", "motion", "equilibrium", "modes"}
             As for `sensitivity`.
         t : float or str [s]
@@ -949,9 +953,9 @@ class DesignMethods(Model):
         outputs : int or sequence of float [s], optional
             Number of times of a motion, or the times themselves.
         parameters : mapping, optional
-            Values to begin with, in place of the model's.
+            Initial values, in place of the model's.
         about : {"equilibrium"}, optional
-            For modes: about the static equilibrium; else where the mechanism is drawn.
+            For modes: about the static equilibrium; else about the assembled position.
         rtol : float [1], optional
             As for `sensitivity`.
         atol : float [m, rad, m/s, rad/s], optional
@@ -959,11 +963,12 @@ class DesignMethods(Model):
         coordinates : {"auto", "absolute", "joint"}
             As for `sensitivity`.
         evaluations : int
-            Most analyses to be made.
+            Largest number of analyses.
         tolerance : float [1]
             Relative changes of cost and parameters below which the search ends.
         progress : bool or callable
-            A bar on a terminal and in a notebook from two seconds on; a callable gets the part of ``evaluations`` made.
+            A bar on a terminal and in a notebook from two seconds on; a callable gets the fraction of ``evaluations``
+            done.
 
         Returns
         -------
@@ -976,7 +981,7 @@ class DesignMethods(Model):
         AnalysisError
             If the mechanism cannot be analysed at the start.
         Interrupted
-            If the user interrupts it; its ``result`` is the best by then.
+            If the user interrupts it; its ``result`` is the best found by then.
         """
         from .sensitivity.optimization import OptimizeOptions, optimize
 
@@ -1015,53 +1020,53 @@ class DesignMethods(Model):
         threads: int | None = None,
         progress: bool | Callable[[float], None] = True,
     ) -> Study:
-        """Analyse at many values of parameters, on all cores: grids, samples, Monte Carlo, Sobol' indices.
+        """Run an analysis for many parameter values, on all cores: grids, samples, Monte Carlo, Sobol' indices.
 
-        Each run is to the last bit what the analysis by itself makes of it (``m.simulate(**study.question(k))``), and
-        doubtful where that is. One that fails is left out, and the study says why.
+        Each run is bit for bit equal to the single analysis (``m.simulate(**study.question(k))``), with the same
+        diagnostics. A failed run is left out, and the study gives the reason.
 
         Parameters
         ----------
         vary : mapping
-            Parameter -> its values (grid, list); or what samples of it are drawn from: (low, high), a distribution of
+            Parameter -> its values (grid, list); or the distribution to sample from: (low, high), a distribution of
             ``scipy.stats``, or ``"normal(mean, sd)"``, ``"uniform(low, high)"``, ``"loguniform(low, high)"``,
             ``"lognormal(median, sd of the logarithm)"``.
         of : sequence of str, or mapping of str to callable
             Curves of a result (``"slider.x"``), or one number of each: ``"end(slider.x)"``, ``max``, ``min``, ``mean``,
             ``rms``: of the curve at the output times, ``mean`` and ``rms`` over time by the trapezoidal rule, so that
-            it matters not how times are spread; where they are far apart for what the curve does, both are as rough.
-            Of an equilibrium also ``"least"`` (its least stiffness) and ``"stable"`` (1 or 0); of modes
-            ``"frequency[0]"``, ``"omega[0]"``, ``"damping_ratio[0]"``, slowest first, and ``"stable"``; of linear
-            models ``"gain(output, input)"``, with an angular frequency [rad/s] as third also ``phase``, and
-            ``"abscissa"``, the largest real part of an eigenvalue [1/s]; of sampled models ln(abs(z)) / period of the
-            largest multiplier z.
-            Or name -> function of a run's answer that returns a number.
+            the spacing of times does not matter; both are inaccurate if the times are too far apart. Of an equilibrium
+            also ``"least"`` (its lowest stiffness eigenvalue) and ``"stable"`` (1 or 0); of modes ``"frequency[0]"``,
+            ``"omega[0]"``, ``"damping_ratio[0]"``, slowest first, and ``"stable"``; of linear models ``"gain(output,
+            input)"``, with an angular frequency [rad/s] as third also ``phase``, and ``"abscissa"``, the largest real
+            part of an eigenvalue [1/s]; of sampled models ln(abs(z)) / period of the largest multiplier z. Or name ->
+            function of a run's result that returns a number.
         analysis : {"motion", "kinematics", "instant", "equilibrium", "modes", "linearize"} or callable
-            What each run is: `simulate`, `kinematics`, `assemble` with accelerations and reactions, `equilibrium`,
-            `modes`, `linearize`; or a function of the mechanism and the values of its parameters, of any other.
+            The analysis of each run: `simulate`, `kinematics`, `assemble` with accelerations and reactions,
+            `equilibrium`, `modes`, `linearize`; or a function of the mechanism and its parameter values for any other
+            analysis.
         t_end : float or str [s], optional
             End of motions and kinematics.
         t_start : float or str [s], optional
-            Their start: 0 if not given; where ``start`` ended if that is.
+            Their start. If not given: the end of ``start``, or 0 without ``start``.
         outputs : int or sequence of float [s], optional
-            Output times, as for `simulate`; if not given 501, or 17 where ends are all that is looked at.
+            Output times, as for `simulate`; if not given 501, or 17 if only final values are requested.
         t : float or str [s], optional
             Time of an instant, of an equilibrium or of small motions: 0 if not given.
         about : {"equilibrium"}, optional
-            Of modes and linear models: about the equilibrium; else where the mechanism is drawn.
+            For modes and linear models: about the equilibrium; else about the assembled position.
         design : {"grid", "list", "random", "latin", "sobol", "saltelli"}
-            ``grid``: all combinations of the values; ``list``: the first of all, the second of all, and so on.
-            ``random``: Monte Carlo; ``latin``: a Latin hypercube; ``sobol``: scrambled points of Sobol; ``saltelli``:
-            the runs that `Study.indices` needs.
+            ``grid``: all combinations of the values; ``list``: the first value of every parameter, the second of every
+            parameter, and so on. ``random``: Monte Carlo; ``latin``: a Latin hypercube; ``sobol``: scrambled points of
+            Sobol; ``saltelli``: the runs that `Study.indices` needs.
         samples : int, optional
-            How many are drawn; a power of two for ``sobol`` and ``saltelli``, which makes (parameters + 2) times as
+            Number of samples; a power of two for ``sobol`` and ``saltelli``. The latter makes (parameters + 2) times as
             many runs.
         seed : int, optional
-            Of the samples: 0 if not given, so that the same call draws the same.
+            Seed of the samples: 0 if not given, so that the same call gives the same samples.
         parameters : mapping, optional
             Values of other parameters in place of the model's, in SI units or with a unit.
         start : Result, optional
-            Every run goes on from where this result ended.
+            Every run continues from the end of this result.
         coordinates : {"auto", "absolute", "joint"}
             As for `simulate`.
         method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "variational", "impulse"} or Stepping
@@ -1087,14 +1092,14 @@ class DesignMethods(Model):
         specialize : bool or "auto"
             As for `simulate`; auto is decided once, for all runs together.
         file : path, optional
-            Where the study is kept while it runs (NetCDF, by `load_study` read back): the same call with the same file
-            goes on where it was interrupted or killed.
+            File to which the study is saved while it runs (NetCDF, read by `load_study`): the same call with the same
+            file continues where it was interrupted or killed.
         executor : concurrent.futures.Executor, optional
-            Who computes the runs, for instance processes or ``client.get_executor()`` of Dask; threads if not given.
+            Executor of the runs, for instance processes or ``client.get_executor()`` of Dask; threads if not given.
         threads : int, optional
-            How many; one for each core if not given.
+            Number of threads; one for each core if not given.
         progress : bool or callable
-            As for `simulate`: the part of the runs that are done.
+            As for `simulate`: the fraction of the runs done.
 
         Returns
         -------
@@ -1103,12 +1108,12 @@ class DesignMethods(Model):
         Raises
         ------
         ModelError
-            If a parameter, quantity, distribution or option does not exist or does nothing, the analysis does not know
-            something that the mechanism has, or the file is of another study.
+            If a parameter, quantity, distribution or option does not exist or has no effect, the analysis does not
+            support an element of the mechanism, or the file belongs to another study.
         AnalysisError
             If the executor fails.
         Interrupted
-            If the user interrupts it; its ``result`` is the study with what was computed.
+            If the user interrupts it; its ``result`` is the study with the runs computed so far.
         """
         from .studies.study import StudyOptions, study
 
@@ -1122,11 +1127,11 @@ if TYPE_CHECKING:
     from .symbolic.equations import Equations
     from .symbolic.export.code import Code
 else:
-    Model = object  # a mechanism is one; signatures alone load nothing
+    Model = object  # a mixin of Mechanism; this import is for type checkers only
 
 
 class SymbolicMethods(Model):
-    """Equations of a mechanism as expressions."""
+    """Symbolic equations of a mechanism, and code made of them."""
 
     def symbolic(
         self,
@@ -1138,20 +1143,20 @@ class SymbolicMethods(Model):
     ) -> Equations:
         """The equations of motion as expressions in the mechanism's own names: M, f, g, G, gamma, reactions, energies.
 
-        They are what the engine computes with, run on symbols: nothing is derived a second time. Whatever a result
-        has can be asked for: ``eq["slider.x"]``, ``eq["A.force"]``, ``eq["energy.kinetic"]``.
+        The engine's own formulas are evaluated on symbols: nothing is derived a second time. Every quantity of a result
+        is available: ``eq["slider.x"]``, ``eq["A.force"]``, ``eq["energy.kinetic"]``.
 
         Parameters
         ----------
         coordinates : {"auto", "absolute", "joint"}
-            Those of the equations; auto: those of the joints, wherever friction allows it.
+            Coordinates of the equations; auto: joint coordinates, unless friction requires absolute ones.
         inputs : sequence of str
-            As for `linearize`: what is added to laws of forces, motors and drivers, as symbols.
+            As for `linearize`: terms added to laws of forces, motors and drivers, as symbols.
         parameters : mapping, optional
-            Values of parameters in place of the model's, in SI units or with a unit. They are symbols all the same.
+            Values of parameters in place of the model's, in SI units or with a unit. They remain symbols.
         names : {"parameters", "all", "none"}
-            Which numbers are symbols: parameters; or every number of the description, called after its field:
-            ``"rod.mass"``; none: numbers stay numbers.
+            Numbers that become symbols: parameters; or every number of the description, named by its field:
+            ``"rod.mass"``; or none.
 
         Returns
         -------
@@ -1181,29 +1186,29 @@ class SymbolicMethods(Model):
     ) -> Code:
         """Write the equations of motion as code: C, Python that needs NumPy only, CasADi or Numba.
 
-        Functions are straight-line code of time, state, inputs and parameters, made from the formulas that the program
-        itself runs on. `Code` says in which order their arguments are.
+        Functions are straight-line code of time, state, inputs and parameters, made from the formulas that flyball
+        itself uses. `Code` gives the order of their arguments.
 
         Parameters
         ----------
         folder : str or Path, optional
-            Where the files are written; none are if it is left out.
+            Folder for the files; no files are written if not given.
         language : {"c", "python", "casadi", "numba"}
             C99 with a header, a Python module, functions of CasADi with a module that reads them, or a module of
             functions that Numba compiles.
         functions : sequence of str
-            Which of kinematics, velocities, T, M, f, g, nu, G, gamma, residual, right_hand_side, energies and, with
-            outputs, outputs; all of them if not given.
+            Functions to write, out of kinematics, velocities, T, M, f, g, nu, G, gamma, residual, right_hand_side,
+            energies and, with outputs, outputs; all of them if not given.
         outputs : sequence of str
-            Quantities of results by name that the function ``outputs`` gives, such as ``"slider.x"``, ``"A.force_x"``.
+            Names of result quantities that the function ``outputs`` returns, such as ``"slider.x"``, ``"A.force_x"``.
         inputs : sequence of str
-            As for `linearize`: what is added to laws of forces, motors and drivers, as the argument ``u``.
+            As for `linearize`: terms added to laws of forces, motors and drivers; the argument ``u``.
         coordinates : {"auto", "absolute", "joint"}
-            Those of the equations, as for `symbolic`.
+            Coordinates of the equations, as for `symbolic`.
         parameters : mapping, optional
-            Values of parameters in place of the model's, in SI units or with a unit. They are arguments all the same.
+            Values of parameters in place of the model's, in SI units or with a unit. They remain arguments.
         name : str
-            What files are called and names in C begin with; the mechanism's if not given.
+            Name of the files and prefix of names in C; the mechanism's name if not given.
 
         Returns
         -------
@@ -1217,7 +1222,7 @@ class SymbolicMethods(Model):
         AssemblyError
             If the mechanism cannot be assembled.
         ImportError
-            If CasADi is asked for and not there.
+            If CasADi is required and not installed.
         """
         from .symbolic.export.export import ExportOptions, export
 

@@ -8,22 +8,22 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Protocol
 
-AFTER = 2.0  # seconds before there is a bar
-EVERY = 0.1  # seconds between two states of it
+AFTER = 2.0  # delay before a bar is shown [s]
+EVERY = 0.1  # interval between two updates of the bar [s]
 
 
 class ReportProgress(Protocol):
-    """Takes the fraction done, and what else there is to say."""
+    """Callback that takes the completed fraction and an optional note."""
 
     def __call__(self, fraction: float, note: str = "") -> None:
-        """Tell."""
+        """Report progress."""
 
 
 def progress_bar(wish: bool | Callable[[float], None], what: str) -> AbstractContextManager[ReportProgress]:
-    """What an analysis tells how far it is: ``wish`` is a function, or whether there may be a bar.
+    """Context manager that yields a progress callback; ``wish`` is such a function, or whether a bar may be shown.
 
-    Nothing is written but to a terminal or a notebook. The bar has no thread of its own and is gone when the analysis
-    ends, also by an error or an interrupt.
+    Output is only written to a terminal or a notebook. The bar has no thread of its own and is removed when the
+    analysis ends, also by an error or an interrupt.
     """
     if callable(wish):
         return nullcontext(lambda fraction, note="": wish(fraction))
@@ -31,11 +31,11 @@ def progress_bar(wish: bool | Callable[[float], None], what: str) -> AbstractCon
 
 
 def no_progress(fraction: float, note: str = "") -> None:
-    """Nobody looks."""
+    """Discard progress reports."""
 
 
 def _bar_type() -> Callable[[str], Any] | None:
-    """What makes a bar where somebody sees it, or None."""
+    """Return the type of bar for the current output, or None if there is no terminal or notebook."""
     ask = getattr(sys.modules.get("IPython"), "get_ipython", None)
     if ask is not None and getattr(ask(), "kernel", None) is not None:
         return _NotebookBar
@@ -43,7 +43,7 @@ def _bar_type() -> Callable[[str], Any] | None:
 
 
 class _DelayedBar:
-    """A bar that comes late and is drawn seldom; only then it is asked whether somebody sees it."""
+    """A bar that appears after a delay and is updated rarely; only then the type of output is determined."""
 
     def __init__(self, what: str) -> None:
         self.what, self.drawn, self.unseen = what, None, False
@@ -69,7 +69,7 @@ class _DelayedBar:
 
 
 class _Terminal:
-    """A line of a terminal, by rich; refreshed by hand, so that no thread runs beside compiled code."""
+    """A line on a terminal, drawn by rich; refreshed explicitly, so that no thread runs beside compiled code."""
 
     def __init__(self, what: str) -> None:
         from rich.console import Console
@@ -91,7 +91,7 @@ class _Terminal:
 
 
 class _NotebookBar:
-    """A bar below the cell of a notebook; it needs no widgets."""
+    """A bar below the notebook cell; it needs no widgets."""
 
     def __init__(self, what: str) -> None:
         from IPython import display

@@ -1,7 +1,7 @@
-"""Assembly: positions that close all loops and velocities that fulfil all constraints, near those described.
+"""Assembly: positions that close all loops and velocities that satisfy all constraints, near those described.
 
-`assemble` is the entry; it adds an explanation where no velocities exist. `assembled_state` finds the state,
-`positions_and_velocities` holds the numerical methods. Imports the model, tables, engine and numerics; of the
-questions only `mobility`, which names what is free in an explanation. Motion, statics and the other analyses
-begin with an `Assembly`.
+`assemble` is the entry point; it adds an explanation where no velocities exist. `assembled_state` finds the state,
+`positions_and_velocities` contains the numerical methods. This package imports the model, tables, engine and numerics;
+of the analyses only `mobility`, which names free motions in an explanation. Simulation, statics and the other analyses
+start from an `Assembly`.
 """

@@ -1,12 +1,12 @@
-"""`assemble`: positions and velocities that fulfil every constraint, or an explanation of the contradiction.
+"""`assemble`: positions and velocities that satisfy every constraint, or an explanation of the contradiction.
 
-Positions by damped Gauss-Newton with steps of least weighted size, first on residuals that are true angles (they
-lead from far away, and never to an antiparallel joint), then on the constraint rows. Velocities as described
-where the constraints allow it; what is not described is free.
+Positions are found by damped Gauss-Newton with steps of least weighted size: first with residuals that are true angles
+(they converge from far away, and never to an antiparallel joint), then with the constraint rows. Velocities are as
+described where the constraints allow it; velocities not described are free.
 
-Why constraints contradict one another: drivers and initial rates prescribe, joints only hold. Where the
-constraints depend on one another and their right-hand sides do not, several prescribe the same freedom, or
-nothing is free, or the free motion does not move the prescribed coordinate: nowhere, or not in this position.
+Explanation of contradictory velocities: drivers and initial rates prescribe motion, joints only restrain it. Where
+constraints are dependent and their right-hand sides are inconsistent, either several prescribe the same freedom, or
+there is no freedom, or the free motion does not move the prescribed coordinate (in any position, or in this one).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | 
     Returns
     -------
     Assembly
-        ``departures`` says what of the description it does not have.
+        ``departures`` lists the deviations from the description.
 
     Raises
     ------

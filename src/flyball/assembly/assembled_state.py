@@ -1,6 +1,6 @@
 """The assembled state: consistent positions and velocities near those described, or why there is none.
 
-The error lists the elements whose constraints cannot be fulfilled together, and by how much.
+The error lists the elements whose constraints cannot be satisfied together, and the residuals.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from .positions_and_velocities import (
     velocity_departures,
 )
 
-ROW_PARTS = ("value", "force on M", "torque on M", "torque on F", "bias")  # that a row's formula returns
+ROW_PARTS = ("value", "force on M", "torque on M", "torque on F", "bias")  # the results of a row's formula
 MAX_LISTED = 8  # elements that a message names
-NEGLIGIBLE_GAP = 1e-9  # part of the mechanism's length, or radians, below which a gap is none
+NEGLIGIBLE_GAP = 1e-9  # negligible gap, relative to the mechanism's length, or [rad]
 
 
 def position_error(c: CompiledMechanism, best: Any) -> AssemblyError:
-    """The error that says which elements cannot be fulfilled together, worst first; ``best`` is the nearest start."""
+    """Return the error that names elements with inconsistent constraints, worst first; ``best`` is the nearest state."""
     t = best.t
     c.at(t, best.q, best.v)
     g = c.work.rows.value
@@ -73,7 +73,9 @@ def position_error(c: CompiledMechanism, best: Any) -> AssemblyError:
 
 
 def undefined_row(c: CompiledMechanism) -> str:
-    """The constraint row of a user's own that is not finite at the kinematics in the scratch; else nothing."""
+    """Return a message on a user-defined constraint row that is not finite at the present kinematics; empty if there is
+    none.
+    """
     s, S, W = c.structure, c.values.system, c.work
     for k, t in enumerate(s.terms):
         if s.term_code[k] is None:
@@ -99,7 +101,9 @@ def _gap_text(metres: float, radians: float, length: float) -> str:
 
 
 def undefined_rate_error(c: CompiledMechanism, t: float) -> AssemblyError | None:
-    """The error for a driver's law that has no finite rate at t; rows are those last evaluated."""
+    """Return the error for a driver's law without finite rate at t, by the rows last evaluated; None if there is
+    none.
+    """
     for r, x in zip(c.structure.rows, c.work.rows.nu, strict=True):
         if not np.isfinite(x):
             return AssemblyError(
@@ -110,7 +114,9 @@ def undefined_rate_error(c: CompiledMechanism, t: float) -> AssemblyError | None
 
 
 def velocity_error(c: CompiledMechanism, gaps: Mapping[str, float], best: Any, reason: str = "") -> AssemblyError:
-    """The error for constraints that no velocities fulfil together; ``gaps``: of the nearest [m/s or rad/s]."""
+    """Return the error for contradictory velocity constraints; ``gaps``: residuals at the nearest velocities [m/s or
+    rad/s].
+    """
     begin = f"{c.structure.model.name!r}: no velocities fulfil all constraints at t = {best.t:g} s"
     if reason:
         return AssemblyError(f"{begin}: {reason}", gaps=dict(gaps), best=best)
@@ -124,36 +130,38 @@ def velocity_error(c: CompiledMechanism, gaps: Mapping[str, float], best: Any, r
 
 
 def rate_unit(c: CompiledMechanism, name: str) -> str:
-    """What the rates of an element's rows are counted in."""
+    """Return the unit of the rates of an element's rows."""
     rows = c.structure.slices.get(name)
     metric = c.metric[rows] if rows is not None else np.ones(1, bool)
     return "m/s" if metric.all() else "rad/s" if not metric.any() else "m/s or rad/s"
 
 
-MAX_CACHED_ASSEMBLIES = 4  # assembled starts of the same numbers that are kept
+MAX_CACHED_ASSEMBLIES = 4  # cached assemblies of one set of values
 
 
 @dataclass(repr=False)
 class Assembly:
-    """A consistent start: the compiled mechanism, its state, and what of the description could not be kept."""
+    """A consistent start: the compiled mechanism, its state, and the deviations from the description."""
 
     compiled: CompiledMechanism
     t: float
     q: np.ndarray
     v: np.ndarray
-    moved: dict[str, float] = field(default_factory=dict)  # body -> how far its mass centre went [m]
+    moved: dict[str, float] = field(default_factory=dict)  # body -> displacement of its mass centre [m]
     iterations: int = 0
     departures: tuple[
         InitialDeviation, ...
-    ] = ()  # changed positions, given velocities that cannot be, very large others
+    ] = ()  # changed positions, given velocities that are inconsistent, other velocities that are very large
 
     def again(self) -> Assembly:
-        """The same with arrays and scratch of its own."""
+        """Return a copy with its own arrays and workspace."""
         c, q, v = self.compiled.again(), self.q.copy(), self.v.copy()
         return Assembly(c, self.t, q, v, dict(self.moved), self.iterations, self.departures)
 
     def of(self, c: CompiledMechanism) -> Assembly:
-        """The same of a mechanism that differs in forces and controllers alone, whose states begin as these say."""
+        """Return the assembly of a mechanism that differs in forces and controllers only, with its own controller
+        states.
+        """
         a, n = self.again(), len(c.structure.controls)
         z = np.concatenate([c.z[:n], a.compiled.z[n:]])
         a.compiled = CompiledMechanism(c.values, z, c.parameters)
@@ -165,7 +173,7 @@ class Assembly:
         return np.concatenate([self.q, self.v, self.compiled.z])
 
     def lines(self) -> list[tuple[str, str]]:
-        """Labels and texts for people: where every mass centre begins and how it moves, what could not be kept."""
+        """Return labelled lines of text: position and velocity of every mass centre, and deviations."""
         length = self.compiled.values.length
         out = [("assembled", f"{self.compiled.structure.model.name}, t = {self.t:g} s, {self.iterations} iterations")]
         bodies = self._bodies()
@@ -177,7 +185,7 @@ class Assembly:
         return [*out, *(("not kept", d.text) for d in self.departures)]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data, world axes: the same."""
+        """Return the same as plain data, in world axes."""
         bodies = {
             name: {"mass_centre": b.p.tolist(), "velocity": b.v.tolist(), "angular_velocity": b.w.tolist()}
             for name, b in self._bodies().items()
@@ -186,7 +194,7 @@ class Assembly:
         return {"t": self.t, "iterations": self.iterations, "bodies": bodies, "moved": self.moved, "departures": gone}
 
     def __repr__(self) -> str:
-        """The lines."""
+        """Return the lines as text."""
         return "\n".join(f"{label:<12} {text}" for label, text in self.lines())
 
     def _bodies(self) -> dict[str, BodyState]:
@@ -194,7 +202,7 @@ class Assembly:
 
 
 ContradictionExplainer = Callable[[CompiledMechanism, float, np.ndarray, np.ndarray, np.ndarray], str]
-"""(mechanism, t, q, v, right-hand sides of its rows) -> why no velocities fulfil these; "" if that is not known."""
+"""(mechanism, t, q, v, right-hand sides of its rows) -> why they are contradictory; "" if that is not known."""
 
 
 def consistent_state(
@@ -223,7 +231,7 @@ def consistent_state(
 
 
 def _has_own_poses(c: CompiledMechanism) -> bool:
-    """Whether turns and places as drawn are others than those of the values that differ in forces alone."""
+    """Return whether reference angles and curve positions differ from those of the values that differ in forces only."""
     x, n = c.values, len(c.structure.controls)
     if (other := x.alike) is None:
         return True
@@ -270,7 +278,9 @@ def _closed_position(
     values: Mapping[str, float],
     parameters: Mapping[str, float] | None,
 ) -> tuple[np.ndarray, int]:
-    """A closed position near the drawn one, and how many iterations led there; ``compiled_model`` follows its turns."""
+    """Return a closed position near the reference configuration, and the number of iterations; angle states are
+    updated.
+    """
     q, v = reference.copy(), compiled_model.values.v
     holds = [i for i in model.initial if i.name in values]
     near = compiled_model
@@ -280,7 +290,7 @@ def _closed_position(
     count = 0
     if largest_residual(near, t, q, v, 0.0) > CLOSED_TOLERANCE or _has_joints_by_frames(
         model
-    ):  # as near as rounding allows, not only within it
+    ):  # also joints given by frames: close them to rounding, not only to the tolerance
         far = compile_mechanism(model, parameters=parameters, far=True, holds=holds, held=values)
         far.follow(compiled_model.hints)
         if largest_residual(far, t, q, v) > FAR_CLOSED_TOLERANCE:
@@ -296,12 +306,12 @@ def _closed_position(
 
 
 def _has_joints_by_frames(model: Model) -> bool:
-    """Whether some joint is given by frames, so that nothing says it is drawn closed."""
+    """Return whether some joint is given by frames, so that the reference configuration may not be closed there."""
     return any(j.at is None for j in model.joints)
 
 
 def _displacements(c: CompiledMechanism, before: np.ndarray, after: np.ndarray, uncertainty: float) -> dict[str, float]:
-    """Body -> how far its mass centre went, beyond rounding."""
+    """Return body -> displacement of its mass centre, where beyond rounding."""
     out: dict[str, float] = {}
     if np.array_equal(before, after):
         return out
@@ -318,7 +328,7 @@ def _displacements(c: CompiledMechanism, before: np.ndarray, after: np.ndarray, 
 def _pose_departures(
     c: CompiledMechanism, before: np.ndarray, after: np.ndarray, uncertainty: float
 ) -> list[InitialDeviation]:
-    """Poses of reference frames that are not those drawn, beyond rounding."""
+    """Return the changes of poses of reference frames from the reference configuration, beyond rounding."""
     out: list[InitialDeviation] = []
     if np.array_equal(before, after):
         return out
@@ -341,16 +351,18 @@ def _pose_departures(
 
 
 def _frame_origin(q: np.ndarray, reference: Any, k: int) -> np.ndarray:
-    """Origin of a body's reference frame from its coordinates; a point mass stays turned as it is drawn."""
+    """Return the origin of a body's reference frame from its coordinates; a point mass keeps its reference
+    orientation.
+    """
     R = reference.R if len(q) == k else rotation_about(2, q[2]) if k == 2 else quaternion_to_matrix(q[3:7])
     return q[:k] - (R @ reference.com)[:k]
 
 
-# What is asked of the start besides the drawing: initial conditions, and what drivers say of it.
+# Initial conditions that override the reference configuration: `Initial` elements and drivers.
 
 
 def initial_turn_angles(c: CompiledMechanism, known: Mapping[str, float]) -> dict[str, float]:
-    """What the states that count turns begin near, where coordinates are told their value."""
+    """Return starting values of angle states where the values of their coordinates are given."""
     out = {}
     for name in set(known) & set(c.structure.state_at):
         joint, what = c.structure.model.coordinate(name, c.structure.model.bodies[0])
@@ -362,7 +374,7 @@ def initial_turn_angles(c: CompiledMechanism, known: Mapping[str, float]) -> dic
 
 
 def add_whole_turns(c: CompiledMechanism, known: Mapping[str, float], q: np.ndarray) -> None:
-    """Bodies in the plane that are told their angle begin with its whole turns."""
+    """Add whole turns to the angles of planar bodies whose angle is given."""
     s = c.structure
     for name, value in known.items():
         owner, what = s.model.coordinate(name, s.model.bodies[0])
@@ -375,7 +387,7 @@ def add_whole_turns(c: CompiledMechanism, known: Mapping[str, float], q: np.ndar
 
 
 def initial_conditions(model: Model, env: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
-    """Values and rates that initial conditions ask for."""
+    """Return the values and rates that initial conditions prescribe."""
     values, rates = {}, {}
     for i in model.initial:
         unit = model.unit(i.name, i)
@@ -391,7 +403,7 @@ def _driver_law(model: Model, d: Driver) -> Expression:
 
 
 def driver_positions(model: Model, t: float, env: Mapping[str, float]) -> dict[str, float]:
-    """What drivers' laws ask for at time t, as far as they follow time alone."""
+    """Return the values that drivers' laws prescribe at time t, as far as they depend on time alone."""
     out = {}
     model = model.snapshot()
     tables = {x.name: x for x in model.tables}

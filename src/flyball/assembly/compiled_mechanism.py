@@ -1,7 +1,7 @@
-"""The compiled mechanism: tables, workspace, evaluation at a state, and how its arrays are read back by name.
+"""The compiled mechanism: tables, workspace, evaluation at a state, and access to its arrays by name.
 
-`CompiledMechanism` is what every analysis evaluates. Also the steps along the velocities that lead from one
-position to another.
+All analyses evaluate a `CompiledMechanism`. This module also computes the steps along the velocities from one position
+to another.
 """
 
 from __future__ import annotations
@@ -35,40 +35,40 @@ from ..tables.values import Values, values
 
 @dataclass
 class CompiledMechanism:
-    """A compiled mechanism with scratch of its own."""
+    """A compiled mechanism with its own workspace."""
 
     values: Values
-    z: np.ndarray  # turns of angles and places on curves, as last evaluated; work states are zero
-    parameters: dict[str, Any] = field(default_factory=dict)  # values in place of the model's own
-    system: System = field(init=False, repr=False, compare=False)  # the values' tables, or with addresses of `made`
-    made: Any = field(default=None, init=False, repr=False, compare=False)  # code that it runs on, if not all's
+    z: np.ndarray  # controller states, angles and curve positions as last evaluated; work states are zero
+    parameters: dict[str, Any] = field(default_factory=dict)  # values that replace the model's own
+    system: System = field(init=False, repr=False, compare=False)  # tables of `values`, or with addresses of `made`
+    made: Any = field(default=None, init=False, repr=False, compare=False)  # generated code in use; None: general engine
 
     def __post_init__(self) -> None:
         self.system = self.values.system
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without scratch, and without addresses, which mean nothing in another process."""
+        """Return the state without workspace and addresses, which are invalid in another process."""
         return {k: x for k, x in vars(self).items() if k not in ("work", "scratch", "system", "made")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state, system=state["values"].system, made=None)
 
     def run_on(self, code: Any) -> None:
-        """From now on code that was made for this mechanism does what it can for the engine; the scratch is kept."""
+        """Use generated code from now on, as far as it replaces the engine; the contents of the workspace are kept."""
         x, before = self.values, vars(self).pop("scratch", None)
         vars(self).pop("work", None)
         self.made, self.system = code, x.kept.get("made", id(code), 1, lambda: (code, code.system(x.system)))[1]
         if before is not None:
-            kept = self.work._replace(flat=before.fields.flat)  # that of the code itself is longer now
+            kept = self.work._replace(flat=before.fields.flat)  # the new flat array is longer, for the code itself
             assign(kept, before.fields)
 
     def run_on_tables(self) -> None:
-        """From now on the engine's own loops do all."""
+        """Use the general engine from now on."""
         self.made, self.system = None, self.values.system
 
     @cached_property
     def work(self) -> Work:
-        """Scratch of its own."""
+        """Its workspace."""
         if self.system.const.dtype.kind in "fc":
             return self.scratch.fields  # type: ignore[no-any-return]
         w = allocate_work(self.structure, self.system)
@@ -77,42 +77,42 @@ class CompiledMechanism:
 
     @cached_property
     def scratch(self) -> PooledBuffer:
-        """The same as compiled code has it."""
+        """The workspace as compiled code takes it."""
         made = pooled_work(self.structure, self.system, self.system.const.dtype)
         made.array("options").stabilization, made.array("options").solve_tolerance = NONE, 1e-13
         return made
 
     def array(self, name: str) -> Any:
-        """An array of the scratch, without the others."""
+        """Return an array of the workspace, without creating the others."""
         return self.scratch.array(name)
 
     @property
     def buffers(self) -> tuple[Any, Any]:
-        """The tables and the scratch as kernels take them: a System and a Work that need not be described again."""
+        """Tables and workspace as kernels take them: struct pointers that need no further conversion."""
         return struct_tables(self.structure, self.system), self.scratch
 
     def bound(self, R: Tableau, clock: StepState, out: np.ndarray) -> BoundKernel:
-        """The engine bound to the tables and the scratch that are its own now; as `entry_point.run_task` else."""
+        """Return the engine bound to the present tables and workspace; otherwise as `entry_point.run_task`."""
         return BoundKernel(engine, *self.buffers, StructBuffer(R), StructBuffer(clock), StructBuffer(OutputBuffer(out)))
 
     @property
     def structure(self) -> Structure:
-        """The integers."""
+        """The structure of the mechanism."""
         return self.values.structure
 
     @property
     def y(self) -> np.ndarray:
-        """The drawn state."""
+        """State vector of the reference configuration."""
         return np.concatenate([self.values.q, self.values.v, self.z])
 
     def again(self) -> CompiledMechanism:
-        """The same with scratch of its own; turns and places as here."""
+        """Return a copy with its own workspace; angles and curve positions as here."""
         return CompiledMechanism(self.values, self.z.copy(), self.parameters)
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray, task: int = POSITION) -> tuple[int, np.ndarray]:
         """Evaluate at a state; rows and kinematics are left in ``work``. Returns (status, dy).
 
-        Turns and places are those nearest to the last ones.
+        Angles and curve positions are those nearest to the last ones.
         """
         s = self.structure
         if np.iscomplexobj(self.values.system.const):
@@ -128,12 +128,12 @@ class CompiledMechanism:
 
     @property
     def sizes(self) -> np.ndarray:
-        """What a large step is along every velocity: the mechanism's length [m], or a radian, (nv,)."""
+        """Reference length along every velocity: the mechanism's length [m], or a radian, (nv,)."""
         return np.array([self.values.length if n.unit == "m" else 1.0 for n in velocity_names(self.structure)])
 
     @cached_property
     def metric(self) -> np.ndarray:
-        """Whether the value of a row is a length [m]; else it is a turn, or a cosine, (nr,)."""
+        """Whether the value of a row is a length [m]; else it is an angle or a cosine, (nr,)."""
         out = np.zeros(len(self.structure.rows), bool)
         for t in self.structure.terms:
             if not t.measured:
@@ -142,11 +142,11 @@ class CompiledMechanism:
 
     @cached_property
     def has_curves(self) -> bool:
-        """Whether a term leans on a place on a curve."""
+        """Whether a term depends on a position on a curve."""
         return any(t.formula.of_kind.place for t in self.structure.terms)
 
     def find_places(self) -> None:
-        """Take for the places on curves those nearest of all at the poses last evaluated, wherever one was before."""
+        """Set positions on curves to the nearest points at the poses last evaluated, independent of earlier ones."""
         for t in self.structure.terms:
             if t.formula.of_kind.place:
                 F, M = ((x[:3], x[3:12].reshape(3, 3)) for x in self.work.FK[[t.F, t.M]])
@@ -154,17 +154,17 @@ class CompiledMechanism:
 
     @property
     def hints(self) -> dict[str, float]:
-        """Turns and places by name."""
+        """Angles, curve positions and other states by name."""
         return dict(zip(self.structure.states, self.z.tolist(), strict=True))
 
     def follow(self, hints: Mapping[str, float]) -> None:
-        """Take turns and places from elsewhere."""
+        """Take over angles and curve positions."""
         for name, k in self.structure.state_at.items():
             if name in hints and not name.endswith(".work"):
                 self.z[k] = hints[name]
 
     def moving(self, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, BodyState]:
-        """How every body moves at a state."""
+        """Return pose and velocity of every body at a state."""
         W = self.work
         self.at(t, q, v)
         angles = turned_angles(self.values, W, q) if self.structure.model.planar else {}
@@ -177,7 +177,9 @@ class CompiledMechanism:
         return out
 
     def take(self, other: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(q, v) of this mechanism in the state (t, q, v) of it in other coordinates; turns and places too."""
+        """Return (q, v) in these coordinates of a state (t, q, v) in other coordinates; take over angles and curve
+        positions too.
+        """
         hints = other.hints | other.turned(q)
         self.follow(hints)
         same = other.drawn(q) and self.values.given is other.values.given
@@ -187,11 +189,11 @@ class CompiledMechanism:
         return own, joint_velocities(self.values, bodies, self.work) if bodies else np.zeros(self.structure.nv)
 
     def drawn(self, q: np.ndarray) -> bool:
-        """Whether that is the position that is drawn, with the turns that it is drawn with."""
+        """Return whether q is the reference configuration, with its angles."""
         return np.array_equal(q, self.values.q) and np.array_equal(self.z, initial_hints(self.values))
 
     def turned(self, q: np.ndarray) -> dict[str, float]:
-        """Angles of joints that are coordinates, by name, as the states that count turns have them."""
+        """Return the angles of joints that are coordinates, by name, with the sign of the angle states."""
         s = self.structure
         return {
             f"{t.joint.name}.{p.coordinate}": t.joint.coordinates[p.coordinate].sign * q[s.tables["tree"].q[row]]
@@ -200,7 +202,7 @@ class CompiledMechanism:
         }
 
     def jacobian(self) -> np.ndarray:
-        """Dense copy of the constraint Jacobian last evaluated, (nr, nv)."""
+        """Return a dense copy of the constraint Jacobian last evaluated, (nr, nv)."""
         S = self.values.system
         nr, row_p = len(S.rows.law), S.row_start[: len(S.rows.law) + 1]
         n = row_p[-1]
@@ -209,7 +211,7 @@ class CompiledMechanism:
         return out
 
     def sparse_jacobian(self):
-        """Sparse copy of the constraint Jacobian last evaluated."""
+        """Return a sparse copy of the constraint Jacobian last evaluated."""
         import scipy.sparse as sp
 
         S = self.values.system
@@ -218,32 +220,35 @@ class CompiledMechanism:
         return sp.csr_matrix((self.work.G[:n].copy(), S.column[:n], row_p), shape=(len(S.rows.law), self.structure.nv))
 
     def mass(self):
-        """Sparse mass matrix of absolute coordinates, (nv, nv)."""
+        """Return the sparse mass matrix of absolute coordinates, (nv, nv)."""
         table = self.values.system.bodies
         return self._blocks(table.inertia, table.mass)
 
     def kinetic_energy(self, v: np.ndarray) -> float:
-        """Kinetic energy [J] at velocities v (nv,) of absolute coordinates."""
+        """Return the kinetic energy [J] at velocities v (nv,) of absolute coordinates."""
         if not v.any():
             return 0.0
         i, j, M = self.mass_entries()
         return float(0.5 * (v[i] * M * v[j]).sum())
 
     def mass_entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows, columns and entries of the mass matrix of absolute coordinates."""
+        """Return rows, columns and entries of the mass matrix of absolute coordinates."""
         x, table = self.values, self.values.system.bodies
         return x.unforced.kept.get("mass", None, 1, lambda: self._entries(table.inertia, table.mass))
 
     def inverse_mass_root(self, movable: np.ndarray, dense: bool = False):
-        """R, sparse if not told, with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.
+        """Return R, sparse unless ``dense``, with R R^T the inverse mass matrix of absolute coordinates; 0 for fixed
+        velocities.
 
-        Missing inertias have stand-ins.
+        Missing inertias are substituted.
         """
         table = self.values.system.bodies
         return self._blocks(table.inverse_inertia, table.inverse_mass, movable, dense)
 
     def _blocks(self, turning: np.ndarray, shifting: np.ndarray, root: np.ndarray | None = None, dense: bool = False):
-        """The matrix of `_entries`, sparse if not told. With ``root`` its square root, rows times these numbers."""
+        """Return the matrix of `_entries`, sparse unless ``dense``. With ``root``: its square root, rows times these
+        factors.
+        """
         rows, columns, entries = self._entries(turning, shifting, root is not None)
         entries = entries if root is None else entries * root[rows]
         nv = self.structure.nv
@@ -258,7 +263,7 @@ class CompiledMechanism:
     def _entries(
         self, turning: np.ndarray, shifting: np.ndarray, root: bool = False
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows, columns and entries of a matrix with one block a body, or of its square root.
+        """Return rows, columns and entries of a matrix with one block per body, or of its square root.
 
         A block is ``shifting`` (nb,) times the identity, and the matrix of ``turning`` (nb, 9).
         """
@@ -298,7 +303,7 @@ def compile_mechanism(
     solved: bool = True,
     switches: bool = False,
 ) -> CompiledMechanism:
-    """Compile a mechanism (see ``structure`` and ``values``)."""
+    """Compile a mechanism (see `tables.structure` and `tables.values`)."""
     choices = Choices(
         far=far,
         positions=positions,
@@ -314,8 +319,9 @@ def compile_mechanism(
 
 
 def initial_hints(x: Values) -> np.ndarray:
-    """States as drawn: joints have no turns yet and works are none; bodies are turned as drawn, places on curves are
-    those nearest to the followers.
+    """Return the states of the reference configuration: no turns of joints, no works, bodies' own angles.
+
+    Positions on curves are those nearest to the followers.
     """
     s = x.structure
     z = np.zeros(len(s.states), x.q.dtype)
@@ -329,12 +335,12 @@ def initial_hints(x: Values) -> np.ndarray:
     return z
 
 
-# Python's collector of cycles, kept away while very many objects are made that stay.
+# Python's cyclic garbage collector is paused while many long-lived objects are created.
 
 
 @contextmanager
 def garbage_collection_paused() -> Iterator[None]:
-    """No collection in here, where it would look through a large mechanism's objects time and again and free none."""
+    """Pause garbage collection, which would repeatedly search a large mechanism's objects and free none."""
     before = gc.isenabled()
     gc.disable()
     try:
@@ -344,11 +350,11 @@ def garbage_collection_paused() -> Iterator[None]:
             gc.enable()
 
 
-HALF_TURN = 1e-3  # cosine of half an angle below which it counts as half a turn
+HALF_TURN = 1e-3  # cosine of half an angle below which the angle counts as half a turn
 
 
 def tangent_rate(c: CompiledMechanism, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-    """The change along the velocities that changes of the coordinates are, (nv,)."""
+    """Return the change along the velocities that corresponds to changes of the coordinates, (nv,)."""
     S = c.values.system
     out = np.zeros(c.structure.nv)
     for b in range(len(S.tree.parent)):
@@ -363,10 +369,11 @@ def tangent_rate(c: CompiledMechanism, q: np.ndarray, dq: np.ndarray) -> np.ndar
 
 
 def tangent_step(c: CompiledMechanism, q: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """The step along the velocities that leads from one position to another, (nv,): what ``retract`` takes.
+    """Return the step along the velocities from one position to another, (nv,), as ``retract`` takes it.
 
-    Turns of bodies in space are Cayley steps, 2 tan(angle / 2) about the axis; towards half a turn, where these have no
-    end, they stay finite. Angles of the plane count whole turns.
+    Rotations of bodies in space are Cayley steps, 2 tan(angle / 2) about the axis, bounded near half a turn. Planar
+    angles
+    include whole turns.
     """
     S = c.values.system
     out = np.zeros(c.structure.nv)

@@ -1,9 +1,9 @@
 """The ``flyball`` command: entry point and registration of all subcommands.
 
-``cli/application.py`` holds the typer application, exit codes and printing of errors; ``cli/subcommand.py`` makes
-a subcommand from a method of `Mechanism`; ``cli/options.py`` turns its arguments into command-line options. The
-other modules hold the subcommands of one subject each. A new subcommand is a function with the decorator
-`command`; its module is imported here. Whatever takes long to import is imported inside functions.
+``cli/application.py`` contains the typer application, exit codes and printing of errors; ``cli/subcommand.py`` makes a
+subcommand from a method of `Mechanism`; ``cli/options.py`` turns its arguments into command-line options. The other
+modules contain the subcommands of one subject each. A new subcommand is a function with the decorator `command`; its
+module is imported here. Slow imports are placed inside functions.
 """
 
 from __future__ import annotations

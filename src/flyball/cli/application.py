@@ -53,7 +53,9 @@ ParameterChanges = Annotated[list[str] | None, typer.Option("--set", help='Set a
 
 @contextmanager
 def report_errors(as_json: bool) -> Iterator[None]:
-    """Errors as one message to stderr (or one JSON object) and an exit code; no traceback."""
+    """Context manager that prints errors as one message to stderr (or one JSON object) and sets an exit code; no
+    traceback.
+    """
     try:
         yield
     except FlyballError as error:
@@ -64,7 +66,7 @@ def report_errors(as_json: bool) -> Iterator[None]:
 
 
 def with_option_names(text: str) -> str:
-    """A message whose remedies are options of the command line, where they are calls in Python."""
+    """Replace remedies written as Python calls in a message by command-line options."""
     text = text.replace("about=m.equilibrium()", "--equilibrium")
     return re.sub(r"m\.changed\(\{(.*?)\}\)\.\w+\(\.\.\.\)", _without_options, text)
 
@@ -75,7 +77,7 @@ def _without_options(call: re.Match) -> str:
 
 
 def exit_with_error(message: str, kind: str, code: int, as_json: bool, more: dict[str, Any] | None = None) -> None:
-    """Say what is wrong and end with the code; as JSON with ``more`` beside it."""
+    """Print the error and exit with the code; as JSON with ``more`` included."""
     if as_json:
         print_json({"error": message, "kind": kind} | (more or {}))
     else:
@@ -89,7 +91,7 @@ def print_json(data: Any) -> None:
 
 
 def _json_data(value: Any) -> Any:
-    """Plain JSON: what is not finite becomes null."""
+    """Convert data to plain JSON; non-finite numbers become null."""
     if isinstance(value, dict):
         return {str(k): _json_data(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
@@ -100,7 +102,7 @@ def _json_data(value: Any) -> Any:
 
 
 def print_table(lines: list[tuple[str, str]]) -> None:
-    """Labels and texts, labels only where they change."""
+    """Print a table of labels and texts; a repeated label is printed once."""
     width = max(len(label) for label, _ in lines)
     last = ""
     for label, text in lines:
@@ -109,14 +111,14 @@ def print_table(lines: list[tuple[str, str]]) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, its parents too."""
+    """Create a folder and its parents."""
     from ..model.output_files import make_folder as make
 
     make(folder)
 
 
 def show_notices(verbose: bool) -> None:
-    """Print notices as they come, without the line of code that they are about; without ``verbose`` none is printed."""
+    """Print notices when they are issued, without the source line; without ``verbose`` none is printed."""
     if not verbose:
         warnings.filterwarnings("ignore", "compiling ", PerformanceNotice)
         return

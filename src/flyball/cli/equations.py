@@ -15,7 +15,7 @@ from .subcommand import Request, command
 
 @command(SymbolicMethods.symbolic, name="equations", overrides={"inputs": OptionOverride(names=("--input",))})
 def equations(request: Request, *, out: OutputFolder = None) -> None:
-    """Write equations.html, which opens offline, and equations.tex; print sizes and names."""
+    """Write equations.html (works offline) and equations.tex; print sizes and names."""
     found = request.run_analysis()
     folder = request.folder(out, "equations")
     request.write(folder / "equations.html", found.to_html)
@@ -36,7 +36,7 @@ def export(
     *,
     out: Annotated[Path | None, typer.Option(help="Folder for the files; named after the model if not given.")] = None,
 ) -> None:
-    """Print the functions with their arguments and how long they are, and the files written."""
+    """Print the functions with their arguments and lengths, and the files written."""
     code = request.run_analysis(folder=request.folder(out, "code"))
     request.files += [str(f) for f in code.files]
     request.print_result(code)

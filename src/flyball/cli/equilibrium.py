@@ -1,4 +1,4 @@
-"""Subcommands about rest and small motions: equilibrium, equilibria, linearize, root-locus and modes."""
+"""Subcommands on equilibrium and small motions: equilibrium, equilibria, linearize, root-locus and modes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .subcommand import Request, command
 
 @command(StaticsMethods.equilibrium, without=("start",))
 def equilibrium(request: Request, *, out: PageFile = None) -> None:
-    """Print where it is; --out shows it."""
+    """Print the equilibrium position; --out writes a picture of it."""
     found = request.run_analysis()
     request.write(out, found.result.to_html)
     request.print_result(found)
@@ -24,7 +24,7 @@ def equilibrium(request: Request, *, out: PageFile = None) -> None:
 
 @command(StaticsMethods.equilibria, without=("start",))
 def equilibria(request: Request, *, plot: PlotFile = None) -> None:
-    """Print the series and where it jumps."""
+    """Print the series of equilibria and its jumps."""
     found = request.run_analysis()
     request.write(plot, lambda path: found.plot(path=path))
     request.print_result(found)
@@ -54,7 +54,7 @@ def linearize(
 
 @command(StaticsMethods.root_locus)
 def root_locus(request: Request, *, plot: PlotFile = None) -> None:
-    """Print the eigenvalues at every value, and the values where one crosses the imaginary axis."""
+    """Print the eigenvalues for every value, and the values at which one crosses the imaginary axis."""
     found = request.run_analysis()
     request.write(plot, found.plot)
     request.print_result(found)
@@ -69,7 +69,7 @@ def modes(
     out: PageFile = None,
     plot: PlotFile = None,
 ) -> None:
-    """Print a table; --out shows how they move, --plot draws the eigenvalues."""
+    """Print a table of modes; --out writes an animation, --plot draws the eigenvalues."""
     request.rest(equilibrium, turning)
     found = request.run_analysis()
     request.write(out, found.to_html)

@@ -21,7 +21,7 @@ def check(request: Request) -> None:
 
 @command(MobilityMethods.mobility)
 def mobility(request: Request) -> None:
-    """Print freedoms and sets."""
+    """Print degrees of freedom and sets of redundant constraints."""
     request.print_result(request.run_analysis())
 
 
@@ -41,7 +41,7 @@ def singularities(
     plot: PlotFile = None,
     brief: Annotated[bool, typer.Option("--table", help="One line a position.")] = False,
 ) -> None:
-    """Passages, lock-ups, bifurcations and self-motions are told apart."""
+    """Print singular positions, classified as passages, lock-ups, bifurcations and self-motions."""
     result = request.run_analysis()
     if branch is not None:
         result = request.run_analysis(branch=_find_branch(result, branch))
@@ -53,7 +53,7 @@ def singularities(
 
 
 def _find_branch(result: Any, text: str) -> Any:
-    """The branch that POINT.BRANCH means."""
+    """Return the branch with the number POINT.BRANCH."""
     first, _, second = text.partition(".")
     try:
         point, k = int(first) - 1, int(second or "0")

@@ -1,6 +1,6 @@
 """Arguments of methods as command-line options: help from docstrings, and conversion of option texts to values.
 
-Docstrings in NumPy style give the help, the unit and the choices of an argument; its type says what typer reads.
+NumPy-style docstrings give the help, the unit and the choices of an argument; its type determines typer's type.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ UNIT_PATTERN = re.compile(r"\[([^\],]+)\]")
 
 
 class ArgumentHelp(NamedTuple):
-    """An argument: the unit of its number ("" for none), what can be chosen, and what is said about it."""
+    """Help of an argument: the unit of its number ("" for none), the choices, and the description."""
 
     unit: str = ""
     choices: tuple[str, ...] = ()
@@ -30,12 +30,12 @@ class ArgumentHelp(NamedTuple):
 
 
 def first_doc_line(method: Callable) -> str:
-    """The first line of the docstring."""
+    """Return the first line of the docstring."""
     return without_code_marks((inspect.getdoc(method) or "").partition("\n")[0])
 
 
 def argument_help(method: Callable) -> dict[str, ArgumentHelp]:
-    """The section Parameters, by name."""
+    """Return the entries of the section Parameters by argument name."""
     text = inspect.getdoc(method) or ""
     _, _, section = text.partition("Parameters\n----------\n")
     section = re.split(r"\n\w+\n-{3,}\n", section)[0]
@@ -53,19 +53,19 @@ def argument_help(method: Callable) -> dict[str, ArgumentHelp]:
 
 
 def without_code_marks(text: str) -> str:
-    """Without the marks of code."""
+    """Remove reST code marks from a text."""
     return re.sub(r"`+", "", text)
 
 
-RANGE_SEPARATOR = ":"  # in "0:10:21", 21 values from 0 to 10
+RANGE_SEPARATOR = ":"  # in "0:10:21": 21 values from 0 to 10
 
 
 @dataclass(frozen=True)
 class OptionOverride:
-    """How an argument stands on the command line, where its type does not say it all.
+    """Properties of an option that its type does not determine.
 
-    ``default`` is what the command takes if it is not given, ``shown`` what its help says instead; ``names`` are the
-    names of the option, ``many`` says that it may be repeated, ``read`` makes the method's value of it.
+    ``default`` is the default of the command, ``shown`` its description in the help; ``names`` are the names of the
+    option, ``many`` allows the option to be repeated, ``read`` converts the text to the method's value.
     """
 
     default: Any = None
@@ -82,7 +82,7 @@ def _unchanged(value: Any, unit: str, flag: str) -> Any:
 
 
 def read_quantity(text: str, unit: str, flag: str) -> float:
-    """A number, or a quantity that has the unit."""
+    """Parse a number, or a quantity with the unit."""
     from ..model.expressions import number
 
     try:
@@ -92,7 +92,7 @@ def read_quantity(text: str, unit: str, flag: str) -> float:
 
 
 def read_values(text: str, unit: str, flag: str) -> list[float]:
-    """Values from ``0,0.5,1`` or from ``first:last:how many``."""
+    """Parse values written as ``0,0.5,1`` or ``first:last:count``."""
     if RANGE_SEPARATOR not in text:
         return [read_quantity(x, unit, flag) for x in text.split(",")]
     import numpy as np
@@ -104,27 +104,27 @@ def read_values(text: str, unit: str, flag: str) -> list[float]:
 
 
 def read_count_or_values(text: str, unit: str, flag: str) -> int | list[float]:
-    """A number of values, or the values."""
+    """Parse a number of values, or the values."""
     if text.strip().lstrip("+-").isdecimal():
         return int(text)
     return read_values(text, unit, flag)
 
 
 def read_result_file(path: Path, unit: str, flag: str) -> Any:
-    """The result in a file."""
+    """Load the result in a file."""
     from ..mechanism import load_result
 
     return load_result(path)
 
 
 def refuse_duplicate(out: Mapping[str, Any], name: str, flag: str, text: str) -> None:
-    """Refuse what is given twice: one of both would count."""
+    """Refuse a name that is given twice, since only one of both values would count."""
     if name in out:
         raise ModelError(f"{flag} {text!r}: {name!r} is given twice; give it once")
 
 
 def read_assignments(texts: list[str], unit: str, flag: str) -> dict[str, str]:
-    """Names and what they are given, each as ``name=text``."""
+    """Parse names and their values, each written as ``name=text``."""
     out: dict[str, str] = {}
     for text in texts:
         name, equals, value = (x.strip() for x in text.partition("="))
@@ -137,7 +137,7 @@ def read_assignments(texts: list[str], unit: str, flag: str) -> dict[str, str]:
 
 OPTION_TYPES: dict[
     str, tuple[Any, Callable[[Any, str, str], Any]]
-] = {  # annotation -> (what typer reads, what makes a value)
+] = {  # annotation -> (typer's type, conversion to a value)
     "str": (str, _unchanged),
     "int": (int, _unchanged),
     "float": (float, _unchanged),
@@ -162,7 +162,7 @@ FORMAT_HINTS = {
 
 @dataclass(frozen=True)
 class Option:
-    """An argument of a method, ready for typer."""
+    """An argument of a method as a typer option."""
 
     name: str
     flag: str
@@ -171,17 +171,17 @@ class Option:
     make: Callable[[Any, str, str], Any]
 
     def read(self, value: Any) -> Any:
-        """The method's value."""
+        """Convert typer's value to the method's value."""
         return self.make(value, self.unit, self.flag)
 
 
 def make_option(p: inspect.Parameter, described: ArgumentHelp, override: OptionOverride | None) -> Option:
-    """An option of the command line from an argument of a method.
+    """Make a command-line option from an argument of a method.
 
     Raises
     ------
     TypeError
-        If nothing says how values of its type stand on a command line.
+        If no conversion is defined for its type.
     """
     override = override or OptionOverride()
     required = p.default is p.empty and override.default is None
@@ -212,7 +212,7 @@ def make_option(p: inspect.Parameter, described: ArgumentHelp, override: OptionO
 
 
 def _option_help(p: inspect.Parameter, described: ArgumentHelp, override: OptionOverride, hint: str) -> str:
-    """What the docstring says, how it is written, what can be chosen, and what it is if it is not given."""
+    """Return the help of an option: description, format, choices and default."""
     usual = (
         override.shown
         if override.shown is not None
@@ -232,5 +232,5 @@ def make_options(
     described: Mapping[str, ArgumentHelp],
     overrides: Mapping[str, OptionOverride],
 ) -> list[Option]:
-    """Options of a command, in the order of the method's arguments."""
+    """Return the options of a command, in the order of the method's arguments."""
     return [make_option(p, described.get(name, ArgumentHelp()), overrides.get(name)) for name, p in arguments.items()]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..results.result import Result
 
 
-MAX_CSV_NUMBERS = 5_000_000  # above, the table is left out: such a file is of no use
+MAX_CSV_NUMBERS = 5_000_000  # above this size the table is not written: such a file is of no use
 
 
 @command(
@@ -48,7 +48,7 @@ def run(
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
-    """Write report.html, animation.html, result.csv and result.nc; pictures into plots/ where they are wanted."""
+    """Write report.html, animation.html, result.csv and result.nc; pictures into plots/ on request."""
     talk, error = not (request.as_json or quiet), None
     try:
         result = request.run_analysis(progress=talk)
@@ -69,7 +69,7 @@ def run(
 def _print_summary(
     result: Result, error: SimulationError | None, files: list[Path], notes: list[str], as_json: bool, talk: bool
 ) -> None:
-    """Say what was done, and end with the right code."""
+    """Print a summary of the run, and end with the appropriate exit code."""
     summary = {
         "name": result.model.name,
         "success": result.health.success,
@@ -98,7 +98,7 @@ def _print_summary(
 
 
 def _write_run_files(result: Result, folder: Path, plots: bool, pages: Sequence[str]) -> tuple[list[Path], list[str]]:
-    """Write all files of a result; returns them, and remarks on what was left out."""
+    """Write all files of a result; return them, and remarks on files that were left out."""
     files, notes = [], []
     make_folder(folder)
 
@@ -136,7 +136,7 @@ def compare(request: Request, *, plot: PlotFile = None) -> None:
     request.print_result(result)
 
 
-DEFAULT_END = "1"  # s, the end of the motion if nothing says when
+DEFAULT_END = "1"  # end of the motion [s] if nothing specifies it
 TIME_OPTIONS = {"times": OptionOverride(names=("--outputs", "--times")), "t_end": OptionOverride(shown=DEFAULT_END)}
 
 
@@ -165,13 +165,13 @@ def kinematics(
 
 
 def set_default_end(request: Request) -> None:
-    """A number of times without an end goes on for a second."""
+    """Set the end to one second if a number of times is given without an end."""
     if not isinstance(request.given.get("times"), list):
         request.given.setdefault("t_end", DEFAULT_END)
 
 
 def read_point(text: str) -> str | tuple[str, list[float]]:
-    """A point from the command line: a name, or ``body:x,y``."""
+    """Parse a point of the command line: a name, or ``body:x,y``."""
     name, colon, rest = text.partition(":")
     return (name, read_values(rest, "m", "--point")) if colon else text
 

@@ -15,7 +15,7 @@ from .subcommand import Request, command
 
 
 def _read_variations(texts: list[str], unit: str, flag: str) -> dict[str, Any]:
-    """name=values (0,1,2 or first:last:how many), name=low:high or name=distribution."""
+    """Parse variations: name=values (0,1,2 or first:last:count), name=low:high or name=distribution."""
     out: dict[str, Any] = {}
     for text in texts:
         name, equals, told = (x.strip() for x in text.partition("="))
@@ -61,7 +61,7 @@ def study(
     plot: PlotFile = None,
     histogram: Annotated[Path | None, typer.Option(help="Write how often values occur to a picture.")] = None,
 ) -> None:
-    """Print how the quantities spread; with --file the study can be interrupted, and the same command goes on."""
+    """Print how the quantities vary; a study with --file can be interrupted and continued by the same command."""
     try:
         found = request.run_analysis()
     except Interrupted as ended:
@@ -81,7 +81,7 @@ def study(
 
 
 def _read_bounds(texts: list[str], unit: str, flag: str) -> dict[str, tuple[str | None, str | None]]:
-    """name, or name=low:high with either left out."""
+    """Parse bounds: name, or name=low:high with either limit left out."""
     out: dict[str, tuple[str | None, str | None]] = {}
     for text in texts:
         name, equals, bounds = text.partition("=")
@@ -115,7 +115,7 @@ def optimize(request: Request) -> None:
 
 
 def _read_target(texts: list[str], count: int) -> Any:
-    """Numbers, or the columns of a file, (times, quantities)."""
+    """Parse target values: numbers, or the columns of a file; shape (times, quantities)."""
     import numpy as np
 
     if len(texts) == 1 and Path(texts[0]).suffix.lower() == ".csv":
@@ -123,7 +123,7 @@ def _read_target(texts: list[str], count: int) -> Any:
             found = np.genfromtxt(texts[0], delimiter=",", ndmin=2)
         except (OSError, ValueError) as error:
             raise ModelError(f"cannot read {texts[0]!r}: {error}") from None
-        found = found[~np.isnan(found).all(axis=1)]  # a line of names
+        found = found[~np.isnan(found).all(axis=1)]  # header line
         if found.shape[1] != count or not len(found) or np.isnan(found).any():
             raise ModelError(f"{texts[0]!r} needs a column of numbers for each of the {count} quantities")
         return found

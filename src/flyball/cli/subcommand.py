@@ -1,8 +1,8 @@
-"""A subcommand made from a method of `Mechanism`: options, types, defaults and help are those of its arguments.
+"""Subcommands made from methods of `Mechanism`: options, types, defaults and help are those of the method's arguments.
 
-The model file is loaded, parameters are changed (``--set``) and parts are left out (``--without``). A subcommand
-of its own only defines what is printed and written, as a function of the `Request`; its keyword-only arguments
-are the options that the method does not have.
+The model file is loaded, parameters are changed (``--set``) and parts are left out (``--without``). The function of a
+subcommand only prints and writes results. It takes the `Request`; its keyword-only arguments are the options that the
+method does not have.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ if TYPE_CHECKING:
 
 
 def load_mechanism(path: Path) -> Mechanism:
-    """The mechanism of a model file."""
+    """Load the mechanism of a model file."""
     from ..mechanism import load
 
     return load(path)
 
 
 def set_parameters(mechanism: Mechanism, changes: Sequence[str]) -> None:
-    """Give parameters other values, and check again all that depends on them."""
+    """Set new values of parameters, and repeat all checks that depend on them."""
     from ..model.model import listing, suggest
 
     given: dict[str, str] = {}
@@ -70,12 +70,12 @@ def set_parameters(mechanism: Mechanism, changes: Sequence[str]) -> None:
 
 
 def leave_out_parts(mechanism: Mechanism, names: Sequence[str]) -> Mechanism:
-    """The mechanism without parts of these names, or of these kinds (``events``, ``limits``, ...).
+    """Return the mechanism without the parts of these names, or of these kinds (``events``, ``limits``, ...).
 
     Raises
     ------
     ModelError
-        If there is none of that name, or what is left names one that is left out.
+        If there is no part of that name, or a remaining part refers to one that is left out.
     """
     from ..model.model import CATEGORIES, suggest
 
@@ -97,12 +97,12 @@ def leave_out_parts(mechanism: Mechanism, names: Sequence[str]) -> Mechanism:
     return left
 
 
-COMMON_ARGUMENTS = ("self", "parameters", "progress")  # parameters are given by --set
+COMMON_ARGUMENTS = ("self", "parameters", "progress")  # parameters are set by --set
 
 
 @dataclass
 class Request:
-    """A question from the command line, ready to be asked, and how to answer."""
+    """One call of a subcommand: the mechanism, the method, its arguments, and where the output goes."""
 
     mechanism: Mechanism
     method: str
@@ -112,29 +112,29 @@ class Request:
     files: list[str] = field(default_factory=list)
 
     def run_analysis(self, **more: Any) -> Any:
-        """What the mechanism answers, to more or other arguments if given."""
+        """Run the analysis and return its result, with additional or changed arguments if given."""
         return getattr(self.mechanism, self.method)(**self.given | more)
 
     def rest(self, equilibrium: bool, turning: Sequence[str] | None) -> None:
-        """Ask about the equilibrium, or the steady motion, that is next to the mechanism as drawn."""
+        """Return the equilibrium, or the steady motion, nearest to the reference configuration."""
         if equilibrium or turning:
             t = self.given.pop("t", 0.0)
             self.given["about"] = self.mechanism.equilibrium(t=t, turning=turning or ())
 
     def folder(self, out: Path | None, suffix: str) -> Path:
-        """The folder for results, made: as told, or named after the model."""
+        """Create and return the output folder: as given, or named after the model."""
         found = out if out is not None else Path(f"{self.source.stem}-{suffix}")
         make_folder(found)
         return found
 
     def write(self, path: Path | None, write: Callable[[Path], Any]) -> None:
-        """Write a file, if it is wanted."""
+        """Write a file if its path was given."""
         if path is not None:
             write(path)
             self.files.append(str(path))
 
     def print_result(self, found: Any, data: Mapping[str, Any] | None = None) -> None:
-        """Print a result and the files written: its lines, or one JSON object."""
+        """Print a result and the list of written files, as lines or as one JSON object."""
         if self.as_json:
             told = dict(found.as_dict() if data is None else data)
             print_json(told | {"files": self.files})
@@ -152,7 +152,8 @@ def command(
     overrides: Mapping[str, OptionOverride] | None = None,
     without: Sequence[str] = (),
 ) -> Callable[[Conclusion], Conclusion]:
-    """Make a subcommand of a method; what it decorates is called with what was asked, and prints and writes.
+    """Make a subcommand of a method. The decorated function is called with the `Request`; it prints and writes the
+    result.
 
     Parameters
     ----------
@@ -160,10 +161,10 @@ def command(
         Of a class of `flyball.mechanism_methods`.
     name : str
         Of the subcommand; the method's if not given.
-    overrides : mapping of str to Flag
-        Arguments that stand otherwise on the command line than their type says.
+    overrides : mapping of str to OptionOverride
+        Arguments whose option differs from what their type implies.
     without : sequence of str
-        Arguments that it does not have.
+        Arguments that are not options.
     """
 
     def register(conclude: Conclusion) -> Conclusion:
@@ -199,12 +200,12 @@ def command(
 
 
 def _is_given(value: Any, of: Option) -> bool:
-    """Whether an option was given; else the method's own default holds."""
+    """Return whether an option was given; otherwise the method's default applies."""
     return value is not None and value != [] and (value is not False or of.parameter.default is None)
 
 
 def _extra_options(conclude: Conclusion) -> list[inspect.Parameter]:
-    """Options that the command has besides the method's."""
+    """Return the options that the command has in addition to the method's."""
     hints = get_type_hints(conclude, include_extras=True)
     return [
         p.replace(annotation=hints[p.name])

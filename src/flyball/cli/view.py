@@ -1,4 +1,4 @@
-"""Subcommands without an analysis: ``view`` shows a result in the web browser, ``compile`` compiles all kernels."""
+"""Subcommands without an analysis: ``view`` opens a result in the web browser, ``compile`` compiles all kernels."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ def view(
 
 
 def _page_file(file: Path) -> Path:
-    """The animation page of a file: itself, or written beside the result (in a temporary folder if need be)."""
+    """Return the animation page of a file: the file itself, or a page written beside the result.
+
+    If that folder is not writable, a temporary folder is used.
+    """
     if file.suffix.lower() in (".html", ".htm"):
         if not file.is_file():
             raise ModelError(f"there is no file {str(file)!r}")
@@ -55,7 +58,7 @@ def _page_file(file: Path) -> Path:
 
 @app.command(name="compile")
 def compile_kernels() -> None:
-    """Compile everything that would be compiled on first use, on all cores, and keep it for this user."""
+    """Compile, on all cores, everything that would be compiled on first use, and store it for this user."""
     with report_errors(False):
         from ..compiler.ahead_of_time import compile_all
         from ..compiler.object_code import cache_folder

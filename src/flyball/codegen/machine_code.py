@@ -1,8 +1,9 @@
-"""From the procedures of one mechanism to LLVM text, machine code and addresses; and what makes that impossible.
+"""Translation of one mechanism's procedures to LLVM text, machine code and addresses.
 
-What procedures pass on to each other is computed once, by the first that needs it. Expressions of the tables'
-entries alone are computed once for a `System` (they stand after the addresses in `System.flat`); what moves and a
-later procedure needs is kept in `Work.flat`. No pass of Numba is run. The object code is what is kept on disk.
+Values that procedures share are computed once, by the first that needs them. Expressions of table entries only are
+computed once for a `System` (they are stored after the addresses in `System.flat`); shared values that depend on the
+state are stored in `Work.flat`. No pass of Numba is run. The object code is stored on disk. `Refused` states why a
+mechanism cannot be translated.
 """
 
 from __future__ import annotations
@@ -39,23 +40,23 @@ PREDECESSORS: dict[str, tuple[str, ...]] = {
     "LOADS": ("PLACE", "MOVE"),
     "FINISH": ("PLACE", "MOVE"),
 } | dict.fromkeys(("FACTOR", "REUSE", "STEP", "STEP_UNLOADED", "REFINE", "DRIFT"), ("PLACE",))
-"""Procedures that have run, at this state, when another one does."""
+"""Procedures that have run, at this state, before another one does."""
 SHARED_ARRAYS = ("W_G", "W_FK")
-"""Arrays that nobody writes to but the procedures."""
+"""Arrays that only the procedures write to."""
 ENTRIES = (
     "SCRATCH", "PREPARE", "PLACE", "MOVE", "LOADS", "FACTOR", "REUSE", "STEP", "STEP_UNLOADED", "REFINE", "FINISH",
     "DRIFT", "SHOW", "SAMPLED",
 )  # fmt: skip
-"""Entries of `System.flat` by name; the first is a length, the last a number of an entry; all others are addresses."""
+"""Entries of `System.flat` by name; the first is a length, the last the index of an entry; all others are addresses."""
 
 
 class LinkedProcedures:
-    """The procedures with all that they read and leave.
+    """The procedures with their inputs and outputs linked.
 
     Attributes
     ----------
     procedures : list of Procedure
-        ``CONSTANTS`` first, which fills in what stands behind the addresses.
+        ``CONSTANTS`` first, which fills in the numbers behind the addresses.
     constants, scratch : int
         Numbers behind the addresses in `System.flat`; length of `Work.flat`.
     """
@@ -118,7 +119,7 @@ class LinkedProcedures:
             here = x.index in self.computed[p.name] or (x.op == SYMBOL and x.index in p.reads)
             if (
                 here or _spline_search(x) in self.searched[p.name]
-            ):  # where the piece is known, another order costs nothing
+            ):  # the piece is known, so another derivative order is cheap
                 if x.index not in self.slots:
                     self.slots[x.index] = ("W_flat", self.scratch)
                     self.scratch += 1
@@ -133,7 +134,7 @@ def _is_multiple(x: Node) -> bool:
 
 
 def _spline_search(x: Node) -> tuple[SearchKey, int] | None:
-    """Which piece of a spline an operation needs: breaks, and the number of the argument."""
+    """Piece of a spline that an operation needs: key of the breaks, and index of the argument."""
     spline = spline_of(x.data)
     return None if spline is None or not isinstance(x.args[0], Node) else (search_key(spline[0]), x.args[0].index)
 
@@ -143,7 +144,7 @@ ARGUMENTS = "ptr %S, ptr %W, double %t, ptr %a, ptr %b, ptr %c, ptr %d"
 
 @lru_cache(maxsize=1)
 def array_offsets() -> dict[str, int]:
-    """Where, from the begin of a `System` or `Work`, the addresses of their arrays' numbers stand [bytes]."""
+    """Offsets [bytes], in a `System` or `Work`, of the data addresses of their arrays."""
     return dict(_places(struct_layout(System), "S_", DATA)) | dict(_places(struct_layout(Work), "W_", DATA))
 
 
@@ -156,7 +157,7 @@ def _places(of: Struct, prefix: str, at: int) -> Iterator[tuple[str, int]]:
 
 
 def llvm_text(linked: LinkedProcedures) -> str:
-    """The whole module, as text."""
+    """Text of the whole module."""
     module = Module(ARGUMENTS, _base_lines)
     for p in linked.procedures:
         module.add(p)
@@ -164,10 +165,10 @@ def llvm_text(linked: LinkedProcedures) -> str:
 
 
 def _base_lines(base: str) -> list[str]:
-    """Lines that leave the address of a base's numbers in ``%base``."""
+    """Lines that load the data address of an array into ``%base``."""
     if base in ("a", "b", "c", "d"):
         return []
-    if base.startswith("C_"):  # one of the tables, whose addresses stand where S does
+    if base.startswith("C_"):  # a table of `CONSTANTS`, which gets their addresses in place of S
         at = 8 * _constant_arrays().index(base.removeprefix("C_"))
         holder = "S"
     else:
@@ -180,7 +181,7 @@ def _base_lines(base: str) -> list[str]:
 
 @lru_cache(maxsize=1)
 def _constant_arrays() -> list[str]:
-    """Names of the arrays whose addresses ``CONSTANTS`` holds, in their order: see `table_addresses`."""
+    """Names of the arrays whose addresses ``CONSTANTS`` gets, in order: see `table_addresses`."""
     numbers = {name: layout for name, layout in struct_layout(System).fields if name in TRACED_TABLES}
     fields = {name: [x for x, _ in of.fields] if isinstance(of, Struct) else [] for name, of in numbers.items()}
     return [full for name in TRACED_TABLES for full in [f"{name}.{x}" for x in fields[name]] or [name]]
@@ -188,14 +189,14 @@ def _constant_arrays() -> list[str]:
 
 @lru_cache(maxsize=1)
 def target_description() -> str:
-    """What the code is for: processor, versions."""
+    """Description of the target: processor, versions."""
     import llvmlite
 
     return f"{target_triple()} {baseline()} {llvmlite.__version__} {llvm_binding().llvm_version_info}"
 
 
 class LoadedProcedures:
-    """Machine code in memory, as long as this lives.
+    """Machine code in memory, valid as long as this object exists.
 
     Attributes
     ----------
@@ -215,22 +216,22 @@ def table_addresses(S: System) -> np.ndarray:
 
 
 Entry = tuple[str, int]
-"""A table, and the number of an entry in it."""
+"""A table, and the index of an entry in it."""
 
 
 class Refused(Exception):
-    """No code is made for a mechanism; the reason in words."""
+    """No code is generated for a mechanism; the message is the reason."""
 
 
 @dataclass(frozen=True)
 class ProgramText:
-    """The code as text.
+    """Generated code as text.
 
     Attributes
     ----------
     text : str
     known : list of Entry
-        Entries of the tables whose very values are in it, since a formula decides by them.
+        Table entries whose values are fixed in it, since a formula branches on them.
     scratch, constants, operations, laws
         As in `GeneratedCode`.
     """
@@ -244,12 +245,12 @@ class ProgramText:
 
 
 def trace_procedures(s: Structure, S: System) -> ProgramText:
-    """Run the engine's loops on expressions, and write down what they do.
+    """Run the engine's loops on expressions, and translate them to text.
 
     Raises
     ------
     Refused
-        If something cannot be written so.
+        If something cannot be expressed.
     """
     known: set[Entry] = set()
     try:
@@ -269,7 +270,7 @@ def trace_procedures(s: Structure, S: System) -> ProgramText:
 
 
 def _deciding_entries(stages: MechanismProcedures) -> set[Entry]:
-    """Entries that formulas have decided by."""
+    """Table entries that formulas have branched on."""
     nodes = [x for x in stages.graph if x.index in stages.graph.decided]
     found = (stages.constants.get(x.index) for x in nodes_in_order(nodes))
     return {(base.removeprefix("C_"), k) for base, k in filter(None, found)}
@@ -284,18 +285,19 @@ class GeneratedCode:
 
     Attributes
     ----------
-    loaded : Loaded
+    loaded : LoadedProcedures
         The machine code.
     scratch, constants : int
-        Length of `Work.flat`; numbers that are reckoned once for a `System`.
+        Length of `Work.flat`; numbers that are computed once for a `System`.
     operations : int
-        What has been compiled: operations of all procedures.
+        Compiled operations of all procedures.
     laws : list of str
-        Procedures of the laws that may do much within a step, in the order of `pulse_detection.law_at`; "" for the others.
+        Procedures of the laws that may act briefly within a step, in the order of `pulse_detection.law_at`; "" for
+        the others.
     seconds : float
-        What tracing and compiling took [s of the processor].
+        Processor time of tracing and compiling [s].
     known : list of Entry
-        Entries of the tables whose very values are in the code.
+        Table entries whose values are fixed in the code.
     """
 
     loaded: LoadedProcedures
@@ -307,7 +309,7 @@ class GeneratedCode:
     known: list[Entry]
 
     def system(self, S: System) -> System:
-        """The tables with the addresses in them; the code lives as long as the array in which they stand."""
+        """Tables with the addresses in them; the array of addresses keeps the code in memory."""
         first = FLAT + self.constants
         memory = (ctypes.c_int64 * (first + len(self.laws)))()
         memory.code = self.loaded  # type: ignore[attr-defined]

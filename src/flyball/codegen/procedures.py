@@ -1,8 +1,8 @@
-"""The engine's loops run on expressions, task by task: what each procedure reads, and what it writes where.
+"""The engine's loops run on expressions, task by task: inputs and outputs of each procedure.
 
-What is in the engine's arrays afterwards is what the generated code has to write, at the same places. The tables'
-entries are symbols, so that the code holds for other values of parameters; entries that are 0, 1 or -1 stay
-numbers. Factors and solves read what they work on from where the engine has it.
+The generated code has to write what the engine's arrays contain afterwards, at the same places. The tables' entries are
+symbols, so that the code is valid for other values of parameters; entries that are 0, 1 or -1 stay numbers. Factors and
+solves read their inputs from the engine's arrays.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ from ..tables.table_definitions import (
     with_numbers,
 )
 
-PLAIN_ENTRIES = (0.0, 1.0, -1.0)  # entries of tables that the code may know
+PLAIN_ENTRIES = (0.0, 1.0, -1.0)  # entries of tables that may be fixed in the code
 SOLVES = (
     "STEP",
     "STEP_UNLOADED",
@@ -66,7 +66,7 @@ SOLVES = (
 def tables_of_symbols(
     S: System, graph: Graph, known: Sequence[tuple[str, int]] = ()
 ) -> tuple[System, dict[int, Place]]:
-    """The tables with symbols in them, and where each stands; entries that are ``known`` are numbers."""
+    """Tables with symbols as entries, and the place of each; entries that are ``known`` are numbers."""
     places: dict[int, Place] = {}
     told = set(known)
 
@@ -86,7 +86,7 @@ def tables_of_symbols(
 
 
 class ProcedureRecorder:
-    """What of the engine's arrays is an expression, and where each stands.
+    """Workspace of expressions, with the place of each in the engine's arrays.
 
     Attributes
     ----------
@@ -108,23 +108,23 @@ class ProcedureRecorder:
         self.z = self.numbered("z", len(s.states))
 
     def numbered(self, name: str, n: int) -> np.ndarray:
-        """Symbols that are called by their numbers."""
+        """Array of n symbols, named by their indices."""
         out = np.zeros(n, object)
         out[:] = [self.graph.symbol(f"{name}[{k}]") for k in range(n)]
         return out
 
     def array(self, name: str) -> np.ndarray:
-        """An array of `Work`, by its name: ``"rows.gamma"``."""
+        """Array of `Work`, by its name: ``"rows.gamma"``."""
         found: Any = reduce(getattr, name.split("."), self.W)
         return found  # type: ignore[no-any-return]
 
     def at(self, name: str, *index: int) -> Place:
-        """Where an entry of an array of `Work` stands."""
+        """Place of an entry of an array of `Work`."""
         array = self.array(name)
         return f"W_{name.replace('.', '_')}", index[0] if array.ndim == 1 else index[0] * array.shape[1] + index[1]
 
     def fresh(self, name: str, row: int | None, columns: Sequence[int]) -> dict[int, Place]:
-        """Put symbols into an array of `Work`, or a row of it, in place of what is there; where they are read."""
+        """Replace an array of `Work`, or a row of it, by symbols; returns the places they are read from."""
         reads = {}
         array = self.array(name)
         for c in columns:
@@ -135,7 +135,7 @@ class ProcedureRecorder:
         return reads
 
     def again(self, name: str) -> dict[int, Place]:
-        """Symbols in place of what is no number in an array of one dimension: it is read from there."""
+        """Replace all expressions in a one-dimensional array by symbols; returns the places they are read from."""
         array = self.array(name)
         reads = {}
         for e, x in enumerate(array):
@@ -145,21 +145,21 @@ class ProcedureRecorder:
         return reads
 
     def stored(self, name: str, row: int | None, columns: Sequence[int]) -> list[tuple[Place, Any]]:
-        """What stands in an array of `Work`, or in a row of it, to be written there."""
+        """Entries of an array of `Work`, or of a row of it, with the places to write them to."""
         array = self.array(name)
         return [(self.at(name, *i), array[i]) for i in ((c,) if row is None else (row, c) for c in columns)]
 
     def kept(self, name: str) -> list[tuple[Place, Any]]:
-        """A whole array of one dimension, to be written."""
+        """Entries of a whole one-dimensional array, with the places to write them to."""
         return [(self.at(name, e), x) for e, x in enumerate(self.array(name))]
 
     def given(self, base: str, nodes: np.ndarray, first: int = 0) -> dict[int, Place]:
-        """Symbols that stand one after the other from an argument on."""
+        """Consecutive symbols with their places in an argument, from index ``first`` on."""
         return {x.index: (base, first + k) for k, x in enumerate(nodes)}
 
     @property
     def time(self) -> dict[int, Place]:
-        """The time."""
+        """The time, as an input."""
         return {self.t.index: ("t", 0)}
 
     @property
@@ -176,7 +176,7 @@ class ProcedureRecorder:
     def add(
         self, name: str, reads: dict[int, Place], stores: list[tuple[Place, Any]], returned: Any = 0.0
     ) -> Procedure:
-        """Another procedure; what formulas took for granted meanwhile makes it return a number greater than 0."""
+        """Add a procedure; if an assumption made by its formulas fails, it returns a number greater than 0."""
         granted, self.graph.granted = self.graph.granted, []
         checks = [([x], what, k + 1.0) for k, (x, what) in enumerate(granted)]
         made = Procedure(
@@ -192,10 +192,10 @@ class ProcedureRecorder:
 
 
 class SolveProcedures(ProcedureRecorder):
-    """Factor, solves, and what is missing of the velocities' constraints."""
+    """Procedures of the factorisation, the solves, and the constraint violation of velocities."""
 
     def solved(self) -> None:
-        """Factor and solves."""
+        """Add the factorisation and the solves."""
         solver = self.S.sizes.solver
         S, W = self.S, self.W
         if solver == SCHUR:
@@ -217,7 +217,7 @@ class SolveProcedures(ProcedureRecorder):
             self.refined(reads)
 
     def stepped(self, name: str, is_loaded: bool, reads: dict[int, Place]) -> None:
-        """Begin of a solve: what there is without the rows' multipliers, and what is left of the equations."""
+        """Add the start of a solve: the solution without the rows' multipliers, and the residuals of the equations."""
         S, W = self.S, self.W
         f, gamma = self.numbered("f", self.nv), self.numbered("gamma", self.nr)
         reads = {**reads, **self.given("a", f), **self.given("b", gamma)}
@@ -227,7 +227,7 @@ class SolveProcedures(ProcedureRecorder):
         if is_loaded:
             reads |= self.fresh("velocities.prescribed", None, self.driven)
             x[self.driven] = W.velocities.prescribed[self.driven]
-        if S.sizes.solver == SCHUR and self.semidefinite:  # what a pass gives back of E is of all that it has moved
+        if S.sizes.solver == SCHUR and self.semidefinite:  # the correction by E applies to the whole step of a pass
             W.velocities.scratch_2[:] = f if is_loaded else 0.0
         elif S.sizes.solver == SCHUR:
             for b in range(len(S.tree.parent)) if is_loaded else ():
@@ -241,7 +241,7 @@ class SolveProcedures(ProcedureRecorder):
         self.add(name, reads, stores)
 
     def solution(self, x: np.ndarray, lam: np.ndarray) -> list[tuple[Place, Any]]:
-        """What a pass leaves: the solution, what is left of the equations, efforts of drivers."""
+        """Outputs of a pass: the solution, the residuals of the equations, efforts of drivers."""
         out: list[tuple[Place, Any]] = [(("c", k), y) for k, y in enumerate(x)] + [
             (("d", k), y) for k, y in enumerate(lam)
         ]
@@ -255,11 +255,11 @@ class SolveProcedures(ProcedureRecorder):
 
     @property
     def semidefinite(self) -> bool:
-        """Whether something stands in for missing masses."""
+        """Whether substitutes replace zero masses."""
         return bool(self.S.scales.semidefinite > 0.0)
 
     def refined(self, reads: dict[int, Place]) -> None:
-        """A pass for what is left."""
+        """Add a refinement pass."""
         S, W = self.S, self.W
         f, gamma = self.numbered("f", self.nv), self.numbered("gamma", self.nr)
         x, lam = self.numbered("x", self.nv), self.numbered("lam", self.nr)
@@ -280,7 +280,7 @@ class SolveProcedures(ProcedureRecorder):
         self.add("REFINE", reads, self.solution(x, lam) + list(zip(places, rows, strict=True)), worst)
 
     def drifted(self) -> None:
-        """What is missing of the velocities' constraints."""
+        """Add the constraint violation of velocities."""
         out = np.array([0.0] * self.nr, object)
         worst, size = velocity_violation(self.S, self.W, self.v, out)
         stores = [(("b", k), x) for k, x in enumerate(out)] + [(("W_flat", TERMS), size)]
@@ -288,7 +288,7 @@ class SolveProcedures(ProcedureRecorder):
 
 
 class MechanismProcedures(SolveProcedures):
-    """All procedures of one mechanism, as far as expressions go; `Linked` says what they hand on to each other."""
+    """All procedures of one mechanism, as expressions; `LinkedProcedures` determines the values that they share."""
 
     def __init__(self, s: Structure, S: System, known: Sequence[tuple[str, int]] = ()) -> None:
         super().__init__(s, S, known)
@@ -298,7 +298,7 @@ class MechanismProcedures(SolveProcedures):
         self.prepared()
         self.placed()
         self.moved()
-        self.graph.strict = True  # where a force has no value, neither has what it is added to
+        self.graph.strict = True  # where a force has no value, a sum with it has none
         self.loaded()
         self.graph.strict = False
         self.finished()
@@ -308,7 +308,7 @@ class MechanismProcedures(SolveProcedures):
         self.sampled()
 
     def prepared(self) -> None:
-        """Unit quaternions, prescribed coordinates."""
+        """Add the normalisation of quaternions, and prescribed coordinates."""
         q, v = self.q.copy(), self.v.copy()
         set_prescribed(self.S, self.W, self.t, q, v)
         stores = [(("a", k), x) for k, x in enumerate(q) if x is not self.q[k]]
@@ -317,7 +317,7 @@ class MechanismProcedures(SolveProcedures):
         self.add("PREPARE", {**self.given("a", self.q), **self.given("b", self.v), **self.time}, stores)
 
     def placed(self) -> None:
-        """Poses and rows."""
+        """Add poses and rows."""
         nm, nr = self.nm, self.nr
         reads = self.fresh("sensed", VALUE, range(nm, 2 * nm))  # rates, as last measured
         update_positions(self.S, self.W, self.t, self.q, self.z)
@@ -333,7 +333,7 @@ class MechanismProcedures(SolveProcedures):
         self.add("SHOW", self.given("a", self.q), shown)
 
     def entries(self, readers: Sequence[Callable[[Work], list[Any]]], far: bool = False) -> list[tuple[int, int]]:
-        """Entries of the frames' records that others read; all positions if they ask how ``far`` frames are."""
+        """Entries of the frames' records that other code reads; all positions if ``far``."""
         S, FK, graph = self.S, self.W.FK, self.graph
         moving = range(S.sizes.ground_frames, S.sizes.moving_frames)
         asked = {(k, c) for k in moving for c in range(3)} if far else set()
@@ -350,11 +350,11 @@ class MechanismProcedures(SolveProcedures):
             except UndeterminedDecision:
                 found = list(trial[list(moving)].ravel())
             asked |= {names[x.index] for x in ordered_operations(found, {}) if x.index in names}
-        del graph.granted[granted:]  # by formulas of symbols that stand in no procedure
+        del graph.granted[granted:]  # by formulas of symbols that occur in no procedure
         return sorted(asked)
 
     def _can_progress(self) -> bool:
-        """Whether expressions can say how places on curves go on."""
+        """Whether the rates of places on curves can be expressed."""
         granted = len(self.graph.granted)
         try:
             self._place_rates(self.W._replace(FK=self.numbered("FK?", self.W.FK.size).reshape(self.W.FK.shape)))
@@ -365,7 +365,7 @@ class MechanismProcedures(SolveProcedures):
         return True
 
     def _place_rates(self, W: Work) -> list[Any]:
-        """Nothing, if expressions can do it."""
+        """Run the rates of places on curves on expressions; returns no outputs."""
         progress(self.S, W, self.z, np.zeros(len(self.z), object))
         return []
 
@@ -390,7 +390,7 @@ class MechanismProcedures(SolveProcedures):
         return list(sensed.ravel())
 
     def moved(self) -> None:
-        """Velocities, bias accelerations, and what follows."""
+        """Add velocities, bias accelerations, and quantities that follow from them."""
         nm = self.nm
         update_velocities(self.S, self.W, self.t, self.v, self.z)
         stores = self.stored("rows.gamma", None, range(self.nr))
@@ -400,7 +400,7 @@ class MechanismProcedures(SolveProcedures):
         self.add("MOVE", {**self.given("a", self.v), **self.given("b", self.z), **self.time}, stores)
 
     def loaded(self) -> None:
-        """Generalised forces."""
+        """Add generalised forces."""
         nm = self.nm
         reads = self.fresh("sensed", LOAD, range(2 * nm, loads_end(self.S, self.W)))
         rates = np.full(len(self.z), None, object)
@@ -410,7 +410,7 @@ class MechanismProcedures(SolveProcedures):
         self.add("LOADS", {**self.state, **reads}, stores)
 
     def finished(self) -> None:
-        """The state's derivative."""
+        """Add the derivative of the state."""
         if not self.finishes:
             return
         nq, nv = self.s.nq, self.nv
@@ -418,7 +418,7 @@ class MechanismProcedures(SolveProcedures):
         x, lam = self.numbered("x", nv), self.numbered("lam", self.nr)
         self.W.velocities.solved[:], self.W.rows.multiplier[:] = x, lam
         reads = self.fresh("velocities.effort", None, self.driven)
-        before = self.numbered("dy", nq + nv + len(self.z))  # works stand there already
+        before = self.numbered("dy", nq + nv + len(self.z))  # works are there already
         dy = before.copy()
         store_derivative(self.S, self.W, self.t, np.concatenate([self.q, self.v, self.z]), dy)
         self.W.velocities.solved[:], self.W.rows.multiplier[:] = given
@@ -428,7 +428,7 @@ class MechanismProcedures(SolveProcedures):
         made.checks = [(list({y.index: y for y in dy if isinstance(y, Node)}.values()), "finite", 1.0)]
 
     def sampled(self) -> None:
-        """Laws that may do much within a step, one by one."""
+        """Add the laws that may act briefly within a step, one by one."""
         S, W = self.S, self.W
         sensed = np.full((3, 2 * self.nm), None, object)
         sensed[VALUE] = values = self.numbered("within", 2 * self.nm)

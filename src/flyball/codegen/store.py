@@ -1,6 +1,6 @@
-"""Whether code can be made for a mechanism, its key, its cost, and the code kept in memory and on disk.
+"""Whether code can be generated for a mechanism, its key, its cost, and its cache in memory and on disk.
 
-Code is kept in this process, and on disk beside the engine's (`compiler.store`), for others.
+Code is cached in this process, and on disk beside the engine's (`compiler.object_code`), for other processes.
 """
 
 from __future__ import annotations
@@ -44,25 +44,26 @@ from .machine_code import (
 from .procedures import PLAIN_ENTRIES
 
 MAX_OPERATIONS = 40_000
-"""Operations, as estimated, up to which code is made: compiling takes seconds there, and grows faster than they."""
+"""Estimated operations up to which code is generated: its compilation takes seconds, and grows faster than linearly."""
 LOOKUP_COST, LOAD_COST, OPERATION_COST, GROWTH_COST = 50e3, 3e6, 20e3, 3.5
-"""What it costs to look a mechanism up, to load code from disk [ns]; to make an operation [ns], and more for each of
-all others: 0.2 s for Andrews' mechanism, 1.8 s for the Stewart platform."""
+"""Cost of looking a mechanism up, of loading code from disk [ns]; of compiling an operation [ns], and the addition for
+each other operation: 0.2 s for Andrews' mechanism, 1.8 s for the Stewart platform.
+"""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is known before anything is made.
+    """What is known before code is generated.
 
     Attributes
     ----------
     key : str
-        The same for all mechanisms that the same code may serve: their structure, which entries of their tables are 0,
-        1 or -1, the sources that all this comes from, the processor.
+        The same for all mechanisms that the same code may serve: a hash of their structure, of the table entries
+        that are 0, 1 or -1, of the sources, and of the processor.
     size : int
         Estimated operations.
     refused : str
-        Why no code is made for it, in words; empty if it is.
+        Why no code is generated, in words; empty if it is.
     """
 
     key: str
@@ -71,7 +72,7 @@ class Plan:
 
 
 def plan(x: Values) -> Plan:
-    """Look at a mechanism; nothing is traced."""
+    """Inspect a mechanism; nothing is traced."""
     return x.kept.get("plan of made code", None, 1, lambda: _planned(x.structure, x.system))
 
 
@@ -97,7 +98,7 @@ def estimate_operations(S: System) -> int:
 
 
 def _structure(s: Structure, S: System) -> bytes:
-    """Hash of what parameters cannot change, of sources and processor."""
+    """Hash of everything that parameters cannot change, of sources and processor."""
     digest = hashlib.sha256(target_description().encode() + sources_digest())
     digest.update(" ".join("" if x is None else x.content for x in (*s.force_code, *s.term_code)).encode())
     for name, a in named_arrays(S._replace(force_code=S.force_code != 0, term_code=S.term_code != 0)):
@@ -109,7 +110,7 @@ def _structure(s: Structure, S: System) -> bytes:
 
 @lru_cache(maxsize=1)
 def sources_digest() -> bytes:
-    """Hash of all files that formulas come from, or that make code of them."""
+    """Hash of all source files of formulas and of the code generator."""
     digest = hashlib.sha256()
     files: set[Path] = compiled_files()
     for folder in ("codegen", "expression_graph"):
@@ -121,27 +122,27 @@ def sources_digest() -> bytes:
     return digest.digest()
 
 
-IN_MEMORY = 64  # codes that a process keeps
+IN_MEMORY = 64  # codes that a process caches
 STORED_FIELDS = ("scratch", "constants", "operations", "laws", "seconds", "known")
-"""What a file says of its code."""
+"""Metadata of the code in a file."""
 _LOCK = threading.RLock()
 _found: OrderedDict[tuple[str, str], GeneratedCode] = OrderedDict()
 _refused: dict[str, str] = {}
-_nowhere: dict[str, int] = {}  # of what was not on disk, when the folder had last been changed
+_nowhere: dict[str, int] = {}  # key -> modification time of the folder when the code was not on disk
 
 
 def ready() -> bool:
-    """Whether this process has any such code."""
+    """Whether this process has any generated code."""
     return bool(_found)
 
 
 def can_store() -> bool:
-    """Whether code can be left on disk for other processes."""
+    """Whether code can be stored on disk for other processes."""
     return _folder() is not None
 
 
 def known(p: Plan, x: Values) -> str:
-    """Where code for a mechanism is: "memory", "disk", or "" (nowhere)."""
+    """Location of the code for a mechanism: "memory", "disk", or "" (none)."""
     if in_memory(p, x) is not None:
         return "memory"
     folder = _folder()
@@ -154,22 +155,22 @@ def known(p: Plan, x: Values) -> str:
 
 
 def refusal(p: Plan) -> str:
-    """Why no code is made for it, as far as that is known; empty if nothing speaks against it."""
+    """Reason why no code is generated, as far as known; empty if there is none."""
     return p.refused or _refused.get(p.key, "")
 
 
 def price(p: Plan, where: str) -> float:
-    """What it costs to have the code [ns], by counts: never by a clock."""
+    """Estimated cost of obtaining the code [ns], from counts and not from measured time."""
     return {"memory": LOOKUP_COST, "disk": LOAD_COST}.get(where, p.size * (OPERATION_COST + GROWTH_COST * p.size))
 
 
 def code(p: Plan, x: Values) -> tuple[GeneratedCode, str]:
-    """The code for a mechanism, and where it comes from, in words.
+    """Code for a mechanism, and its origin in words.
 
     Raises
     ------
     Refused
-        If none is made for it.
+        If no code is generated for it.
     """
     if why := refusal(p):
         raise Refused(why)
@@ -206,7 +207,7 @@ def digest(S: System, entries: list[Entry]) -> str:
 
 
 def in_memory(p: Plan, x: Values) -> GeneratedCode | None:
-    """The code for a mechanism that this process has."""
+    """Code for a mechanism from this process's cache."""
     for key, made in list(_found.items()):
         if key[0] == p.key and key[1] == digest(x.system, made.known):
             return made
@@ -232,7 +233,7 @@ def _files(p: Plan) -> list[Path]:
 
 
 def _fitting(p: Plan, S: System) -> Iterator[tuple[dict[str, Any], bytes]]:
-    """What files say that may serve a mechanism, and their code."""
+    """Metadata and code of the files that fit a mechanism."""
     for path in _files(p):
         if (data := read_object(path)) is not None:
             text, _, machine_code = data.partition(b"\n")
@@ -245,7 +246,7 @@ def _fitting(p: Plan, S: System) -> Iterator[tuple[dict[str, Any], bytes]]:
 
 def _on_disk(p: Plan, S: System) -> GeneratedCode | None:
     for told, machine_code in _fitting(p, S):
-        with contextlib.suppress(RuntimeError):  # LLVM's, of wrong code
+        with contextlib.suppress(RuntimeError):  # LLVM's error for invalid code
             made = GeneratedCode(LoadedProcedures(machine_code, told["laws"]), *(told[k] for k in STORED_FIELDS))
             _keep_in_memory(p, S, made)
             return made
@@ -253,7 +254,7 @@ def _on_disk(p: Plan, S: System) -> GeneratedCode | None:
 
 
 def _write(p: Plan, of: str, fields: dict[str, Any], machine_code: bytes) -> None:
-    """Leave it for others; where that cannot be, nothing is lost but time."""
+    """Store code for other processes; a failure costs only time."""
     folder = _folder()
     if folder is None:
         return

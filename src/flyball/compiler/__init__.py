@@ -1,1 +1,1 @@
-"""Formulas and kernels: what Numba compiles, how it is linked, and how the cache knows that it is still true."""
+"""Formulas and kernels: what Numba compiles, how it is linked, and how the cache detects outdated code."""

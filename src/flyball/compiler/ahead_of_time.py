@@ -1,4 +1,4 @@
-"""Every kernel compiled ahead of time, on all cores: ``flyball compile``, and the wheel that brings object code."""
+"""Ahead-of-time compilation of all kernels on all cores, for ``flyball compile`` and for the wheel with object code."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .object_code import (
 )
 
 _DECORATED = re.compile(r"^@(first_order_)?kernel$", re.MULTILINE)
-# Modules are found where this process finds them, and an interrupt is this process' to answer.
+# Child processes find modules where this process does, and leave interrupts to it.
 _WORKER = """import signal, sys
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 sys.path[:] = {path!r}
@@ -37,7 +37,7 @@ work()
 
 
 def all_kernels() -> list[Kernel]:
-    """The kernels of flyball, those that take longest first."""
+    """Kernels of flyball, those that take longest first."""
     for file in sorted(compiled_files()):
         if _DECORATED.search(file.read_text(encoding="utf-8")):
             import_module(".".join(("flyball", *file.relative_to(PACKAGE).with_suffix("").parts)))
@@ -46,35 +46,35 @@ def all_kernels() -> list[Kernel]:
 
 
 def missing_kernels(folder: Path, cpus: Sequence[str]) -> list[Kernel]:
-    """Kernels of which a folder has not all object code."""
+    """Kernels whose object code is missing, at least in part, from a folder."""
     return [k for k in all_kernels() if any(read_object(folder / file_name(k, cpu)) is None for cpu in cpus)]
 
 
 def compile_all(
     folder: Path | None = None, cpus: Sequence[str] = (), progress: Callable[[str, int, int], None] | None = None
 ) -> int:
-    """Compile what a folder lacks; processes share the work.
+    """Compile the kernels that a folder lacks, shared among processes.
 
     Parameters
     ----------
     folder : Path
-        The user's if it is not given.
+        By default the user's.
     cpus : sequence of str
-        See `object_code.BASELINES`; this machine's if there are none.
+        See `object_code.BASELINES`; by default this machine's.
     progress : function
         Called with the name of a kernel that is ready, how many are, and how many there are in all.
 
     Returns
     -------
     int
-        How many were compiled.
+        Number of kernels compiled.
 
     Raises
     ------
     OSError
         If the folder cannot be written.
     RuntimeError
-        If a kernel cannot be compiled, with the end of what that process said.
+        If a kernel cannot be compiled, with the end of that process's output.
     """
     folder, cpus = folder or cache_folder(), cpus or (baseline(),)
     if folder is None:
@@ -86,7 +86,7 @@ def compile_all(
     lock = Lock()
 
     def serve() -> None:
-        """Have one process compile what nobody has taken yet."""
+        """Run one process that compiles kernels from the shared list."""
         code = _WORKER.format(path=sys.path)
         process = subprocess.Popen(
             [sys.executable, "-P", "-c", code], stdin=PIPE, stdout=PIPE, stderr=PIPE, text=True, bufsize=1
@@ -119,12 +119,12 @@ def compile_all(
 
 
 def available_cores() -> int:
-    """Cores that this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def work() -> None:
-    """What a process does that was started for this: compile the kernels whose names it reads, one a line."""
+    """Main function of a child process: compile the kernels whose names it reads, one on each line."""
     folder, cpus = Path(sys.stdin.readline().strip()), tuple(sys.stdin.readline().split())
     known = {k.name: k for k in all_kernels()}
     for line in sys.stdin:

@@ -1,11 +1,11 @@
 """Formulas: plain Python code that compiled code may call, and the sources that compiled code is made of.
 
 ``@formula`` marks a formula. The function itself stays plain Python, so the same source runs on floats, complex
-numbers, arrays over time and symbols. It is registered with the compiler when something is compiled
-(`object_code`), and never before: describing and checking a mechanism does not pay for a compiler.
+numbers, arrays over time and symbols. It is registered with the compiler when something is compiled (`object_code`),
+and never before: describing and checking a mechanism does not load a compiler.
 
-The hash of a kernel's sources covers its file and all that this imports, as far as it holds formulas or constants
-of theirs; an edit of what a kernel does not import leaves its code valid.
+The hash of a kernel's sources covers its file and all files that this imports, as far as they contain formulas or their
+constants. An edit of a file that a kernel does not import leaves its code valid.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from weakref import WeakValueDictionary
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}  # division as in C; nothing is allocated
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}  # division as in C; no memory allocation
 LOCK = threading.RLock()
 KERNELS: list[Any] = []  # every `kernels.Kernel`
 FIRST_ADDRESS = 1 << 16
-"""No code table stands at a smaller address; the numbers of the kinds of built-in elements are smaller."""
+"""Smallest possible address of a code table; the numbers of the kinds of built-in elements are smaller."""
 CODE_TABLES: WeakValueDictionary[int, Any] = WeakValueDictionary()
 """The `kernels.CodeTable` at an address, as long as it exists."""
 _formulas: list[Callable[..., Any]] = []
@@ -39,7 +39,7 @@ _numba_overload: list[Any] = []  # `numba_target.overload`, once something is co
 
 
 def formula(function: F) -> F:
-    """Let compiled code call ``function``; the function itself stays plain Python and can be run on any numbers."""
+    """Let compiled code call ``function``; the function itself stays plain Python and accepts any numbers."""
     _formulas.append(function)
     _register_waiting()
     return function
@@ -53,7 +53,7 @@ def when_compiling(callback: Callable[[], None]) -> Callable[[], None]:
 
 
 def register_all(overload: Any) -> None:
-    """Tell the compiler of every formula, those of the future included, by ``target.overload``."""
+    """Register every formula with the compiler, including later ones, by ``target.overload``."""
     _numba_overload[:] = [overload]
     _register_waiting()
 
@@ -72,7 +72,7 @@ def _make_callable(function: Callable[..., Any]) -> None:
 
 
 def by_address(fields):  # type: ignore[no-untyped-def]
-    """The named tuple by its address, in compiled code; the tuple itself in plain Python."""
+    """Pass the named tuple by its address in compiled code; return the tuple itself in plain Python."""
     return fields
 
 
@@ -89,23 +89,23 @@ def call_bound(words, task):  # type: ignore[no-untyped-def]
 def formula_at(table, k, arguments, like):  # type: ignore[no-untyped-def]
     """Call formula k of the code table at an address.
 
-    In compiled code its code is called, in plain Python the function itself.
+    Compiled code calls the formula's code, plain Python the function itself.
 
     Parameters
     ----------
     table : int
-        Address of a `kernels.CodeTable`; of any other number the result is ``like``.
+        Address of a `kernels.CodeTable`; for any other number the result is ``like``.
     k : int
     arguments : tuple
     like : number or tuple
-        The result where there is no such table; it has the type of every result.
+        The result without such a table; it has the type of every result.
     """
     found = CODE_TABLES.get(int(table))
     return like if found is None else found.functions[k](*arguments)
 
 
 def has_formula(table, k):  # type: ignore[no-untyped-def]
-    """Whether there is a code table at an address, and formula k in it."""
+    """Whether there is a code table at an address, with formula k in it."""
     found = CODE_TABLES.get(int(table))
     return found is not None and found.functions[k] is not None
 
@@ -122,11 +122,11 @@ COMPILED = (
     "simulation/impulse_stepping",
     "tables/table_definitions.py",
 )
-"""Files and folders that hold formulas and kernels, and all constants that these take from elsewhere."""
+"""Files and folders that contain formulas and kernels, and all constants that these use."""
 COMPILER = ("formulas.py", "kernels.py", "numba_target.py", "object_code.py", "struct_layout.py")
-"""Files of the compiler that decide what code is made."""
+"""Files of the compiler that determine the code."""
 GENERATED_SOURCES: dict[str, str] = {}
-"""Sources of formulas that were put together at import (`generated_formula`): module and name -> text."""
+"""Sources of formulas that were generated at import (`generated_formula`): module and name -> text."""
 
 _IMPORT = re.compile(r"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|[\w ,*]+)", re.MULTILINE)
 _FOLDER_SEARCH = re.compile(r"^import pkgutil$", re.MULTILINE)
@@ -142,7 +142,7 @@ def compiled_files() -> set[Path]:
 
 
 def sources_of(file: Path) -> list[Path]:
-    """The source files that a kernel which stands in ``file`` is made of: all, where it is not one of ours."""
+    """Source files of a kernel in ``file``: all of them if it is not a file of flyball."""
     known, seen, todo = compiled_files(), set[Path](), [file, *(Path(__file__).parent / name for name in COMPILER)]
     if not file.is_relative_to(PACKAGE):
         todo += known
@@ -156,12 +156,12 @@ def sources_of(file: Path) -> list[Path]:
 
 @cache
 def _imported_files(path: Path) -> frozenset[Path]:
-    """Files that a file imports; where it looks for the files of its folder by itself, all of these."""
+    """Files that a file imports; all files of its folder if it searches that itself."""
     text = path.read_text(encoding="utf-8")
     out = set(path.parent.glob("*.py")) if _FOLDER_SEARCH.search(text) else set()
     for dots, module, names in _IMPORT.findall(text):
         base = path.parents[len(dots) - 1].joinpath(*module.split("."))
-        if base.is_dir():  # what is named may be files of it, or folders
+        if base.is_dir():  # the names may be files or folders in it
             named = [base / n for n in re.findall(r"\w+", names)]
             out |= {base / "__init__.py", *(n.with_suffix(".py") for n in named), *(n / "__init__.py" for n in named)}
             out |= set(base.glob("*.py")) if "*" in names else set()
@@ -171,15 +171,15 @@ def _imported_files(path: Path) -> frozenset[Path]:
 
 
 def source_hash(function: Callable[..., Any]) -> str:
-    """Hash of every source that a kernel is made of."""
+    """Hash of all sources of a kernel."""
     return _sources_hash(Path(function.__code__.co_filename))
 
 
 def content_hash(function: Callable[..., Any]) -> str:
-    """Hash of a function that is not flyball's: its code, and all that this takes from outside.
+    """Hash of a function outside flyball: its code, and everything it reads from outside.
 
-    Numbers that it finds outside, such as global constants, are part of its code and of the hash; so are other
-    functions. Those of flyball count by their sources.
+    Numbers that it reads from outside, such as global constants, are part of its code and of the hash; so are other
+    functions. Functions of flyball are covered by the hash of their sources.
     """
     digest = hashlib.sha256(f"{sys.implementation.cache_tag} {_sources_hash(Path(__file__))}".encode())
     for part in _content_parts(function, []):
@@ -188,16 +188,16 @@ def content_hash(function: Callable[..., Any]) -> str:
 
 
 def fresh_copy(function: FunctionType, copies: dict[FunctionType, FunctionType]) -> FunctionType:
-    """The same function as another object, with what it takes from outside as that is now.
+    """Copy of a function with the present values of what it reads from outside.
 
-    Numba keeps what it has made of a function, with the numbers that it took from outside then. Functions that are not
-    flyball's and that it calls are replaced in the same way, and compiled code may call them.
+    Numba caches the compiled function with the outside numbers of that time. Functions outside flyball that it calls
+    are replaced in the same way, and compiled code may call them.
 
     Parameters
     ----------
     function : function
     copies : dict
-        Twins that were made already.
+        Copies made already.
     """
     names = _used_names(function.__code__)
 
@@ -225,14 +225,14 @@ def fresh_copy(function: FunctionType, copies: dict[FunctionType, FunctionType])
     for name in names & set(function.__globals__):
         scope[name] = known(function.__globals__[name])
     for cell, given in zip(cells, function.__closure__ or (), strict=True):
-        with suppress(ValueError):  # not filled yet
+        with suppress(ValueError):  # an empty cell
             cell.cell_contents = known(given.cell_contents)
     return new
 
 
 def _content_parts(x: Any, visited: list[Any]) -> Iterator[str]:
-    """Texts that say what compiled code is made of where it uses a value."""
-    x = getattr(x, "py_func", x)  # the Python under decorators of Numba
+    """Texts that identify the code that a value contributes to compiled code."""
+    x = getattr(x, "py_func", x)  # the Python function under Numba's decorators
     if isinstance(x, CodeType):
         yield f"{x.co_code.hex()} {x.co_names} {x.co_varnames} {x.co_argcount} {x.co_kwonlyargcount} {x.co_flags}"
         for constant in x.co_consts:
@@ -265,10 +265,10 @@ def _content_parts(x: Any, visited: list[Any]) -> Iterator[str]:
 
 
 def _external_values(function: FunctionType) -> Iterator[tuple[str, Any]]:
-    """Names and values that a function finds outside of itself."""
+    """Names and values that a function reads from outside."""
     names = _used_names(function.__code__)
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
-        with suppress(ValueError):  # not filled yet
+        with suppress(ValueError):  # an empty cell
             yield name, cell.cell_contents
     for name in sorted(names & set(function.__globals__)):
         value = function.__globals__[name]
@@ -281,7 +281,7 @@ def _external_values(function: FunctionType) -> Iterator[tuple[str, Any]]:
 
 
 def _used_names(code: CodeType) -> set[str]:
-    """Global names and attributes that code uses, functions inside it included."""
+    """Global names and attributes that code uses, including nested functions."""
     return set(code.co_names).union(*(_used_names(c) for c in code.co_consts if isinstance(c, CodeType)))
 
 
@@ -300,7 +300,7 @@ def _sources_hash(file: Path) -> str:
 
 
 def generated_formula(home: str, name: str, arguments: str, lines: Sequence[str], names: Mapping[str, Any]) -> Any:
-    """A formula with these lines.
+    """Formula with the given lines.
 
     Parameters
     ----------
@@ -311,7 +311,7 @@ def generated_formula(home: str, name: str, arguments: str, lines: Sequence[str]
     lines : sequence of str
         The body, without indentation of its own.
     names : mapping
-        What the body calls.
+        Names that the body uses.
     """
     text = "".join([f"def {name}({arguments}):\n", *(f"    {line}\n" for line in lines)])
     file = f"<{home}.{name}>"
@@ -325,10 +325,10 @@ def generated_formula(home: str, name: str, arguments: str, lines: Sequence[str]
 def dispatch_by_kind(
     home: str, name: str, arguments: str, cases: Mapping[int, Callable], otherwise: str, form: int | None = None
 ) -> Any:
-    """A formula ``name(kind, arguments)`` that hands on to the one of that kind.
+    """Formula ``name(kind, arguments)`` that calls the formula of that kind.
 
-    ``otherwise`` is what an unknown kind answers: nan, so that no element is ever answered by another one's formula.
-    Where there is a ``form``, ``kind`` may also be the address of a code table, whose formula of that number is called.
+    ``otherwise`` is the result for an unknown kind: nan, so that the formula of another element is never used. With a
+    ``form``, ``kind`` may also be the address of a code table, whose formula of that number is called.
     """
     names: dict[str, Any] = {f"{_formula_name(f)}_{kind}": f for kind, f in sorted(cases.items())}
     lines = []

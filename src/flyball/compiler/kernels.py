@@ -1,16 +1,15 @@
 """Kernels: entry points of compiled code, layouts and buffers of their arguments, code tables of formulas.
 
-A kernel is called by Python or, by its address, by other kernels. Its parameters are structures of arrays, arrays
-and numbers, declared by annotations: a named tuple whose fields are annotated with the names below (``mass:
-Float1``, ``pattern: Pattern``) is a structure of arrays. An array is described by seven words and two for each
-dimension, as Numba describes it: two that own memory (0 here), its length, the bytes of an entry, the address of
-its numbers, its shape, its strides. A structure is its arrays one after the other. `StructBuffer` describes the
-arrays of a named tuple, which stay where they are; `StructPool` makes named tuples whose arrays stand in one
-block of memory.
+A kernel is called by Python or, by its address, by other kernels. Its parameters are structures of arrays, arrays and
+numbers, declared by annotations: a named tuple whose fields are annotated with the names below (``mass: Float1``,
+``pattern: Pattern``) is a structure of arrays. An array is described by seven words and two for each dimension, as in
+Numba: two for memory ownership (0 here), its length, the bytes of an entry, the address of its numbers, its shape, its
+strides. A structure is a sequence of array descriptions. `StructBuffer` describes the arrays of a named tuple, which
+stay where they are; `StructPool` makes named tuples whose arrays share one block of memory.
 
-Built-in elements are compiled into the kernels. The formulas of a user's own class are compiled alone, and a
-kernel calls them through the addresses in the class's `CodeTable`, so that no kernel has to be compiled again
-when a user's source changes. Numba is imported only where something must be compiled.
+Built-in elements are compiled into the kernels. The formulas of a user-defined class are compiled alone, and a kernel
+calls them through the addresses in the class's `CodeTable`, so that no kernel has to be compiled again when a user's
+source changes. Numba is imported only when something must be compiled.
 """
 
 from __future__ import annotations
@@ -50,11 +49,11 @@ class Signature(NamedTuple):
     Attributes
     ----------
     name : str
-        The attribute of the class that is the formula.
+        Attribute of the class that holds the formula.
     arguments : str
         Names of its arguments.
     lengths : tuple
-        Lengths of the arguments, which are numbers (0) or tuples of numbers, nested as these are.
+        Lengths of the arguments, which are numbers (0) or nested tuples of numbers.
     result : int or tuple
         Lengths of the result, likewise.
     returns : str
@@ -100,12 +99,12 @@ class CompiledCode:
 
     @property
     def used(self) -> bool:
-        """Whether the code is in the memory of this process."""
+        """Whether the code is loaded in this process."""
         return self._loaded is not None
 
     @property
     def origin(self) -> str:
-        """Where the code is from: "shipped", "cache" or "compiled"; empty as long as its address was not read."""
+        """Origin of the code: "shipped", "cache" or "compiled"; empty before its address is first read."""
         return self._loaded.origin if self._loaded is not None else ""
 
     @property
@@ -121,7 +120,7 @@ class CompiledCode:
 
 
 class FormulaCode(CompiledCode):
-    """The machine code of one formula of a user's own, for floats or for complex numbers."""
+    """Machine code of one formula of a user-defined class, for floats or for complex numbers."""
 
     signature: Signature
 
@@ -136,7 +135,7 @@ class FormulaCode(CompiledCode):
 
     @property
     def content(self) -> str:  # type: ignore[override]
-        """Hash of the formula, of its signature, and of the functions and numbers that it uses."""
+        """Hash of the formula, its signature, and the functions and numbers that it uses."""
         return f"{self.signature} {self.signature.result} {content_hash(self._original)}"
 
 
@@ -160,7 +159,7 @@ class CodeTable:
     Raises
     ------
     ModelError
-        If a formula is no static method, or has other arguments than its signature.
+        If a formula is not a static method, or its arguments differ from its signature.
     """
 
     def __init__(self, owner: type, signatures: Sequence[Signature]) -> None:
@@ -201,7 +200,7 @@ class CodeTable:
                     words[int(first_order)] = code.address
                 except (ImportError, MemoryError):
                     raise
-                except Exception as error:  # Numba's, of many kinds
+                except Exception as error:  # Numba raises many kinds of exceptions
                     raise ModelError(_cannot_compile(self.owner, signature, first_order, error)) from error
                 self._code.append(code)
 
@@ -213,12 +212,12 @@ class CodeTable:
 
 
 def code_table(owner: type, signatures: Sequence[Signature], required: Sequence[Signature] = ()) -> CodeTable:
-    """The code table of a class; a new one where a formula has changed.
+    """Code table of a class; a new one if a formula has changed.
 
     Raises
     ------
     ModelError
-        If the class lacks a required formula, or one is not as its signature says.
+        If the class lacks a required formula, or one does not match its signature.
     """
     for x in required:
         if not hasattr(owner, x.name):
@@ -233,7 +232,7 @@ def code_table(owner: type, signatures: Sequence[Signature], required: Sequence[
 
 
 def table_addresses(tables: Sequence[CodeTable | None]) -> np.ndarray:
-    """Addresses of code tables; 0 of None."""
+    """Addresses of code tables; 0 for None."""
     return np.array([0 if x is None else x.address for x in tables], np.int64)
 
 
@@ -250,7 +249,7 @@ def make_ready(addresses: np.ndarray, first_order: bool) -> None:
 
 
 def short_reason(error: Exception) -> str:
-    """The line of an error of Numba that says what is wrong."""
+    """Line of a Numba error that states the cause."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     lines = [line for line in lines if not line.startswith(("Failed in", "During:"))] or [type(error).__name__]
     return lines[0][:200]
@@ -284,19 +283,19 @@ def _cannot_compile(owner: type, signature: Signature, first_order: bool, error:
     )
 
 
-ALIGNMENT = 64  # bytes at whose multiples arrays begin in a block
+ALIGNMENT = 64  # alignment of arrays in a block [bytes]
 _ORDER = 0x1 | 0x100  # flags of an array: C order, aligned
 _WRITEABLE = 0x400
 _byte, _address = ctypes.c_char.from_buffer, ctypes.addressof
 
 
 def address_of(x: np.ndarray) -> int:
-    """Where an array's first number stands; by its buffer, where it has one, in a fifth of the time."""
+    """Address of an array's first number; through its buffer if possible, which takes a fifth of the time."""
     return _address(_byte(x)) if x.size and x.flags.writeable and x.flags.c_contiguous else x.ctypes.data
 
 
 def tuple_layout(fields: Any) -> Struct:
-    """Layout of a named tuple: the ``Complex`` twin if an array that has one is complex."""
+    """Layout of a named tuple: the ``Complex`` variant if an array for which there is one is complex."""
     return struct_layout(type(fields), _is_complex(fields, struct_layout(type(fields))))
 
 
@@ -325,7 +324,7 @@ class StructBuffer:
     Raises
     ------
     TypeError
-        If an array is not as the annotations of the tuple declare it.
+        If an array does not match the annotations of the tuple.
     """
 
     def __init__(self, fields: Any, *known: StructBuffer) -> None:
@@ -337,7 +336,7 @@ class StructBuffer:
         self.address = address_of(self.words)
 
     def of(self, fields: Any) -> StructBuffer:
-        """That of another tuple of this kind, most of whose arrays are the same."""
+        """Buffer of another tuple of this type, most of whose arrays are the same."""
         if tuple_layout(fields) != self.layout:
             return StructBuffer(fields)
         other = copy(self)
@@ -358,7 +357,7 @@ def _add_descriptions(fields: Any, layout: Struct, known: dict[int, StructBuffer
 
 
 def _field_description(x: np.ndarray, of: Any, name: str, layout: Struct) -> tuple[int, ...]:
-    """The words that describe an array of a structure; code that it has the addresses of is made ready."""
+    """Descriptor words of an array of a structure; code whose addresses it contains is loaded or compiled."""
     words = array_description(x, of, f"{layout.of.__name__}.{name}")
     if isinstance(of, CodeTables) and x.any():
         make_ready(x, layout.complex)
@@ -366,7 +365,7 @@ def _field_description(x: np.ndarray, of: Any, name: str, layout: Struct) -> tup
 
 
 def _update_descriptions(old: Any, new: Any, layout: Struct, words: np.ndarray, at: int) -> None:
-    """Write anew the words, from ``at`` on, of the arrays that are not those of ``old``."""
+    """Rewrite the words, from ``at`` on, of the arrays that differ from those of ``old``."""
     for before, x, (name, of) in zip(old, new, layout.fields, strict=True):
         if x is not before and isinstance(x, tuple):
             _update_descriptions(before, x, of, words, at)
@@ -376,7 +375,7 @@ def _update_descriptions(old: Any, new: Any, layout: Struct, words: np.ndarray, 
 
 
 def array_description(x: np.ndarray, of: Array | RecordLayout, name: str) -> tuple[int, ...]:
-    """The words that describe an array.
+    """Descriptor words of an array.
 
     Raises
     ------
@@ -394,7 +393,7 @@ def array_description(x: np.ndarray, of: Array | RecordLayout, name: str) -> tup
 
 
 class JoinedBuffer(StructBuffer):
-    """A named tuple of tuples that have buffers."""
+    """Buffer of a named tuple of tuples that have buffers."""
 
     def __init__(self, make: type, *parts: StructBuffer) -> None:
         self._make, self._parts = make, parts
@@ -410,7 +409,7 @@ class JoinedBuffer(StructBuffer):
 
 
 class PooledBuffer(StructBuffer):
-    """What a `StructPool` makes: arrays in one block of memory; in Python they are made when first used."""
+    """Result of a `StructPool`: arrays in one block of memory; the Python arrays are created when first used."""
 
     def __init__(self, pool: StructPool) -> None:
         self._pool, self._block = pool, pool.block.copy()
@@ -425,19 +424,19 @@ class PooledBuffer(StructBuffer):
         return self._pool.fill(self._block)
 
     def array(self, name: str) -> Any:
-        """One of its arrays, without the others; of a tuple in it ``"inner.name"``."""
+        """One of its arrays, without creating the others; in a nested tuple ``"inner.name"``."""
         return self._pool.named(name, self._block)
 
 
 class StructPool:
-    """Makes named tuples of arrays of which each run has its own.
+    """Pool of named tuples of arrays, one for each run.
 
     Parameters
     ----------
     fields : tuple
-        As they are new.
+        Their initial values.
     constant : sequence of ndarray
-        Those of them that all runs share, since nothing writes to them.
+        Arrays among them that all runs share, since nothing writes to them.
     """
 
     def __init__(self, fields: Any, constant: Sequence[np.ndarray] = ()) -> None:
@@ -457,11 +456,11 @@ class StructPool:
         self.words[self.places] = [begin for _, _, begin, _ in self._placements]
 
     def new(self) -> PooledBuffer:
-        """A tuple of one's own."""
+        """New tuple with arrays of its own."""
         return PooledBuffer(self)
 
     def fill(self, block: np.ndarray) -> Any:
-        """The tuple, its arrays in a block."""
+        """Tuple with its arrays in a block."""
         return self._filled(self._new, block, iter(self._placements))
 
     def named(self, name: str, block: np.ndarray) -> np.ndarray:
@@ -470,7 +469,7 @@ class StructPool:
         return np.ndarray(shape, dtype, block, begin).view(of)
 
     def _place_arrays(self, fields: Any, at: int, places: list[int], of: str = "") -> int:
-        """Decide where arrays begin in the block, and which words hold their addresses."""
+        """Assign places in the block to arrays, and the words that hold their addresses."""
         for name, x in zip(fields._fields, fields, strict=True):
             if isinstance(x, tuple):
                 at = self._place_arrays(x, at, places, f"{of}{name}.")
@@ -499,7 +498,7 @@ class StructPool:
 
 
 def _arrays_of(fields: Any) -> Iterator[np.ndarray]:
-    """The arrays of a tuple, of tuples in it too."""
+    """Arrays of a tuple, including nested tuples."""
     for x in fields:
         if isinstance(x, tuple):
             yield from _arrays_of(x)
@@ -513,12 +512,12 @@ def kernel(function: Callable[..., Any]) -> Kernel:
 
 
 def first_order_kernel(function: Callable[..., Any]) -> Kernel:
-    """The same for complex numbers that carry steps: (a + i b)(c + i d) = a c + i (a d + b c)."""
+    """Make ``function`` an entry point for complex steps, with (a + i b)(c + i d) = a c + i (a d + b c)."""
     return Kernel(function, first_order=True)
 
 
 class Kernel(CompiledCode):
-    """A compiled entry point, found in the store or compiled when it is first needed.
+    """Compiled entry point, loaded from the cache or compiled when it is first needed.
 
     Attributes
     ----------
@@ -541,17 +540,17 @@ class Kernel(CompiledCode):
 
     @property
     def returns(self) -> type | None:
-        """`int`, `float` or None."""
+        """Type of the result: `int`, `float` or None."""
         return self._signature[1]
 
     @property
     def content(self) -> str:
-        """Hash of all sources that it is made of."""
+        """Hash of all its sources."""
         return source_hash(self.function)
 
     @cached_property
     def call(self) -> Any:
-        """The code, for Python: takes addresses and numbers."""
+        """Code callable from Python: takes addresses and numbers."""
         kinds = [{int: ctypes.c_int64, float: ctypes.c_double}.get(p, ctypes.c_void_p) for p in self.parameters]
         returned = ctypes.c_double if self.returns is float else ctypes.c_int64
         return ctypes.CFUNCTYPE(returned, *kinds)(self.address)
@@ -562,7 +561,7 @@ class Kernel(CompiledCode):
         Raises
         ------
         TypeError
-            If an argument is not of the kind that the kernel takes.
+            If an argument does not match the parameter.
         """
         kept = [_argument_buffer(x, of, self) for x, of in zip(args, self.parameters, strict=True)]
         return self.call(*(getattr(x, "address", x) for x in kept))
@@ -574,10 +573,10 @@ class ArrayBuffer:
     Parameters
     ----------
     x : ndarray
-        It is kept.
+        Kept alive by this object.
     of : Array
     name : str
-        In a message where it is not of that type.
+        For the message if it is not of that type.
     """
 
     def __init__(self, x: np.ndarray, of: Array, name: str) -> None:
@@ -599,7 +598,7 @@ def _argument_buffer(x: Any, of: Any, kernel: Kernel) -> Any:
 
 
 def check_layout(kernel: Kernel, of: Struct, buffer: StructBuffer) -> None:
-    """Refuse a structure of another layout than the kernel's.
+    """Refuse a structure whose layout is not the kernel's.
 
     Raises
     ------
@@ -610,18 +609,18 @@ def check_layout(kernel: Kernel, of: Struct, buffer: StructBuffer) -> None:
 
 
 class BoundKernel:
-    """A kernel of structures and a task, with its structures: called from Python at the price of a call of C.
+    """A kernel bound to its structures, called with a task: as fast from Python as a call of C.
 
     Parameters
     ----------
     kernel : Kernel
     buffers : StructBuffer
-        They are kept.
+        Kept alive by this object.
 
     Raises
     ------
     TypeError
-        If they are not what the kernel takes.
+        If they do not match the kernel's parameters.
     """
 
     def __init__(self, kernel: Kernel, *buffers: StructBuffer) -> None:
@@ -633,5 +632,5 @@ class BoundKernel:
         self.words = np.array([self.address, *self._addresses], np.int64)  # for `formulas.call_bound`
 
     def __call__(self, task: int) -> int:
-        """Have a task done."""
+        """Run a task."""
         return int(self.kernel.call(*self._addresses, task))

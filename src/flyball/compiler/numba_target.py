@@ -1,14 +1,13 @@
-"""flyball as a target of Numba: kernels are translated by function, then linked and optimised as a whole.
+"""flyball as a target of Numba: kernels are translated function by function, then linked and optimised as a whole.
 
-Numba links, optimises and emits every callee as a library of its own, then again inside each of its callers. Here
-a callee is only translated to LLVM's language (`Library`), and `Library.modules` hands all of a kernel's on.
-Numba lets others add targets (`numba.core.target_extension`): nothing of Numba's is replaced.
+Numba links, optimises and emits every callee as a library of its own, then again inside each of its callers. Here a
+callee is only translated to LLVM's language (`Library`), and `Library.modules` returns all those of a kernel. Numba
+allows additional targets (`numba.core.target_extension`): nothing of Numba's is replaced.
 
-Structures and arrays are passed by address. Numba passes a tuple of arrays as its parts, some two hundred numbers
-for a mechanism; here ``S.field`` is the address of a structure or of an array's description in it, and
-``S.field[i, j]`` reads where the numbers stand, the length of a row, and the element. Nothing writes to
-descriptions, so that the optimiser may read each part once and keep it (`invariant.load`). Views and whole arrays
-are Numba's own.
+Structures and arrays are passed by address. Numba passes a tuple of arrays as its parts, some two hundred numbers for a
+mechanism; here ``S.field`` is the address of a structure or of an array's description in it, and ``S.field[i, j]``
+reads the data address, the length of a row, and the element. Nothing writes to descriptions, so that the optimiser may
+read each part once and keep it (`invariant.load`). Views and whole arrays are Numba's own.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ def reference(layout: Struct | Array | RecordLayout) -> Any:
 
 
 def load_members(builder: Any, address: Any, skipped: int = 0) -> Any:
-    """Read what stands at an address number by number: the optimiser splits no larger reads.
+    """Read the value at an address number by number: the optimiser does not split larger reads.
 
     The first ``skipped`` members are left out.
     """
@@ -67,13 +66,13 @@ def load_members(builder: Any, address: Any, skipped: int = 0) -> Any:
 
 
 class _ArrayReader:
-    """Code that finds what an array's description says."""
+    """Generator of code that reads an array's description."""
 
     def __init__(self, context: Any, builder: Any, typ: Any, value: Any) -> None:
         self.context, self.builder, self.array, self.address = context, builder, typ.array, value
 
     def word(self, k: int, of: Any = None) -> Any:
-        """The k-th word of the description: see `layout`."""
+        """Word k of the description: see `layout`."""
         from llvmlite import ir
 
         integer = ir.IntType(64)
@@ -81,20 +80,20 @@ class _ArrayReader:
         return load_members(self.builder, self.builder.bitcast(place, (of or integer).as_pointer()))
 
     def shape(self, k: int) -> Any:
-        """The k-th length."""
+        """Length of dimension k."""
         return self.word(HEAD // 8 + k)
 
     def data(self) -> Any:
-        """The address of the numbers."""
+        """Address of the numbers."""
         return self.word(DATA // 8, self.context.get_data_type(self.array.dtype).as_pointer())
 
     def whole(self) -> Any:
-        """The array as Numba has it, without owners: nobody counts references here."""
+        """The array in Numba's form, without ownership: references are not counted here."""
         of = self.context.get_value_type(self.array).as_pointer()
         return load_members(self.builder, self.builder.bitcast(self.address, of), 2)
 
     def indices(self, typ: Any, value: Any) -> list[Any] | None:
-        """Integers of an index, counted from the end where negative; None if it holds anything else."""
+        """Integers of an index, counted from the end where negative; None if it contains anything else."""
         from numba.core import cgutils, types
 
         several = isinstance(typ, types.BaseTuple)
@@ -113,7 +112,7 @@ class _ArrayReader:
         return out
 
     def element(self, indices: list[Any]) -> Any:
-        """The address of an element; the first of a row where the last index is left out."""
+        """Address of an element; of the first of a row if the last index is left out."""
         flat = indices[0]
         for k in range(1, self.array.ndim):
             flat = self.builder.mul(flat, self.shape(k))
@@ -121,7 +120,7 @@ class _ArrayReader:
         return self.builder.gep(self.data(), [flat], inbounds=True)
 
     def row(self, typ: Any, index: Any) -> Any:
-        """A row of a table of two dimensions, as an array of type ``typ``."""
+        """Row of a two-dimensional table, as an array of type ``typ``."""
         from llvmlite import ir
 
         model, length = self.context.data_model_manager[typ], self.shape(1)
@@ -140,7 +139,7 @@ class _ArrayReader:
 
 
 def _register_structures(types: Any) -> None:
-    """References to structures, and their fields."""
+    """Register references to structures, and their fields."""
     from llvmlite import ir
     from numba.core import cgutils
     from numba.core.datamodel import models
@@ -149,7 +148,7 @@ def _register_structures(types: Any) -> None:
     from numba.core.typing.templates import AttributeTemplate, infer_getattr
 
     class Structure(types.Type):
-        """A structure by its address."""
+        """Type of a structure passed by address."""
 
         def __init__(self, layout: Struct) -> None:
             self.layout, self.of = layout, dict(layout.fields)
@@ -159,7 +158,7 @@ def _register_structures(types: Any) -> None:
 
     @register_model(Structure)
     class StructureModel(models.OpaqueModel):
-        """An address."""
+        """Data model: an address."""
 
     @infer_getattr
     class Fields(AttributeTemplate):  # type: ignore[misc]
@@ -176,17 +175,17 @@ def _register_structures(types: Any) -> None:
     def of(context):  # type: ignore[no-untyped-def]
         return lambda fields: Structure(_layout_of(fields))
 
-    # not an overload: that would be a function of its own, and its memory gone when it returns
+    # not an overload, which would be a function of its own whose memory is gone when it returns
     @lower_builtin(by_address, types.BaseNamedTuple)
     def put(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         address = builder.bitcast(cgutils.alloca_once_value(builder, args[0]), cgutils.voidptr_t)
-        # an empty piece of assembly: no read through its result may be moved to before the tuple was written
+        # an empty piece of assembly: no read through its result may be moved before the writes of the tuple
         through = ir.FunctionType(address.type, [address.type])
         return builder.asm(through, "", "=r,0,~{memory}", [address], True)
 
 
 def _layout_of(fields: Any) -> Struct:
-    """Layout of a named tuple of arrays that compiled code puts together."""
+    """Layout of a named tuple of arrays that compiled code creates."""
     from numba.core.errors import TypingError
 
     is_complex = any(str(getattr(x, "dtype", "")).startswith("complex") for x in fields.types)
@@ -198,7 +197,7 @@ def _layout_of(fields: Any) -> Struct:
 
 
 def _register_arrays(types: Any) -> None:
-    """References to arrays, and what formulas do with them."""
+    """Register references to arrays, and the operations on them in formulas."""
     from numba.core.datamodel import models
     from numba.core.extending import lower_builtin, lower_cast, register_model
     from numba.core.imputils import lower_getattr, lower_getattr_generic, lower_setattr_generic
@@ -215,7 +214,7 @@ def _register_arrays(types: Any) -> None:
     from numpy import dtype
 
     class Reference(types.Type):
-        """An array by the address of its description."""
+        """Type of an array passed by the address of its description."""
 
         def __init__(self, named: Array | RecordLayout) -> None:
             layout = named.array if isinstance(named, RecordLayout) else named
@@ -235,7 +234,7 @@ def _register_arrays(types: Any) -> None:
 
     @register_model(Reference)
     class ReferenceModel(models.OpaqueModel):
-        """An address."""
+        """Data model: an address."""
 
     class Item(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
@@ -309,7 +308,7 @@ def _register_arrays(types: Any) -> None:
 
 
 def _register_calls(types: Any) -> None:
-    """Calls by address."""
+    """Register calls by address."""
     from llvmlite import ir
     from numba.core.errors import TypingError
     from numba.extending import intrinsic
@@ -349,7 +348,7 @@ def _register_calls(types: Any) -> None:
 
 
 def number_type(shape: Any, is_complex: bool) -> Any:
-    """Numba's type of nested tuples of numbers: lengths, nested as the tuples are; 0 is a number."""
+    """Numba's type of nested tuples of numbers, from their lengths, nested likewise; 0 is a number."""
     from numba.core import types
 
     if isinstance(shape, tuple):
@@ -359,7 +358,7 @@ def number_type(shape: Any, is_complex: bool) -> Any:
 
 
 def nested_lengths(typ: Any) -> Any:
-    """The lengths of nested tuples of numbers, as in `number_type`; None if there is anything else in them."""
+    """Lengths of nested tuples of numbers, as in `number_type`; None if they contain anything else."""
     from numba.core import types
 
     if isinstance(typ, types.Number | types.Boolean):
@@ -382,7 +381,7 @@ def tuple_leaves(builder: Any, typ: Any, value: Any) -> Iterator[tuple[Any, Any]
 
 
 def nested_value(context: Any, builder: Any, typ: Any, given: Iterator[tuple[Any, Any]]) -> Any:
-    """A value of nested tuples, of types and values of numbers."""
+    """Value of nested tuples, from types and values of numbers."""
     from numba.core import types
 
     if isinstance(typ, types.BaseTuple):
@@ -392,7 +391,7 @@ def nested_value(context: Any, builder: Any, typ: Any, given: Iterator[tuple[Any
 
 
 def load_numbers(builder: Any, number: Any, start: Any, count: int) -> Iterator[tuple[Any, Any]]:
-    """Types and values of numbers that stand one after the other in memory."""
+    """Types and values of consecutive numbers in memory."""
     from llvmlite import ir
 
     for k in range(count):
@@ -400,7 +399,7 @@ def load_numbers(builder: Any, number: Any, start: Any, count: int) -> Iterator[
 
 
 def store_numbers(context: Any, builder: Any, number: Any, given: Iterator[tuple[Any, Any]], start: Any) -> None:
-    """Put numbers into memory one after the other, as numbers of one type."""
+    """Store numbers consecutively in memory, converted to one type."""
     from llvmlite import ir
 
     for k, (of, value) in enumerate(given):
@@ -408,10 +407,10 @@ def store_numbers(context: Any, builder: Any, number: Any, given: Iterator[tuple
 
 
 def _register_code_tables(types: Any) -> None:
-    """Calls of formulas by the address of a code table: two words a formula, its code for floats and complex numbers.
+    """Register calls of formulas by the address of a code table.
 
-    The code takes two addresses: where the numbers of the arguments stand one after the other, and where those of the
-    result are to be put.
+    It has two words for each formula, its code for floats and for complex numbers. The code takes two addresses: of the
+    consecutive numbers of the arguments, and of the memory for those of the result.
     """
     from llvmlite import ir
     from numba.core import cgutils
@@ -464,7 +463,7 @@ def _register_code_tables(types: Any) -> None:
 
 
 def register_types() -> None:
-    """Tell Numba of these types, and of calls."""
+    """Register these types, and calls, with Numba."""
     from numba.core import types
 
     _register_structures(types)
@@ -479,7 +478,7 @@ PASSES = (
     (untyped_passes, "MakeFunctionToJitFunction ReconstructSSA"),
     (typed_passes, "NopythonTypeInference PreLowerStripPhis IRLegalization NativeLowering NoPythonBackend"),
 )
-"""Of Numba's passes those that formulas need: no closures, generators, literal unrolling, array expressions."""
+"""Numba's passes that formulas need: no closures, generators, literal unrolling, array expressions."""
 IMPLEMENTATIONS = (
     "core.optional cpython.builtins cpython.iterators cpython.numbers cpython.rangeobj cpython.slicing "
     "cpython.tupleobj np.arraymath np.arrayobj"
@@ -488,15 +487,15 @@ REGISTRIES = "cpython.cmathimpl cpython.mathimpl np.npyimpl"
 
 
 class Flyball(CPU):
-    """The target."""
+    """Target of formulas."""
 
 
 class FirstOrder(Flyball):
-    """The same where complex numbers carry steps."""
+    """Target of formulas in which complex numbers carry first-order steps."""
 
 
 class Library(codegen.CPUCodeLibrary):
-    """The text of a translated function, and the libraries of those that it calls."""
+    """Text of a translated function, and the libraries of those that it calls."""
 
     def __init__(self, owner: Any, name: str) -> None:
         codegen.CodeLibrary.__init__(self, owner, name)
@@ -504,19 +503,19 @@ class Library(codegen.CPUCodeLibrary):
         self._linking_libraries: list[Library] = []
 
     def add_linking_library(self, library: Any) -> None:
-        """Note a callee."""
+        """Add the library of a callee."""
         self._linking_libraries.append(library)
 
     def add_ir_module(self, ir_module: Any) -> None:
-        """Keep the text; nothing is optimised here."""
+        """Store the text; nothing is optimised here."""
         self.texts.append(normalize_ir_text(str(ir_module)))
 
     def finalize(self) -> None:
-        """Nothing more comes."""
+        """No final work."""
         self._finalized = True
 
     def modules(self) -> Iterator[str]:
-        """The texts of it and of all that it calls, each once."""
+        """Texts of the function and of all that it calls, each once."""
         seen: set[int] = set()
         todo: list[Any] = [self]
         while todo:
@@ -528,48 +527,48 @@ class Library(codegen.CPUCodeLibrary):
 
 
 class Codegen(codegen.JITCPUCodegen):
-    """Makes libraries."""
+    """Creates libraries."""
 
     _library_class = Library
 
     def set_env(self, env_name: str, env: Any) -> None:
-        """Formulas have no environment: they raise nothing that needs one."""
+        """Do nothing: formulas raise no exceptions, so they need no environment."""
 
 
 class FormulaContext(cpu.CPUContext):
-    """How formulas are translated."""
+    """Translation of formulas."""
 
     def init(self) -> None:
-        """As for the processor, with libraries of our own and without Numba's runtime."""
+        """Initialise as for the CPU, with this module's libraries and without Numba's runtime."""
         self.is32bit = False
         self._internal_codegen = Codegen(TARGET_NAME)
 
     def load_additional_registries(self) -> None:
-        """What formulas use of Numba: numbers, loops, tuples, arrays, mathematics; no runtime."""
+        """Load the parts of Numba that formulas use: numbers, loops, tuples, arrays, mathematics; no runtime."""
         for name in IMPLEMENTATIONS.split():
             import_module(f"numba.{name}")
         for name in REGISTRIES.split():
             self.install_registry(import_module(f"numba.{name}").registry)
 
     def post_lowering(self, mod: Any, library: Any) -> None:
-        """Nothing is added to what was translated."""
+        """Do nothing after translation."""
 
     def create_cpython_wrapper(self, *args: Any, **more: Any) -> None:
-        """Python calls no formula."""
+        """Do nothing: Python does not call formulas."""
 
     def create_cfunc_wrapper(self, *args: Any, **more: Any) -> None:
-        """Nor does C."""
+        """Do nothing: C does not call formulas."""
 
     def get_executable(self, library: Any, fndesc: Any, env: Any) -> Any:
-        """Something by which Numba knows the function: there is no code of it alone."""
+        """Placeholder for a function's code: there is none for a formula alone."""
         return partial(_no_code).__reduce__
 
 
 class FirstOrderContext(FormulaContext):
-    """The same, with products of complex numbers to first order of their imaginary parts."""
+    """Translation of formulas with first-order products of complex numbers."""
 
     def get_function(self, fn: Any, sig: Any, _firstcall: bool = True) -> Any:
-        """The code of an operation."""
+        """Code of an operation."""
         known = getattr(fn, "typing_key", fn)
         if known in (operator.mul, operator.imul) and all(isinstance(x, types.Complex) for x in sig.args):
             return lambda builder, args, *_: _first_order_product(self, builder, sig, args)
@@ -581,7 +580,7 @@ def _no_code() -> None:
 
 
 def _first_order_product(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """(a + i b)(c + i d) = a c + i (a d + b c): the step is 1e-40 of a number, so that b d is nothing beside a c."""
+    """(a + i b)(c + i d) = a c + i (a d + b c): the step is 1e-40 of a number, so b d is negligible beside a c."""
     (a, b), (c, d) = ([builder.extract_value(x, k) for k in range(2)] for x in args)
     made = ir.Constant(context.get_value_type(sig.return_type), ir.Undefined)
     made = builder.insert_value(made, builder.fmul(a, c), 0)
@@ -589,7 +588,7 @@ def _first_order_product(context: Any, builder: Any, sig: Any, args: Any) -> Any
 
 
 class TypingContext(typing.Context):
-    """What functions return; of operators on the same types it is found once."""
+    """Types of functions; those of operators on the same types are cached."""
 
     def __init__(self) -> None:
         self._signatures: dict[Any, Any] = {}
@@ -612,7 +611,7 @@ class TypingContext(typing.Context):
 
 
 class Target(TargetDescriptor):
-    """The contexts of a target.
+    """Contexts of a target.
 
     Parameters
     ----------
@@ -628,20 +627,20 @@ class Target(TargetDescriptor):
 
     @cached_property
     def typing_context(self) -> Any:
-        """What types there are."""
+        """Typing context."""
         return TypingContext()
 
     @cached_property
     def target_context(self) -> Any:
-        """How they are translated."""
+        """Translation context."""
         return self._make(self.typing_context, self._target_name)
 
 
 class Compiler(CompilerBase):
-    """`PASSES`."""
+    """Numba compiler that runs `PASSES`."""
 
     def define_pipelines(self) -> list[Any]:
-        """One list of passes."""
+        """Define the one list of passes."""
         passes = PassManager(TARGET_NAME)
         for module, names in PASSES:
             for name in names.split():
@@ -651,24 +650,24 @@ class Compiler(CompilerBase):
 
 
 class FormulaDispatcher(Dispatcher):
-    """A formula as Numba calls it."""
+    """Dispatcher of a formula."""
 
     targetdescr = Target(TARGET_NAME, FormulaContext)
 
     def compile(self, sig: Any) -> Any:
-        """Translate it for arguments of these types."""
+        """Translate the formula for arguments of these types."""
         with target_override(self.targetdescr._target_name):
             return super().compile(sig)
 
 
 class FirstOrderDispatcher(FormulaDispatcher):
-    """The same where complex numbers carry steps."""
+    """Dispatcher of a formula in which complex numbers carry first-order steps."""
 
     targetdescr = Target(f"{TARGET_NAME}-first-order", FirstOrderContext)
 
 
 class jit(JitDecorator):
-    """What Numba makes of functions for the target."""
+    """Decorator that Numba uses for functions of this target."""
 
     make = FormulaDispatcher
 
@@ -676,13 +675,13 @@ class jit(JitDecorator):
         self.options = {k: v for k, v in options.items() if k in OPTIONS}
 
     def __call__(self, function: Any) -> Any:
-        """A `FormulaDispatcher`."""
+        """`FormulaDispatcher` of a function."""
         options = OPTIONS | self.options | {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         return self.make(function, targetoptions=options, pipeline_class=Compiler)
 
 
 class first_order_jit(jit):
-    """The same where complex numbers carry steps."""
+    """Decorator for functions in which complex numbers carry first-order steps."""
 
     make = FirstOrderDispatcher
 
@@ -692,16 +691,16 @@ for _target, _jit in ((Flyball, jit), (FirstOrder, first_order_jit)):
     dispatcher_registry[_target] = _jit.make
     jit_registry[_target] = _jit
 overload = partial(numba_overload, jit_options=OPTIONS, target=TARGET_NAME)
-"""``@overload(function)``: what stands for a Python function in compiled code."""
+"""``@overload(function)``: the replacement of a Python function in compiled code."""
 
 
 def translate(function: Any, argument_types: tuple[Any, ...], first_order: bool) -> tuple[Any, Any, Library]:
-    """A function and all that it calls in LLVM's language.
+    """Translate a function and all that it calls to LLVM's language.
 
     Returns
     -------
     context, description, library
-        How it is called, and its text.
+        Its translation context, its calling description, and its text.
     """
     made = (first_order_jit if first_order else jit)()(function)
     made.compile(argument_types)

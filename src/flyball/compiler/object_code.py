@@ -1,12 +1,12 @@
 """Object code of kernels: made by LLVM, stored in files, loaded into memory.
 
-Code is made for a fixed baseline of a processor's family, not for the processor that happens to be there:
-x86-64-v3 (2013 and later), else x86-64-v2, of the others what all of their family have. So results have the same
-bits on all of these: products and sums are not contracted, and nothing is reordered.
+Code is made for a fixed baseline of a processor family, not for the present processor: x86-64-v3 (2013 and later), else
+x86-64-v2; for other families, the features that all processors of the family have. Results thus have the same bits on
+all of these: products and sums are not contracted, and nothing is reordered.
 
-A file is known by its content: a hash of the sources that the kernel is made of, of the layouts of its parameters
-and of the processor that it is for. Files that came with flyball are looked at first, then those that this user's
-machine has made. Long compilations are announced before they begin.
+A file is identified by its content: a hash of the sources of the kernel, the layouts of its parameters and the target
+processor. Files shipped with flyball are searched first, then those compiled on this machine. Long compilations are
+announced before they begin.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from .formulas import LOCK, PACKAGE, register_all
 from .struct_layout import Array, Struct
 
 BASELINES = {"x86-64-v3": ("avx2", "bmi2", "f16c", "fma", "lzcnt", "movbe"), "x86-64-v2": ("sse4.2", "popcnt", "ssse3")}
-"""Processors that code is made for, the best first, and features of theirs that LLVM knows them by."""
+"""Processors that code is made for, the best first, with the LLVM features that identify them."""
 _LLVM_LOCK = threading.RLock()
 
 
 @lru_cache(maxsize=1)
 def llvm_binding() -> Any:
-    """llvmlite's binding, ready for this machine."""
+    """The binding of llvmlite, initialised for this machine."""
     import llvmlite.binding as binding
 
     binding.initialize_native_target()
@@ -48,7 +48,7 @@ def llvm_binding() -> Any:
 
 @lru_cache(maxsize=1)
 def baseline() -> str:
-    """The processor that code is made for here: ``FLYBALL_TARGET``, or the best baseline that this machine has.
+    """Processor that code is made for: ``FLYBALL_TARGET``, or the best baseline that this machine supports.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def baseline() -> str:
 
 
 def baselines() -> tuple[str, ...]:
-    """The processors that object code is shipped for, of this machine's family."""
+    """Processors of this machine's family that object code is shipped for."""
     return tuple(BASELINES) if target_triple().startswith("x86_64") else (baseline(),)
 
 
@@ -78,7 +78,7 @@ def target_triple() -> str:
 
 
 def target_machine(cpu: str = "", system: str = "") -> Any:
-    """LLVM's generator of code for a processor and a system; who makes an engine of it, owns it."""
+    """LLVM's code generator for a processor and a system; an execution engine made with it takes ownership."""
     found = llvm_binding().Target.from_triple(system or target_triple())
     position = "static" if (system or target_triple()).startswith(("x86_64", "i686")) else "default"
     return found.create_target_machine(
@@ -92,9 +92,9 @@ def object_code_of_text(text: str, level: int = 2) -> bytes:
 
 
 def emit_object(module: Any, machine: Any, level: int) -> bytes:
-    """Object code of a module, optimised at a level of LLVM's.
+    """Object code of a module, at an optimisation level of LLVM.
 
-    Loops and straight code are not vectorised: measured, the same speed or slower, and longer in the making.
+    Loops and straight code are not vectorised: measured, the same speed or slower, and longer compilation.
     """
     with _LLVM_LOCK:
         module.triple, module.data_layout = machine.triple, str(machine.target_data)
@@ -107,12 +107,12 @@ def emit_object(module: Any, machine: Any, level: int) -> bytes:
 
 
 class LoadedCode:
-    """Object code in memory, as long as this lives.
+    """Object code in memory, valid as long as this object exists.
 
     Raises
     ------
     RuntimeError
-        If it is no object code for this machine.
+        If it is not object code for this machine.
     """
 
     def __init__(self, code: bytes) -> None:
@@ -126,27 +126,27 @@ class LoadedCode:
             self._engine.finalize_object()
 
     def address(self, name: str) -> int:
-        """Where a function begins; 0 if there is none of that name."""
+        """Address of a function; 0 if there is none of that name."""
         return int(self._engine.get_function_address(name))
 
 
-FAILED = -(2**63)  # what a kernel returns whose formulas ended in an error
+FAILED = -(2**63)  # result of a kernel if one of its formulas raised an error
 ENTRY_NAME = "flyball_kernel"  # the name of a kernel's entry point in its object
 _started: list[bool] = []
 OPTIMIZATION_LEVEL = 3
-"""Of optimisation: 1 and 2 take a second less of twenty, and run 5 to 15 % longer."""
+"""LLVM's optimisation level: 1 and 2 take a second less of twenty, and run 5 to 15 % longer."""
 
 
 def compile_kernel(kernel: Any, cpus: tuple[str, ...], system: str = "") -> list[bytes]:
-    """Object code of a kernel for some processors.
+    """Compile the object code of a kernel for some processors.
 
     Parameters
     ----------
     kernel : kernels.Kernel
     cpus : tuple of str
-        In the words of LLVM: see `object_code.BASELINES`.
+        LLVM's names: see `object_code.BASELINES`.
     system : str
-        Triple of the system; this one if it is empty.
+        Triple of the system; by default this one.
     """
     with LOCK:
         start_compiler()
@@ -163,7 +163,7 @@ def compile_kernel(kernel: Any, cpus: tuple[str, ...], system: str = "") -> list
 
 
 def start_compiler() -> None:
-    """Import Numba, and tell it of flyball's types and of every formula."""
+    """Import Numba, and register flyball's types and every formula."""
     with LOCK:
         if not _started:
             from . import numba_target
@@ -174,11 +174,11 @@ def start_compiler() -> None:
 
 
 def _linked_bitcode(kernel: Any) -> bytes:
-    """Bitcode of a kernel with all that it calls, behind an entry point in C's calling convention."""
+    """Bitcode of a kernel with all that it calls, with an entry point in C's calling convention."""
     from .numba_target import translate
 
     collecting = gc.isenabled()
-    gc.disable()  # millions of small objects, hardly any garbage: looking for it takes a fifth of the time
+    gc.disable()  # millions of small objects and hardly any garbage: collection takes a fifth of the time
     try:
         context, description, library = translate(kernel.function, _argument_types(kernel), kernel.first_order)
     finally:
@@ -194,11 +194,11 @@ def _linked_bitcode(kernel: Any) -> bytes:
         part = llvm_binding().parse_assembly(text)
         for function in part.functions:
             if not function.is_declaration:
-                function.linkage = "linkonce_odr"  # some stand in several texts
+                function.linkage = "linkonce_odr"  # some occur in several texts
         module.link_in(part)
     for function in module.functions:
         if not function.is_declaration and function.name != ENTRY_NAME:
-            function.linkage = "internal"  # nobody outside calls them: they may be inlined, and go
+            function.linkage = "internal"  # not called from outside: they may be inlined and removed
     return bytes(module.as_bitcode())
 
 
@@ -216,7 +216,7 @@ def _argument_types(kernel: Any) -> tuple[Any, ...]:
 
 
 def _kernel_entry(context: Any, description: Any) -> str:
-    """A function that calls the kernel's, and returns its number; `FAILED` where that ended in an error."""
+    """Function that calls the kernel's, and returns its number; `FAILED` if that raised an error."""
     from llvmlite import ir
     from numba.core import types
 
@@ -240,7 +240,7 @@ def _kernel_entry(context: Any, description: Any) -> str:
 
 
 def _formula_entry(context: Any, description: Any, code: Any) -> str:
-    """A function that calls a formula on numbers in memory: see `references`; nan where that ended in an error.
+    """Function that calls a formula on numbers in memory: see `numba_target`; nan if that raised an error.
 
     Raises
     ------
@@ -280,14 +280,14 @@ def _formula_entry(context: Any, description: Any, code: Any) -> str:
 
 
 def compile_timed(kernel: Any, cpus: tuple[str, ...]) -> tuple[list[bytes], float]:
-    """Its object code, and the seconds of processor time that it took."""
+    """Object code of a kernel, and the processor time [s] of its compilation."""
     began = time.process_time()
     return compile_kernel(kernel, cpus), time.process_time() - began
 
 
 NOTICE_PREFIX = "compiling for this machine, once: "
 NUMBA_IMPORT_SECONDS = 0.25
-"""Seconds that importing Numba takes the machine on which `COSTS` were measured."""
+"""Seconds to import Numba on the machine on which `COSTS` were measured."""
 COSTS: dict[str, tuple[str, float]] = {
     "engine": ("the equations of motion", 22.0),
     "residuals_kernel": ("the derivatives of the equations", 15.0),
@@ -322,17 +322,17 @@ COSTS: dict[str, tuple[str, float]] = {
     "largest_margin_kernel": ("forces that are shared", 1.3),
     "pyramid": ("the contact solver of pyramids", 1.7),
 }
-"""What a kernel is, in words, and the seconds that compiling it took that machine, Numba's import apart."""
+"""Description of each kernel, and the seconds of its compilation on that machine, without the import of Numba."""
 DEFAULT_COST = ("part of the numerics", 0.5)
 
 _compile_spans: list[tuple[float, float]] = []
 _spans_lock = Lock()
-_scale: list[float] = []  # seconds that compiling takes here, for one of that machine
+_scale: list[float] = []  # processor time of compilation here, relative to the reference machine
 
 
 @contextmanager
 def announce_compilation(kernel: Any) -> Iterator[None]:
-    """Say that a kernel is compiled, and for about how long, by what this machine has taken so far; keep the time."""
+    """Announce the compilation of a kernel and its expected duration, from previous ones; record the time."""
     began = time.perf_counter()
     if not _scale:
         pass
@@ -353,7 +353,7 @@ def announce_compilation(kernel: Any) -> Iterator[None]:
 
 
 def note_compiled(kernel: Any, seconds: float) -> None:
-    """Note the processor time that a kernel took, for ``flyball compile``."""
+    """Record the processor time of a kernel's compilation, for ``flyball compile``."""
     COMPILE_SECONDS[kernel.name] = seconds
 
 
@@ -361,7 +361,7 @@ COMPILE_SECONDS: dict[str, float] = {}
 
 
 def compiled_since(begin: float) -> float:
-    """Seconds since ``begin`` (by `time.perf_counter`) during which this process compiled."""
+    """Seconds since ``begin`` (of `time.perf_counter`) during which this process compiled."""
     with _spans_lock:
         return sum(max(0.0, b - max(a, begin)) for a, b in _compile_spans if b > begin)
 
@@ -371,28 +371,28 @@ def _rounded_seconds(seconds: float) -> int:
 
 
 FILE_MARK = b"flyball object code 1\n"
-HASH_DIGITS = 24  # of the hash in the name of a file
+HASH_DIGITS = 24  # digits of the hash in the name of a file
 SHIPPED = PACKAGE / "objects"
-"""Object code that came with this installation."""
-MAX_FOLDER_BYTES = 500_000_000  # bytes of all files in the user's folder; those used last stay
+"""Object code shipped with this installation."""
+MAX_FOLDER_BYTES = 500_000_000  # size of all files in the user's folder; those used last are kept
 
 
 class LoadedKernel(NamedTuple):
     """A kernel's code in memory."""
 
     address: int
-    code: Any  # which is freed with this
+    code: Any  # freed with this object
     origin: str  # "shipped", "cache" or "compiled"
 
 
 def code_of(kernel: Any) -> LoadedKernel:
-    """The code of a kernel: found, or compiled now and kept."""
+    """Code of a kernel: loaded, or compiled now and stored."""
     for origin, folder in object_folders():
         path = folder / file_name(kernel, baseline())
         if (code := read_object(path)) is not None:
             if origin == "cache":
                 mark_used(path)
-            with contextlib.suppress(RuntimeError):  # LLVM's, of code that is none of this machine
+            with contextlib.suppress(RuntimeError):  # LLVM's error for code of another machine
                 return _load(code, origin)
     with announce_compilation(kernel):
         pass
@@ -404,7 +404,7 @@ def code_of(kernel: Any) -> LoadedKernel:
 
 
 def is_stored(kernel: Any) -> bool:
-    """Whether its code is in a file."""
+    """Whether a kernel's code is in a file."""
     return any((folder / file_name(kernel, baseline())).is_file() for _, folder in object_folders())
 
 
@@ -416,14 +416,14 @@ def _load(code: bytes, origin: str) -> LoadedKernel:
 
 
 def object_folders() -> list[tuple[str, Path]]:
-    """Where files are looked for."""
+    """Folders that are searched for files."""
     cache = cache_folder()
     return [("shipped", SHIPPED), *([("cache", cache)] if cache is not None else [])]
 
 
 @lru_cache(maxsize=1)
 def cache_folder() -> Path | None:
-    """The user's folder for compiled code: ``FLYBALL_CACHE``, else where the system has such; None if it has none."""
+    """User's folder for compiled code: ``FLYBALL_CACHE``, else the system's cache folder; None if there is none."""
     given = os.environ.get("FLYBALL_CACHE")
     if given:
         root = Path(given)
@@ -453,14 +453,14 @@ def file_name(kernel: Any, cpu: str) -> str:
 
 
 def content_key(kernel: Any, cpu: str) -> str:
-    """A hash of all that a kernel's code depends on."""
+    """Hash of everything a kernel's code depends on."""
     layouts = ", ".join(str(x) for x in kernel.parameters)
     text = f"{kernel.name} {kernel.first_order} ({layouts}) {target_triple()} {cpu} {kernel.content}"
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
 
 
 def read_object(path: Path) -> bytes | None:
-    """The content of a file after its head; None if there is none, or it is damaged."""
+    """Content of a file after its header; None if there is none, or it is damaged."""
     try:
         data = path.read_bytes()
     except OSError:
@@ -470,7 +470,7 @@ def read_object(path: Path) -> bytes | None:
 
 
 def write_object(path: Path, code: bytes) -> None:
-    """Write a file, at once or not at all.
+    """Write a file atomically.
 
     Raises
     ------
@@ -488,7 +488,7 @@ def write_object(path: Path, code: bytes) -> None:
 
 
 def store_object(kernel: Any, code: bytes) -> None:
-    """Leave code for other processes; where that cannot be, say so."""
+    """Store code for other processes; warn if that is impossible."""
     folder = cache_folder()
     if folder is None:
         return
@@ -501,13 +501,13 @@ def store_object(kernel: Any, code: bytes) -> None:
 
 
 def mark_used(path: Path) -> None:
-    """Note that a file of the user's folder is used."""
+    """Mark a file of the user's folder as used."""
     with contextlib.suppress(OSError):
         path.touch()
 
 
 def remove_oldest(folder: Path) -> None:
-    """Remove the files that were used longest ago, beyond `MAX_FOLDER_BYTES` bytes; other processes may do the same meanwhile."""
+    """Remove the least recently used files beyond `MAX_FOLDER_BYTES`; other processes may do the same meanwhile."""
     total = 0
     with contextlib.suppress(OSError):
         found = [(path.stat(), path) for path in folder.glob(f"*-{'[0-9a-f]' * HASH_DIGITS}.o")]

@@ -25,18 +25,19 @@ COMPLEX = "complex"
 
 _TYPES = {"Float": "f8", "Complex": "c16", "Int": "i8", "Short": "i4", "CodeTables": "i8"}
 HEAD, DATA, DIMENSION = 40, 32, 16
-"""Bytes of an array's description without its shape, those before the address of its numbers, those of a dimension."""
+"""Sizes [bytes]: an array's description without its shape, the part before its data address, the part for a dimension.
+"""
 
 
 class Array(NamedTuple):
-    """An array without gaps, in C order."""
+    """Contiguous array in C order."""
 
     dtype: str
     ndim: int
 
     @property
     def size(self) -> int:
-        """Bytes of its description."""
+        """Size of its description [bytes]."""
         return HEAD + DIMENSION * self.ndim
 
     def __str__(self) -> str:
@@ -44,18 +45,18 @@ class Array(NamedTuple):
 
 
 class CodeTables(Array):
-    """The same of addresses of code tables, which are made ready before a kernel is given the array."""
+    """Array of addresses of code tables, whose code is loaded or compiled before a kernel is given the array."""
 
 
 class RecordLayout(NamedTuple):
-    """An array of one dimension whose entries have names."""
+    """One-dimensional array whose entries have names."""
 
     array: Array
     of: type[Record]
 
     @property
     def size(self) -> int:
-        """Bytes of its description."""
+        """Size of its description [bytes]."""
         return self.array.size
 
     def __str__(self) -> str:
@@ -80,7 +81,7 @@ class Record(np.ndarray):
 
     @classmethod
     def blank(cls, dtype: Any = None) -> Any:
-        """All of them 0."""
+        """Record of zeros."""
         return np.zeros(len(cls.names), dtype or {"Int": np.int64}.get(cls.kind, float)).view(cls)
 
 
@@ -95,7 +96,7 @@ def _entry_property(k: int) -> property:
 
 
 class Struct(NamedTuple):
-    """A named tuple of arrays and of structures."""
+    """Named tuple of arrays and of structures."""
 
     of: type
     complex: bool
@@ -103,11 +104,11 @@ class Struct(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Bytes of it."""
+        """Size [bytes]."""
         return sum(x.size for _, x in self.fields)
 
     def offset(self, name: str) -> int:
-        """Where a field begins [bytes]."""
+        """Offset of a field [bytes]."""
         at = 0
         for field, x in self.fields:
             if field == name:
@@ -116,7 +117,7 @@ class Struct(NamedTuple):
         raise AttributeError(f"{self.of.__name__} has no field {name!r}")
 
     def arrays(self) -> Iterator[Array | RecordLayout]:
-        """The arrays of it and of structures in it."""
+        """Arrays in it, including nested structures."""
         for _, x in self.fields:
             yield from x.arrays() if isinstance(x, Struct) else (x,)
 
@@ -135,7 +136,7 @@ def struct_layout(of: type, is_complex: bool = False) -> Struct:
 
 
 def parameter_layouts(function: Callable[..., Any]) -> tuple[tuple[Any, ...], type | None]:
-    """Layouts of a kernel's parameters (`int` and `float` are numbers), and the type that it returns.
+    """Layouts of a kernel's parameters (`int` and `float` are numbers), and its return type.
 
     Raises
     ------
@@ -158,7 +159,7 @@ def parameter_layouts(function: Callable[..., Any]) -> tuple[tuple[Any, ...], ty
 
 
 def _annotation_text(annotation: Any) -> str:
-    """An annotation as it is written, also where it was evaluated."""
+    """Annotation as it is written, also if it was evaluated."""
     if isinstance(annotation, str):
         return annotation
     array = getattr(annotation, "__metadata__", ("",))[0]
@@ -166,7 +167,7 @@ def _annotation_text(annotation: Any) -> str:
 
 
 def _declared_layout(text: Any, scope: dict[str, Any], is_complex: bool) -> Any:
-    """What an annotation declares."""
+    """Layout that an annotation declares."""
     text = _annotation_text(text)
     if text in ("int", "float"):
         return int if text == "int" else float

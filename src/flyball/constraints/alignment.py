@@ -1,8 +1,8 @@
-"""Rotation residuals for assembly: the rotation vector that M still lacks, along one axis of F.
+"""Rotation residuals for assembly: the component, along one axis of F, of the rotation that aligns M with F.
 
-They stand in for ``perpendicular`` rows when a joint starts far from closed: their size is the true angle, so they
-lead from everywhere to the parallel (never the antiparallel) position. Their torque is the gradient to first order,
-which is all that a Newton iteration wants; they are never used for motion.
+They replace ``perpendicular`` rows when a joint is far from closed: their size is the true angle, so they converge from
+everywhere to the parallel (never the antiparallel) position. Their torque is the gradient to first order, which is
+sufficient for a Newton iteration; they are not used in motions.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def axis_row(par, F, M, hint, data):
     o = 0.0 * par[0]
     n = (par[0], par[1], par[2])
     if s.real < 1e-9:
-        # parallel: nothing is lacking; antiparallel: half a turn about F's x axis, or y, whichever the row holds
+        # parallel: zero; antiparallel: half a turn about F's x axis, or y, whichever the row measures
         value = o if c.real > 0.0 else o + 3.141592653589793 * par[0]
     else:
         value = atan2(s, c) / s * dot(n, e)
@@ -52,7 +52,7 @@ def full_row(par, F, M, hint, data):
 
 @formula
 def half_turn(R):
-    """Axis of a rotation by half a turn, R = 2 e e^T - 1, from its largest column."""
+    """Return the axis of a rotation by half a turn, R = 2 e e^T - 1, from its largest column."""
     if R[0].real >= R[4].real and R[0].real >= R[8].real:
         e = (R[0] + 1.0, R[3], R[6])
     elif R[4].real >= R[8].real:
@@ -64,7 +64,7 @@ def half_turn(R):
 
 @formula
 def finish(value, n, F, o):
-    """The row's record: a torque along F's axis n, no acceleration term."""
+    """Return the row's result: a torque along F's axis n, no acceleration term."""
     t = mv(F[1], n)
     return value, (o, o, o), t, neg(t), o
 

@@ -1,7 +1,7 @@
 """The angle of M's x axis about F's z axis, counted from F's x axis: the coordinate of a revolute joint.
 
-Exact also off the constraint (M's x axis out of F's plane): theta = atan2(s, c), c = m.x, s = m.y. Where par[0] is 1,
-the whole turns are those that bring it next to ``hint``.
+Exact also if the constraint is violated (M's x axis out of F's plane): theta = atan2(s, c), c = m.x, s = m.y. If par[0]
+is 1, full turns are added so that it is nearest to ``hint``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ TURNS = True
 
 @formula
 def unwrapped(theta, hint):
-    """Theta plus the whole turns that bring it next to ``hint``."""
+    """Return theta plus the full turns that bring it nearest to ``hint``."""
     return theta + 6.283185307179586 * rounded(0.15915494309189535 * (hint - theta))
 
 

@@ -1,14 +1,15 @@
-"""A ball on a rounded box: how far apart they are, and how fast the material of one slides over that of the other.
+"""A ball on a rounded box: the gap between them, and the sliding velocity of one surface over the other.
 
-M's origin is the centre of the ball. F's origin is the middle of the core of the other side, all points within the
-half edges par[0:3] along F's axes: a point (of a ball), a line (of a capsule), a box. With q the point of the core
-nearest to the centre p and n = (p - q) / |p - q| the gap is |p - q| - par[6], par[6] being the sum of the radii. Of a
-motion only what changes p - q turns n, so faces, edges and corners are one formula; from one to the next the curvature
-jumps. Inside the core the nearest face counts.
+M's origin is the centre of the ball. F's origin is the middle of the core of the other side, which contains all points
+within the half edges par[0:3] along F's axes: a point (for a ball), a line (for a capsule) or a box. With q the point
+of the core nearest to the centre p and n = (p - q) / |p - q| the gap is |p - q| - par[6], where par[6] is the sum of
+the radii. Only motion that changes p - q rotates n, so one formula covers faces, edges and corners; the curvature jumps
+between them. Inside the core the nearest face counts.
 
-Slip is the velocity of M's material over F's at p - r n, r = par[3], along one of two tangents. Where par[4] is 0 it is
-the one in the plane, z x n. Else they are the par[4]-th of the two axes across n that turn with it without a jump
-(Duff and others 2017) for every n but one, which points against the world axis par[5] (1, 2, 3, or -1, -2, -3).
+Slip is the velocity of M's material relative to F's at p - r n, r = par[3], along one of two tangents. If par[4] is 0
+it is the tangent in the plane, z x n. Otherwise it is number par[4] of the two axes perpendicular to n that rotate with
+n continuously (Duff and others 2017) for every n but one, which points against the world axis par[5] (1, 2, 3, or
+-1, -2, -3).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ SINGLE = True
 
 @formula
 def beyond(x, h):
-    """How far x lies outside -h..h, with its sign."""
+    """Return the distance of x beyond the interval -h..h, with its sign."""
     if x.real > h.real:
         return x - h
     return x + h if x.real < -h.real else 0.0 * x
@@ -32,13 +33,13 @@ def beyond(x, h):
 
 @formula
 def within(h, e, w):
-    """What of a rate w turns the normal: none within -h..h. Where h is 0 there is no within, even at e = 0."""
+    """Return the part of a rate w that rotates the normal: zero within -h..h. For h = 0 it is w, even at e = 0."""
     return w if e.real != 0.0 or h.real == 0.0 else 0.0 * w
 
 
 @formula
 def face(par, p):
-    """The face of the core that p lies farthest beyond, or nearest below: 0 to 5 for +x, -x, +y, -y, +z, -z."""
+    """Return the face of the core that p lies farthest beyond, or nearest below: 0 to 5 for +x, -x, +y, -y, +z, -z."""
     best = -1e300
     found = 0
     for i in range(3):
@@ -53,7 +54,7 @@ def face(par, p):
 
 @formula
 def outward(number, o):
-    """The normal of a face, in the axes of the core."""
+    """Return the normal of a face, in the axes of the core."""
     s = o + (1.0 if number % 2 == 0 else -1.0)
     i = number // 2
     return (s if i == 0 else o, s if i == 1 else o, s if i == 2 else o)
@@ -61,7 +62,7 @@ def outward(number, o):
 
 @formula
 def nearest(par, F, M):
-    """Distance from the core, normal and its rate in the world, and what curvature adds to the bias."""
+    """Return the distance from the core, the normal and its rate in the world, and the curvature term of the bias."""
     d = sub(M[0], F[0])
     p = mtv(F[1], d)
     e = (beyond(p[0], par[0]), beyond(p[1], par[1]), beyond(p[2], par[2]))
@@ -86,7 +87,7 @@ def nearest(par, F, M):
 
 @formula
 def across(n, n1, which):
-    """The tangent t1 or t2 of a normal, with its rate, where n = (0, 0, -1) is the one place without."""
+    """Return the tangent t1 or t2 of a normal, with its rate; both are undefined only at n = (0, 0, -1)."""
     a = -1.0 / (1.0 + n[2])
     a1 = a * a * n1[2]
     b = n[0] * n[1] * a
@@ -100,7 +101,7 @@ def across(n, n1, which):
 
 @formula
 def tangent(par, n, n1):
-    """The tangent that a row is about, and its rate."""
+    """Return the tangent of a slip row, and its rate."""
     o = 0.0 * n[0]
     which = int(par[4].real)
     if which == 0:
@@ -119,7 +120,7 @@ def tangent(par, n, n1):
 
 @formula
 def slip(par, F, M, n, n1):
-    """A row of slip along the tangent of par, at p_M - par[3] n.
+    """Return a slip row along the tangent given by par, at p_M - par[3] n.
 
     gdot = t.(u + w_M x rho - w_F x (d + rho)), rho = -r n, u = v_M - v_F.
     """
@@ -148,7 +149,7 @@ def gap_row(par, F, M, hint, data):
 
 @formula
 def slip_row(par, F, M, hint, data):
-    """No value, the wrench of slip, its bias."""
+    """No value, the wrench of slip, its bias. See `slip`."""
     _, n, n1, _ = nearest(par, F, M)
     return slip(par, F, M, n, n1)
 

@@ -1,7 +1,7 @@
 """Building blocks of joints: named groups of scalar rows (after Hahn, *Rigid Body Dynamics of Mechanisms*, BB1 to BB5).
 
-A joint is a tuple of these. Each row also says which axes it speaks of, so that in the plane those that are fulfilled
-anyway fall away, and which row stands in for it while a joint is still far from closed.
+A joint is a tuple of these. Each row also names the axes that it constrains, so that rows that are always satisfied in
+a planar mechanism are omitted, and the row that replaces it during assembly from far away.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Row:
-    """One scalar term: the kind of its formula, its parameters, the axes it speaks of, its stand-in for assembly."""
+    """One scalar term: the kind of its formula, its parameters, the constrained axes, its replacement for assembly."""
 
     kind: int
     par: tuple[float, ...]
@@ -39,20 +39,20 @@ class Row:
     world: bool = False  # axes of the world, not of the joint
     far: Row | None = None
     measure: str = "m"  # unit of its value
-    holonomic: bool = True  # whether it has a value; else it restrains velocities only
+    holonomic: bool = True  # whether it has a value; otherwise it constrains velocities only
     plus: tuple[str, ...] = ()  # coordinates of the joint that are added to the row, with coefficients it gives
 
     parameters: ClassVar[int] = 7  # that its joint may give (`Joint.constants`)
 
     @property
     def of_kind(self) -> Kind:
-        """Its formula, and what is known of that."""
+        """The kind of the formula, with its properties."""
         return KINDS[self.kind]
 
 
 @dataclass(frozen=True)
 class ConstraintRow(Row):
-    """A constraint equation with a formula of a user's own: a subclass defines it as a static method.
+    """A constraint equation with a user-defined formula: a subclass defines it as a static method.
 
     ``row(par, F, M)`` returns the value, the force on M at its origin (the reverse acts on F's body at F's origin), the
     torques on the bodies of M and F about the origins of M and F, and the acceleration bias: with v, w, a, alpha the
@@ -61,7 +61,7 @@ class ConstraintRow(Row):
     - force . (v_M - v_F) + torque_M . w_M + torque_F . w_F is the rate of the value,
     - the bias is the rate of that.
 
-    Force and torques are so the reaction at a Lagrange multiplier of 1.
+    Force and torques are thus the reaction at a Lagrange multiplier of 1.
 
     Parameters
     ----------
@@ -87,7 +87,9 @@ class ConstraintRow(Row):
 
     @property
     def of_kind(self) -> Kind:
-        """Its formula as those of the built-in rows are called: parameter 6 is taken from the value."""
+        """Return its kind, with a formula called like those of the built-in rows: parameter 6 is subtracted from the
+        value.
+        """
 
         def row(par: Any, F: Any, M: Any, hint: Any, data: Any) -> Any:
             value, *wrench = type(self).row(par[:6], F, M)
@@ -106,7 +108,7 @@ def _third(a: str, b: str) -> str:
 
 
 def _perpendicular(m: str, f: str, far_kind: int | None = None) -> Row:
-    """Axis m of M at right angles to axis f of F."""
+    """Return a row that keeps axis m of M perpendicular to axis f of F."""
     par = (*_UNIT[f], *_UNIT[m], 0.0, 1.0)
     far = None if far_kind is None else _row(far_kind, _third(m, f), measure="rad")
     return Row(perpendicular.KIND, par, m + f, far=far, measure="rad")
@@ -135,7 +137,7 @@ CROSSED_AXES = (_perpendicular("z", "z"),)
 """BB4: the z axes of F and M are at right angles."""
 
 CONSTANT_DISTANCE = (Row(distance.KIND, (0.0,) * 7 + (1.0,)),)
-"""BB5: the origins of F and M keep their distance (the length is parameter 6)."""
+"""BB5: the origins of F and M have a constant distance (the length is parameter 6)."""
 
 ANGLE = Row(angle.KIND, (0.0,) * 7 + (1.0,), measure="rad")
 """Coordinate: angle of M's x axis about F's z axis."""
@@ -145,7 +147,7 @@ SLIDE = _row(displacement.KIND, "z")
 
 
 def point_coordinate(axis: str) -> Row:
-    """Coordinate: world component of the way from F to M."""
+    """Coordinate: world component of the vector from F to M."""
     return _row(coincident.KIND, axis, world=True)
 
 
@@ -153,7 +155,7 @@ SKEW_LINES = (
     *CROSSED_AXES,
     *(Row(skew_lines.KIND, (*_UNIT[a], 0.0, 0.0, 0.0, 0.0, 1.0), a, world=True) for a in "xyz"),
 )
-"""The z axes of F and M keep their position to one another, each of them free to slide round a massless link."""
+"""The z axes of F and M keep their relative position; each body may slide and turn along its axis."""
 
 IN_PLANE = _row(displacement.KIND, "z")
 """The origin of M stays in F's x-y plane (or at a height above it)."""

@@ -1,6 +1,6 @@
 """n . (p_M - p_F) = c with n fixed in the world: one row of a common point.
 
-Three of them hold a point; their multipliers are the world components of the force, with no frame to guess.
+Three of them fix a point; their multipliers are the world components of the force.
 """
 
 from __future__ import annotations

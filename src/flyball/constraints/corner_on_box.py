@@ -1,8 +1,8 @@
-"""A sharp corner M on a face of a box F: how high above it, how fast it slides over it, how far from its end.
+"""A sharp corner M on a face of a box F: its height above the face, sliding velocity, and distance from the face's end.
 
-The half edges par[0:3], the radius par[3], the tangent par[4] and the height par[6] are those of ``touch``; par[5] is
-the angle, in M's x-y plane, at which M's body lies behind the corner. Which face it is does not follow from the pose
-where the corner comes to the end of a face: ``hint`` is its number, and stays during a step.
+The half edges par[0:3], the radius par[3], the tangent par[4] and the height par[6] are those of `ball_on_box`; par[5]
+is the angle, in M's x-y plane, of the direction from the corner into M's body. At the end of a face the pose does not
+determine the face: ``hint`` is its number, which stays constant during a step.
 """
 
 from __future__ import annotations
@@ -18,26 +18,27 @@ KIND_SLIDE = 15
 KIND_MARGIN = 16
 KIND_APART = 17
 SINGLE = True
-HEIGHT_TOLERANCE = 1e-9  # of its distance from the middle: nearer by less is as near
+HEIGHT_TOLERANCE = 1e-9  # relative to its distance from the middle: smaller differences of height count as equal
 
 
 @formula
 def height_above_face(par, p, n):
-    """Height of p above the face with the normal n."""
+    """Return the height of p above the face with the normal n."""
     return dot(n, p) - (par[0] * n[0] * n[0] + par[1] * n[1] * n[1] + par[2] * n[2] * n[2])
 
 
 @formula
 def equal_heights(p):
-    """Heights that are the same."""
+    """Return the tolerance within which heights count as equal."""
     return HEIGHT_TOLERANCE * (absolute(p[0]) + absolute(p[1]) + absolute(p[2])).real
 
 
 @formula
 def foot(par, F, M, hint, data):
-    """The face that the corner lies farthest beyond, or nearest below.
+    """Return the face that the corner lies farthest beyond, or nearest below.
 
-    Where two are as near, as where it passes over an edge, it is the one in front of which M's body lies.
+    If two faces are equally near, as when the corner passes over an edge, it is the one in front of which M's body
+    lies.
     """
     p = mtv(F[1], sub(M[0], F[0]))
     o = 0.0 * p[0]
@@ -53,7 +54,7 @@ def foot(par, F, M, hint, data):
 
 @formula
 def progress(par, F, M, s, data):
-    """Faces do not change during a step."""
+    """Return zero rates: faces do not change during a step."""
     return 0.0 * s, 0.0 * s
 
 
@@ -68,14 +69,14 @@ def height_row(par, F, M, hint, data):
 
 @formula
 def slide_row(par, F, M, hint, data):
-    """No value, the wrench of slip, its bias."""
+    """No value, the wrench of slip, its bias. See `ball_on_box.slip`."""
     n = mv(F[1], outward(int(hint.real), 0.0 * par[0]))
     return slip(par, F, M, n, cross(F[2], n))
 
 
 @formula
 def margin_row(par, F, M, hint, data):
-    """How far the corner is from the end of its face: its depth below the other face that it is nearest to."""
+    """Return the distance of the corner from the end of its face: its depth below the nearest other face."""
     p = mtv(F[1], sub(M[0], F[0]))
     o = 0.0 * p[0]
     here, other, best = int(hint.real), 0, -1e300
@@ -90,7 +91,7 @@ def margin_row(par, F, M, hint, data):
 
 @formula
 def distance_row(par, F, M, hint, data):
-    """The distance from the box, wherever the corner is; its height where it is on its face."""
+    """Return the distance from the box for any position of the corner; above its face, the height."""
     p = mtv(F[1], sub(M[0], F[0]))
     o = 0.0 * p[0]
     high = height_above_face(par, p, outward(int(hint.real), o)).real

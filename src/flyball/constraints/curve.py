@@ -1,10 +1,11 @@
 """Distance of M's origin from a smooth curve in F's x-y plane, counted along F's z: a cam and its follower.
 
 With s the parameter of the curve point c(s) nearest to M's origin and n its normal there, delta = n.(p - c). The row is
-par[3] delta - par[6]: the side of the curve (+1 or -1) and the radius of the follower's roller. The gradient of delta
-is n, exactly, since the nearest point does not change it to first order. ``hint`` is a parameter nearby; par[1] and
-par[2] say where in ``data`` the splines x(s) and y(s) stand. Where par[5] is greater than par[4], the curve ends at
-these parameters: beyond them the row is nan, while the search for the nearest point may pass them, straight on.
+par[3] delta - par[6], where par[3] is the side of the curve (+1 or -1) and par[6] the radius of the follower's roller.
+The gradient of delta is n, exactly, since the nearest point does not change it to first order. ``hint`` is a parameter
+nearby; par[1] and par[2] are the positions of the splines x(s) and y(s) in ``data``. If par[5] is greater than par[4],
+the curve ends at these parameters: beyond them the row is nan, while the search for the nearest point may continue on
+the straight extension.
 
 For the curvature terms see Shigley and Uicker, *Theory of Machines and Mechanisms* (1995), chapter 6, or any text on
 offset curves.
@@ -26,7 +27,7 @@ PASSES = 8
 
 @formula
 def point(par, s, data):
-    """Position, first and second derivative of the curve at s: (x, x', x'', y, y', y'')."""
+    """Return the curve at s with first and second derivatives: (x, x', x'', y, y', y'')."""
     x, x1, x2 = spline(data, int(par[1].real), s)
     y, y1, y2 = spline(data, int(par[2].real), s)
     return x, x1, x2, y, y1, y2
@@ -34,7 +35,8 @@ def point(par, s, data):
 
 @formula
 def foot(par, F, M, hint, data):
-    """Parameter of the curve point nearest to M's origin, by Newton from ``hint``: (p - c).c' = 0."""
+    """Return the parameter of the curve point nearest to M's origin by Newton's method from ``hint``: (p - c).c' = 0.
+    """
     p = mtv(F[1], sub(M[0], F[0]))
     s = hint + 0.0 * p[0]
     for _ in range(PASSES):
@@ -42,14 +44,15 @@ def foot(par, F, M, hint, data):
         dx = p[0] - x
         dy = p[1] - y
         speed = x1 * x1 + y1 * y1
-        # near the curve's centre of curvature Newton would run off: a part of |c'|^2 is kept
+        # near the curve's centre of curvature Newton's method would diverge: the slope is bounded below by a part of
+        # |c'|^2
         s = s + (dx * x1 + dy * y1) / maximum(speed - dx * x2 - dy * y2, 0.1 * speed)
     return s
 
 
 @formula
 def local(par, F, M, s, data):
-    """At the nearest point: normal and tangent in the world, delta, curvature, and |c'|."""
+    """Return, at the nearest point, normal and tangent in the world, delta, curvature, and |c'|."""
     x, x1, x2, y, y1, y2 = point(par, s, data)
     speed = sqrt(x1 * x1 + y1 * y1)
     p = mtv(F[1], sub(M[0], F[0]))
@@ -62,7 +65,7 @@ def local(par, F, M, s, data):
 
 @formula
 def progress(par, F, M, s, data):
-    """How fast the nearest point moves along the curve: rate of s and of the arc length."""
+    """Return the rates of s and of the arc length at the nearest point."""
     _, t, delta, curvature, speed = local(par, F, M, s, data)
     along = dot(t, sub(sub(M[3], F[3]), cross(F[2], sub(M[0], F[0]))))
     length = along / (1.0 + curvature * delta)
@@ -73,8 +76,8 @@ def progress(par, F, M, s, data):
 def row(par, F, M, hint, data):
     """Value, force on M at its origin (minus that on F), torques on M and F about their origins, acceleration bias.
 
-    deltadot = n.u + w_F.(n x d); besides what an axis fixed in F gives, the bias holds curvature u_t^2 / (1 + curvature
-    delta).
+    deltadot = n.u + w_F.(n x d); besides the terms of an axis fixed in F, the bias contains curvature u_t^2 / (1 +
+    curvature delta).
     """
     s = foot(par, F, M, hint, data)
     n, t, delta, curvature, _ = local(par, F, M, s, data)

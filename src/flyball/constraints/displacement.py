@@ -31,14 +31,14 @@ def row(par, F, M, hint, data):
 
 @formula
 def seen_from(F, M):
-    """Position r of M's origin from F's, and its rate, as seen from F: along the axes of F."""
+    """Return the position r of M's origin relative to F's, and its rate, as seen in F: along the axes of F."""
     d = sub(M[0], F[0])
     return mtv(F[1], d), mtv(F[1], sub(sub(M[3], F[3]), cross(F[2], d)))
 
 
 @formula
 def point_row(F, M, value, gradient, curvature):
-    """What a row returns whose value g(r) depends on the position r of M's origin as seen from F (`seen_from`).
+    """Return the result of a row whose value g(r) depends on the position r of M's origin as seen from F (`seen_from`).
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
 """m . f = 0 with f fixed in F and m fixed in M: two axes at right angles.
 
-Two of them make axes parallel (Hahn's BB2), one blocks a rotation (BB4). Near the solution only: four orientations
-satisfy it and its gradient vanishes at 90 degrees, so assembly starts from ``alignment`` instead.
+Two of them make axes parallel (Hahn's BB2), one blocks a rotation (BB4). Valid near the solution only: four
+orientations satisfy the rows and the gradient vanishes at 90 degrees, so assembly starts with ``alignment`` rows
+instead.
 """
 
 from __future__ import annotations

@@ -1,14 +1,13 @@
 """Every kind of constraint term, found in the files of this folder.
 
-A file says ``KIND``, its number (or ``ROWS``, several numbers and their formulas), and ``row``. It may also say
+A file defines ``KIND``, its number (or ``ROWS``, several numbers and their formulas), and ``row``. It may also define
 
 - ``OFTEN = True``: the kind is so frequent that compiled code has a loop for it alone; such kinds are the first;
-- ``TURNS = True``: its value is an angle, of which whole turns are counted (parameter 0 says whether to);
-- ``POINTS``: of which of its frames, ``"F"``, ``"M"`` or both, it sees the origin only and makes no
-  torque there;
-- ``SINGLE = True``: it decides by its numbers, so results ask for one time after another;
-- ``foot`` and ``progress``: it leans on a place on a curve: where that is, and how fast it moves. Parameters 1 and 2
-  then say where the curve's two splines stand.
+- ``TURNS = True``: its value is an angle, of which full turns are counted (if parameter 0 says so);
+- ``POINTS``: the frames, ``"F"``, ``"M"`` or both, of which it reads the origin only and on which it makes no torque;
+- ``SINGLE = True``: its formula branches on its numbers, so results evaluate it for one time after another;
+- ``foot`` and ``progress``: it depends on a point of a curve: its parameter, and its rate. Parameters 1 and 2 are then
+  the positions of the curve's two splines in ``data``.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ SIGNATURES = (
         "(value, force on M, torque on M, torque on F, bias): a number, three tuples of three, a number",
     ),
 )
-"""The formula of a constraint row of a user's own: `blocks.ConstraintRow`."""
+"""The formula of a user-defined constraint row: `blocks.ConstraintRow`."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ class Kind:
 
     @property
     def place(self) -> bool:
-        """Whether it leans on a place on a curve."""
+        """Return whether the row depends on a point of a curve."""
         return self.foot is not None
 
 
@@ -67,7 +66,7 @@ def _kinds_of(module: ModuleType) -> list[Kind]:
 
 
 def ordered(found: list[Kind]) -> tuple[Kind, ...]:
-    """Kinds by number.
+    """Return the kinds sorted by number.
 
     Raises
     ------
@@ -94,6 +93,6 @@ def _modules() -> list[ModuleType]:
 
 KINDS = ordered([k for module in _modules() for k in _kinds_of(module)])
 RARE = sum(k.often for k in KINDS)
-"""Kinds from this number on share one loop: nearly as fast, and much less to compile."""
+"""Kinds from this number on share one loop: almost as fast, and much less to compile."""
 BY_ADDRESS = len(KINDS)
-"""The number of rows of a user's own, whose formulas are called by address."""
+"""The number of user-defined rows, whose formulas are called by address."""

@@ -1,6 +1,6 @@
-"""m . (w_M - w_F) with m fixed in M: the angular velocity about an axis of M, as a gyroscope on it feels it.
+"""The angular velocity m . (w_M - w_F) about an axis m fixed in M, as a gyroscope on that axis measures it.
 
-The row has no value: angular velocities about axes in space are no derivatives of angles.
+The row has no value: angular velocities about spatial axes are not derivatives of angles.
 """
 
 from __future__ import annotations

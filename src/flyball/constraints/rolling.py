@@ -1,12 +1,12 @@
-"""The lowest point of a wheel on a plane: how high it is, and how fast its material slides.
+"""The lowest point of a wheel on a plane: its height, and the sliding velocity of its material.
 
 F's z axis n is the normal of the plane, which may move; M's z axis a is the wheel's axle, its origin the centre. The
 wheel is a thin disk of radius par[3] swept by a ball of radius par[4]: a disk, a ball, or a wheel with a round tread.
-From the centre to the contact leads rho = -R e - r n with e = (n - c a) / s, c = n.a, s = sqrt(1 - c^2).
+The vector from the centre to the contact is rho = -R e - r n with e = (n - c a) / s, c = n.a, s = sqrt(1 - c^2).
 
-Where par[5] is 1 the direction par[0:3] (in F) must be the normal: the row is the height n.(d + rho), and the same
-wrench is its gradient, since the lowest point does not move to first order. Where it is 0 the row has no value, only
-a velocity: no slip along that direction, a non-holonomic constraint.
+If par[5] is 1, the direction par[0:3] (in F) must be the normal: the row is the height n.(d + rho), and the same wrench
+is its gradient, since the lowest point does not move to first order. If it is 0, the row has no value, only a velocity:
+no slip along that direction, a non-holonomic constraint.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ KIND = 9
 
 @formula
 def contact(par, F, M):
-    """From the centre to the contact, and the rate of that vector: rho, rhodot."""
+    """Return the vector rho from the centre to the contact, and its rate."""
     n = col(F[1], 2)
     a = col(M[1], 2)
     n1 = cross(F[2], n)

@@ -1,8 +1,9 @@
-"""n . (d - s1 f - s2 m - k f x m) = 0 with d = p_M - p_F, n fixed in the world: one row of two lines held in space.
+"""n . (d - s1 f - s2 m - k f x m) = 0 with d = p_M - p_F, n fixed in the world: one row that fixes two lines to each
+other.
 
-f and m are the z axes of F and M. With the angle between them held too (``perpendicular``), three of these keep two
-lines, one on either body, in a fixed position to one another: a massless link with a hinge at either end whose axes
-are skew and offset (Hahn, *Rigid Body Dynamics of Mechanisms 1*, appendix A.4). Regular also where the axes meet.
+f and m are the z axes of F and M. With the angle between them fixed too (``perpendicular``), three of these keep two
+lines, one on either body, in a fixed relative position: a massless link with a hinge at either end whose axes are skew
+and offset (Hahn, *Rigid Body Dynamics of Mechanisms 1*, appendix A.4). Regular also where the axes meet.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Controllers: one file each, found by itself. A new one is a new file here, and a line below for editors.
+"""Controllers: one file each, found automatically. A new controller is a new file here, and a line below for editors.
 
-A controller declares signals and states as expressions; it imports `model` and `math` only. Continuous and
-sampled controllers are the same classes, with or without a period.
+A controller declares signals and states as expressions; it imports `model` and `math` only. Continuous and sampled
+controllers are the same classes, without or with a period.
 """
 
 import importlib
@@ -15,7 +15,7 @@ for _module in pkgutil.iter_modules(__path__):
 
 _PLACE = f"{__name__}."
 ALL = [c for c in Controller.registry.values() if issubclass(c, Controller) and c.__module__.startswith(_PLACE)]
-"""Every controller that a file of this folder defines; all are public."""
+"""Every controller defined in a file of this folder; all are public."""
 
 globals().update({c.__name__: c for c in ALL})
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here

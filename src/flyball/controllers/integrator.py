@@ -17,10 +17,10 @@ class Integrator(Controller):
     ----------
     name : str
     of : expression
-        The signal u: of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
+        The signal u: an expression of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
     gain : expression
     initial : number
-        What the integral begins with.
+        Initial value of the integral.
     period, offset : number [s], optional
         It is sampled at offset, offset + period, ...: y + period gain u from the next instant on (Euler's rule).
     """
@@ -30,14 +30,14 @@ class Integrator(Controller):
     initial: Annotated[Number, Unit(None)] = 0.0
 
     def given(self) -> dict[str, Any]:
-        """Input and gain."""
+        """Return input and gain."""
         return {"of": self.of, "gain": self.gain, "period": self.period}
 
     def signals(self) -> dict[str, str]:
-        """The integral, and what is integrated."""
+        """Return the integral, and the integrand."""
         return {"output": "value", "input": "of"}
 
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
-        """The integral."""
+        """Return the integral."""
         law = "value + period*gain*input" if self.sampled else "gain*input"
         return (ControlState("value", law, n.initial),)

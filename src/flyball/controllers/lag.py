@@ -11,24 +11,24 @@ from ..model.element import Law, Number, Unit, element, nonnegative, positive
 
 @element
 class Lag(Controller):
-    """A signal that follows another with a lag: y / u = gain (1 + lead s) / (1 + time s).
+    """A first-order lag: y / u = gain (1 + lead s) / (1 + time s).
 
-    Without a lead a low-pass filter of first order; with a lead greater than the time it leads.
+    Without a lead it is a first-order low-pass filter; with a lead greater than the time constant, a lead element.
 
     Parameters
     ----------
     name : str
     of : expression
-        The signal u: of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
+        The signal u: an expression of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
     time : number [s]
         Time constant of the lag.
     lead : number [s]
         Time constant of the lead; none if 0.
     gain : expression
     initial : number
-        What the output of the lag alone, without gain and lead, begins with.
+        Initial value of the lag alone, without gain and lead.
     period, offset : number [s], optional
-        It is sampled at offset, offset + period, ...: exact for inputs that are held.
+        It is sampled at offset, offset + period, ...: exact for inputs that are constant between samples.
 
     Notes
     -----
@@ -42,21 +42,21 @@ class Lag(Controller):
     initial: Annotated[Number, Unit(None)] = 0.0
 
     def check(self, n: SimpleNamespace) -> None:
-        """Times have a sign."""
+        """Refuse time constants of the wrong sign."""
         super().check(n)
         positive(self, n, "time", why="What follows at once needs no Lag")
         nonnegative(self, n, "lead")
 
     def given(self) -> dict[str, Any]:
-        """Input, times and gain."""
+        """Return input, time constants and gain."""
         return {"of": self.of, "time": self.time, "lead": self.lead, "gain": self.gain, "period": self.period}
 
     def signals(self) -> dict[str, str]:
-        """What follows, and what it follows."""
+        """Return output and input."""
         leads = "" if self.lead == 0.0 else " + lead/time*(input - value)"
         return {"output": f"gain*(value{leads})", "input": "of"}
 
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
-        """What lags."""
+        """Return the lagging state."""
         law = "value + (1 - exp(-period/time))*(input - value)" if self.sampled else "(input - value)/time"
         return (ControlState("value", law, n.initial),)

@@ -18,33 +18,34 @@ BACK, CLAMPING = "back-calculation", "clamping"
 class PID(Controller):
     """A PID controller: u = kp (b r - y) + I + D, I' = ki (r - y), D = kd s / (1 + filter s) (c r - y).
 
-    r is the set point, y what is measured, e = r - y. The output is u within its limits. Gains are expressions, so that
-    they may follow time or what is measured (scheduled gains).
+    r is the set point, y the measured value, e = r - y. The output is u within its limits. Gains are expressions, so
+    that they may depend on time or measured values (scheduled gains).
 
     Parameters
     ----------
     name : str
     setpoint, measured : expression
-        Of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
+        Expressions of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
     kp, ki, kd : expression
         Gains: of the error, of its integral over time, of its derivative.
     filter : number [s]
-        Time constant of the derivative's filter; needed where there is a derivative.
+        Time constant of the derivative's filter; required if ``kd`` is given.
     lower, upper : expression, optional
-        Limits of the output. A motion ends, with an error, where the lower one comes to be above the upper.
+        Limits of the output. A motion stops with an error if the lower limit exceeds the upper one.
     anti_windup : {"back-calculation", "clamping", "none"}
-        What the integral does while the output is at a limit: it is led back, I' = ki e + (u_limited - u) / tracking;
-        or it stands still as long as the error would lead it further beyond; or it goes on.
+        Treatment of the integral while the output is at a limit: back-calculation, I' = ki e + (u_limited - u) /
+        tracking; clamping: it stays constant while the error would drive it further beyond the limit; none: it
+        continues.
     tracking : number [s], optional
         Time constant of the back-calculation; if not given sqrt(kd/ki), without a derivative kp/ki.
     setpoint_weight, derivative_weight : number
-        b and c: how much of the set point goes into the proportional part, and into the derivative.
+        b and c: weights of the set point in the proportional part and in the derivative.
     bias : expression
-        Added to the output before limits: what holds against gravity, for instance.
+        Added to the output before limits, for instance to compensate gravity.
     initial : number
-        What the integral part I begins with.
+        Initial value of the integral part I.
     initial_measured : number
-        What was measured before the start, as the derivative sees it: what begins elsewhere has jumped there.
+        Measured value before the start, for the derivative: a different value at the start acts as a jump.
     period, offset : number [s], optional
         It is sampled at offset, offset + period, ...: I by Euler's rule, D by backward differences.
 
@@ -75,7 +76,7 @@ class PID(Controller):
 
     @property
     def windup(self) -> str:
-        """What is done against windup: back-calculation where there are limits and an integral, if nothing is said."""
+        """Return the anti-windup method; by default back-calculation if there are limits and an integral."""
         return self.anti_windup or (BACK if self._limited and self.ki != 0.0 else "none")
 
     @property
@@ -83,7 +84,7 @@ class PID(Controller):
         return self.lower is not None or self.upper is not None
 
     def check(self, n: SimpleNamespace) -> None:
-        """Refuse what has no effect, and what is missing."""
+        """Refuse fields without effect, and missing fields."""
         super().check(n)
         if self.kp == 0.0 and self.ki == 0.0 and self.kd == 0.0:
             raise ModelError(f"{self.title}: it has no gains; give at least one of kp, ki, kd")
@@ -114,18 +115,18 @@ class PID(Controller):
             raise ModelError(f"{self.title}: lower is {self.lower:g}, upper {self.upper:g}; lower must be less")
 
     def ordered(self) -> tuple[str, str] | None:
-        """Limits that follow expressions may cross."""
+        """Return limits that are expressions and may cross."""
         plain = isinstance(self.lower, float) and isinstance(self.upper, float)
         return None if plain or self.lower is None or self.upper is None else ("lower", "upper")
 
     def unlimited(self) -> PID:
-        """Without limits nothing winds up."""
+        """Return the controller without limits, which needs no anti-windup."""
         if not self._limited:
             return self
         return replace(self, lower=None, upper=None, anti_windup=None, tracking=None)
 
     def smoother(self, state: str) -> str:
-        """Clamping stops the integral and lets it go."""
+        """Return the replacement for clamping, which makes the rate of the integral jump."""
         if state != "integral" or self.windup != CLAMPING:
             return ""
         return (
@@ -134,7 +135,7 @@ class PID(Controller):
         )
 
     def given(self) -> dict[str, Any]:
-        """Inputs, gains, limits."""
+        """Return inputs, gains and limits."""
         numbers = ("kp", "ki", "kd", "filter", "lower", "upper", "tracking", "bias", "period")
         own = {k: getattr(self, k) for k in ("setpoint", "measured", *numbers)}
         return {k: v for k, v in own.items() if v is not None} | {
@@ -143,11 +144,11 @@ class PID(Controller):
         }
 
     def called(self, given: str) -> str:
-        """Weights by the names of their fields."""
+        """Return the field name of a weight."""
         return {"weight_p": "setpoint_weight", "weight_d": "derivative_weight"}.get(given, given)
 
     def signals(self) -> dict[str, str]:
-        """The output within limits, the output without them, the error and the parts."""
+        """Return the limited output, the unlimited output, the error and the parts."""
         parts = {}
         if self.kp != 0.0:
             parts["proportional"] = "kp*error" if self.setpoint_weight == 1.0 else "kp*(weight_p*setpoint - measured)"
@@ -158,7 +159,7 @@ class PID(Controller):
         total = " + ".join([*parts, *(["integral"] if self.ki != 0.0 else []), *(["bias"] if self.bias != 0.0 else [])])
         out = "unlimited" if self.lower is None else "max(unlimited, lower)"
         out = out if self.upper is None else f"min({out}, upper)"
-        if self.ordered():  # no number where they cross
+        if self.ordered():  # nan where the limits cross
             out = f"where(lower > upper, (upper - lower)**0.5, {out})"
         inner = {"damped": "-measured" if self.derivative_weight == 0.0 else "weight_d*setpoint - measured"}
         return {
@@ -172,7 +173,7 @@ class PID(Controller):
         }
 
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
-        """The integral part; what the derivative is filtered by."""
+        """Return the integral part, and the state of the derivative filter."""
         out = []
         if self.ki != 0.0:
             rate = self._rate_of_integral()
@@ -185,11 +186,11 @@ class PID(Controller):
         return tuple(out)
 
     def _rate_of_integral(self) -> str:
-        """What is integrated."""
+        """Return the integrand."""
         if self.windup == BACK:
             usual = "sqrt(kd/ki)" if self.kd != 0.0 else "kp/ki"
             time = usual if self.tracking is None else "tracking"
-            # of a sampled one an instant takes back all at most
+            # a sampled controller takes back at most the whole excess at one instant
             back = f"max(period, {time})" if self.sampled else time
             return f"ki*error + (output - unlimited)/({back})"
         if self.windup == CLAMPING:

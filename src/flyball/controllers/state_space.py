@@ -1,6 +1,6 @@
-"""State space: x' = A x + B u, y = C x + D u, of any number of inputs and outputs.
+"""State space: x' = A x + B u, y = C x + D u, with any number of inputs and outputs.
 
-Also made of transfer functions, and of systems of the python-control library.
+It can be made from transfer functions and from systems of the python-control library.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..model.expressions import number
 
 Rows = list[list[float]]
 DEFAULT_OUTPUT_NAME = re.compile(r"y\[\d+\]")
-"""Outputs as python-control calls them by itself."""
+"""Default output names of python-control."""
 
 
 def canonical_form(num: npt.ArrayLike, den: npt.ArrayLike, whose: str) -> tuple[Rows, Rows, Rows, Rows]:
@@ -29,7 +29,7 @@ def canonical_form(num: npt.ArrayLike, den: npt.ArrayLike, whose: str) -> tuple[
     Raises
     ------
     ModelError
-        If there is more in the numerator than in the denominator.
+        If the numerator has a higher degree than the denominator.
     """
     a, b = (np.trim_zeros(np.array(x, float), "f") for x in (den, num))
     if not len(a):
@@ -53,7 +53,7 @@ def system_matrices(system: Any, name: str) -> dict[str, Any]:
     Raises
     ------
     ModelError
-        If it is no such system, or has several inputs or outputs as a transfer function.
+        If it is not such a system, or has several inputs or outputs as a transfer function.
     """
     whose = f"StateSpace {name!r}"
     if all(hasattr(system, k) for k in "ABCD"):
@@ -78,7 +78,7 @@ def system_matrices(system: Any, name: str) -> dict[str, Any]:
 
 
 def output_labels(system: Any) -> tuple[str, ...]:
-    """What a system of the python-control library calls its outputs, as plain words; none if nobody named them."""
+    """Return the output labels of a python-control system as plain words; none if they are default names."""
     labels = [str(x) for x in getattr(system, "output_labels", None) or ()]
     if all(DEFAULT_OUTPUT_NAME.fullmatch(x) for x in labels):
         return ()
@@ -86,7 +86,7 @@ def output_labels(system: Any) -> tuple[str, ...]:
 
 
 def _single_polynomial(coefficients: Any, whose: str) -> np.ndarray:
-    """The one polynomial of a transfer function."""
+    """Return the only polynomial of a transfer function."""
     found = coefficients
     while len(found) and np.ndim(found[0]) > 0:
         if len(found) > 1:
@@ -96,12 +96,12 @@ def _single_polynomial(coefficients: Any, whose: str) -> np.ndarray:
 
 
 def _as_list(value: Any) -> Any:
-    """One law is a list of one."""
+    """Return a list; a single law becomes a list of one."""
     return (value,) if isinstance(value, (str, int, float)) or callable(value) else python_data(value)
 
 
 def _as_matrix(value: Any) -> Any:
-    """Rows of numbers; of one number, and of one row, the matrix that it is."""
+    """Return a matrix; a number or a single row becomes a matrix."""
     value = python_data(value)
     if isinstance(value, (int, float, str)):
         value = ((value,),)
@@ -118,22 +118,22 @@ Matrix = Annotated[tuple[Numbers, ...], BeforeValidator(_as_matrix)]
 class StateSpace(Controller):
     """A linear system x' = A x + B u, y = C x + D u; sampled, with a period, x_(k+1) = A x_k + B u_k.
 
-    Outputs are ``K.output``, or ``K.output1``, ``K.output2``, ... where there are several; laws name a single one,
-    whatever it is called, by the system's name too. States are ``K.x1``, ``K.x2``, ...; of one only ``K.x``.
+    Outputs are ``K.output``, or ``K.output1``, ``K.output2``, ... where there are several; a single output can also be
+    named by the system's name alone. States are ``K.x1``, ``K.x2``, ...; of one only ``K.x``.
 
     Parameters
     ----------
     name : str
     inputs : list of expressions
-        The signals u: of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
+        The signals u: expressions of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
     A, B, C, D : matrices
         Rows of numbers, or of expressions of parameters. Without states only D is given: a matrix of gains.
     outputs : list of str, optional
         Names of the outputs.
     initial : list of numbers, optional
-        What the states begin with; zero if not given.
+        Initial values of the states; zero if not given.
     period, offset : number [s], optional
-        It is sampled at offset, offset + period, ...; outputs are held in between.
+        It is sampled at offset, offset + period, ...; outputs are constant in between.
 
     See Also
     --------
@@ -159,13 +159,13 @@ class StateSpace(Controller):
             Or anything that has A, B, C, D, or num and den, and dt.
         inputs : list of expressions
         fields
-            As of `StateSpace`: outputs, in place of the system's own names, in which what is no letter, digit or _
-            becomes _; initial; period, of a discrete system that does not say its own.
+            As for `StateSpace`: outputs, in place of the system's own names (in which characters other than letters,
+            digits and _ are replaced by _); initial; period of a discrete system that does not state one.
 
         Raises
         ------
         ModelError
-            If it is no such system.
+            If it is not such a system.
         """
         given = system_matrices(system, name)
         if getattr(system, "dt", None) is True and "period" not in fields:
@@ -187,7 +187,7 @@ class StateSpace(Controller):
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """As given, else output, or output1, output2, ..."""
+        """Return the names as given, else output, or output1, output2, ..."""
         return self.outputs or numbered_names(OUTPUT, self.sizes[2])
 
     def check(self, n: SimpleNamespace) -> None:
@@ -223,7 +223,7 @@ class StateSpace(Controller):
             raise ModelError(f"{self.title}: it has {states} states, and {len(self.initial)} initial values")
 
     def given(self) -> dict[str, Any]:
-        """Inputs, and entries of matrices that are expressions."""
+        """Return inputs, and matrix entries that are expressions."""
         out: dict[str, Any] = {f"u_{j}": law for j, law in enumerate(self.inputs)}
         for name in "ABCD":
             for i, row in enumerate(getattr(self, name)):
@@ -231,14 +231,14 @@ class StateSpace(Controller):
         return out
 
     def called(self, given: str) -> str:
-        """Which entry of a matrix, which input."""
+        """Return the name of a matrix entry or input."""
         name, *at = given.split("_")
         if name in "ABCD" and at:
             return f"row {int(at[0]) + 1}, column {int(at[1]) + 1} of {name}"
         return f"input {int(at[0]) + 1}" if name == "u" else given
 
     def _row(self, name: str, i: int, of: tuple[str, ...]) -> list[str]:
-        """Terms of one row of a matrix times a vector."""
+        """Return the terms of one row of a matrix times a vector."""
         M = getattr(self, name)
         out = []
         for j, x in enumerate(M[i] if M else ()):
@@ -253,14 +253,14 @@ class StateSpace(Controller):
         return numbered_names("x", self.sizes[0])
 
     def signals(self) -> dict[str, str]:
-        """The outputs, and the inputs."""
+        """Return the outputs and the inputs."""
         _, inputs, outputs = self.sizes
         u = tuple(f"u_{j}" for j in range(inputs))
         y = (" + ".join([*self._row("C", i, self._x), *self._row("D", i, u)]) or "0" for i in range(outputs))
         return dict(zip(self.output_names, y, strict=True)) | dict(zip(numbered_names("input", inputs), u, strict=True))
 
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
-        """The states x."""
+        """Return the states x."""
         u = tuple(f"u_{j}" for j in range(self.sizes[1]))
         laws = (" + ".join([*self._row("A", i, self._x), *self._row("B", i, u)]) or "0" for i in range(self.sizes[0]))
         initial = n.initial or (0.0,) * self.sizes[0]

@@ -12,13 +12,13 @@ from ..model.element import Law, Numbers, Unit, element
 
 @element
 class Transfer(Controller):
-    """A transfer function y / u = num(s) / den(s), proper, from rest; with a period num(z) / den(z).
+    """A proper transfer function y / u = num(s) / den(s), initially at rest; with a period num(z) / den(z).
 
     Parameters
     ----------
     name : str
     of : expression
-        The signal u: of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
+        The signal u: an expression of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
     num, den : lists of numbers
         Coefficients from the highest power of s, or of z: ``num=[1], den=[0.1, 1]`` is 1 / (0.1 s + 1).
     period, offset : number [s], optional
@@ -34,7 +34,7 @@ class Transfer(Controller):
     den: Annotated[Numbers, Unit(None)]
 
     def check(self, n: SimpleNamespace) -> None:
-        """Refuse what is not proper."""
+        """Refuse an improper transfer function."""
         super().check(n)
         if not n.den:
             raise ModelError(f"{self.title}: den has no coefficients; den=[1] makes num=[k] a gain")
@@ -53,12 +53,12 @@ class Transfer(Controller):
         return numbered_names("x", len(self.den) - 1)
 
     def given(self) -> dict[str, Any]:
-        """The input, and the coefficients."""
+        """Return the input and the coefficients."""
         lists = {"num": (0.0,) * (len(self.den) - len(self.num)) + self.num, "den": self.den}
         return {"of": self.of} | {f"{k}_{i}": x for k, xs in lists.items() for i, x in enumerate(xs)}
 
     def called(self, given: str) -> str:
-        """Which coefficient."""
+        """Return the name of a coefficient."""
         name, _, k = given.partition("_")
         return (
             f"coefficient {int(k) - (len(self.den) - len(self.num)) * (name == 'num') + 1} of {name}"
@@ -67,11 +67,11 @@ class Transfer(Controller):
         )
 
     def signals(self) -> dict[str, str]:
-        """Output and input."""
+        """Return output and input."""
         terms = [f"num_{k}*{x}" for k, x in enumerate(("highest", *self._x)) if self.given()[f"num_{k}"] != 0.0]
         less = "".join(f" - den_{k + 1}*{x}" for k, x in enumerate(self._x))
         return {"output": " + ".join(terms) or "0", "input": "of", "highest": f"(of{less})/den_0"}
 
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
-        """Those of the canonical form."""
+        """Return the states of the canonical form."""
         return tuple(ControlState(x, before) for x, before in zip(self._x, ("highest", *self._x), strict=False))

@@ -1,12 +1,16 @@
 """Eigenvalues and eigenvectors of a system matrix, their uncertainty, and which eigenvalues are equal.
 
-A perturbation E of the matrix moves a simple eigenvalue by y^H E x / y^H x (Wilkinson 1965). With E what rounding
-may have made of every entry, smaller real and imaginary parts are set to zero. What the solver has left of A x - w
-x is as large as rounding of the largest entry: a simple eigenvalue is computed as y^H A x / y^H x, whose error is
-its square (Ostrowski 1958), so that slow ones are accurate beside fast ones. Where eigenvectors are nearly
-parallel, rounding by r splits a defective eigenvalue by as much as sqrt(r), but not its mean: eigenvalues that
-cannot be separated become their mean (Kato 1966, II.2), and their number of common eigenvectors is found in the
-invariant subspace.
+A perturbation E of the matrix A changes a simple eigenvalue w by y^H E x / y^H x, with x and y the right and left
+eigenvectors (Wilkinson 1965). E is taken as the rounding error of every entry; real and imaginary parts smaller than
+the resulting uncertainty are set to zero.
+
+The residual A x - w x of the eigenvalue solver is as large as the rounding error of the largest entry. A simple
+eigenvalue is therefore recomputed as y^H A x / y^H x, whose error is the square of the residual (Ostrowski 1958), so
+that slow eigenvalues are accurate beside fast ones.
+
+Where eigenvectors are nearly parallel, a rounding error r splits a defective eigenvalue by up to sqrt(r), but leaves
+the mean of the split values unchanged. Eigenvalues that cannot be separated are therefore replaced by their mean
+(Kato 1966, II.2). The number of their eigenvectors is found in their invariant subspace.
 """
 
 from __future__ import annotations
@@ -19,15 +23,14 @@ import numpy as np
 from ..errors import AnalysisError
 from .reduced_equations import MatrixUncertainty
 
-ENTRY_ROUNDING = 4.0 * np.finfo(float).eps  # of every entry: what is uncertain of it at least
-EQUAL_TOLERANCE = 1e-9  # difference of eigenvalues, of their own size, below which they are one
-MAX_SPLITTING = 1e-4  # of the matrix' size: a defective eigenvalue is not split further than this by rounding
-NULL_TOLERANCE = 1e-9  # singular values below this part of the largest are none
-RESIDUAL_LIMIT = 1e-9  # what may be left of A x - w x, of |A| |x| + |w| |x|
-CORRECTION_LIMIT = (
-    1e-2  # of the way to the next eigenvalue: corrections are small beside it, and their squares are none
-)
-NEGLIGIBLE_ENTRY = 1e-15  # of the largest entry: left out where balancing makes too much of small entries
+ENTRY_ROUNDING = 4.0 * np.finfo(float).eps  # smallest relative uncertainty of every entry
+EQUAL_TOLERANCE = 1e-9  # relative difference below which two eigenvalues are equal
+MAX_SPLITTING = 1e-4  # rounding splits a defective eigenvalue by less than this part of the matrix norm
+NULL_TOLERANCE = 1e-9  # singular values below this part of the largest count as zero
+RESIDUAL_LIMIT = 1e-9  # largest residual of A x - w x, relative to |A| |x| + |w| |x|
+CORRECTION_LIMIT = 1e-2  # corrections are applied only below this part of the distance to the next eigenvalue
+# Entries below this part of the largest are dropped in the second attempt, where balancing over-scales small entries.
+NEGLIGIBLE_ENTRY = 1e-15
 
 
 @dataclass
@@ -37,19 +40,19 @@ class Spectrum:
     Attributes
     ----------
     raw : ndarray (n,) complex
-        Eigenvalues as computed: sums of those of a group, and of their powers, are exact to rounding.
+        Eigenvalues as computed. Sums of the eigenvalues of a group, and of their powers, are exact to rounding.
     values : ndarray (n,) complex
-        The same, those of one group replaced by their mean; real and imaginary parts that are rounding are 0.
+        The same, with each group replaced by its mean. Real and imaginary parts within rounding are 0.
     vectors : ndarray (n, n) complex
-        Eigenvectors, of a group as many as it has, then as computed.
+        Eigenvectors. Of each group the first columns are its independent eigenvectors, the rest are as computed.
     groups : list of list of int
-        Indices of eigenvalues that are one.
+        Indices of equal eigenvalues.
     multiplicity, geometric : ndarray (n,) int
-        How many eigenvalues are one with each, and how many eigenvectors they have in common.
-    blur : ndarray (n,)
-        What each of the values is uncertain by.
+        Algebraic and geometric multiplicity of each eigenvalue.
+    uncertainty : ndarray (n,)
+        Uncertainty of each value.
     residual : float
-        The largest part of A x - w x, of |A| |x| + |w| |x|.
+        Largest residual of A x - w x, relative to |A| |x| + |w| |x|.
     """
 
     raw: np.ndarray
@@ -68,13 +71,13 @@ def spectrum(A: np.ndarray, uncertainty: MatrixUncertainty | None = None) -> Spe
     Parameters
     ----------
     A : ndarray (n, n)
-    uncertainty : Doubt, optional
-        What is uncertain of it, besides the last digits of its entries.
+    uncertainty : MatrixUncertainty, optional
+        Uncertainty of A, in addition to the rounding of its entries.
 
     Raises
     ------
     AnalysisError
-        If eigenvectors do not fulfil A x = w x.
+        If the computed eigenvectors do not fulfil A x = w x.
     """
     n = len(A)
     if not n:
@@ -102,7 +105,7 @@ def spectrum(A: np.ndarray, uncertainty: MatrixUncertainty | None = None) -> Spe
 
 
 def _correction(w: np.ndarray, k: int, by: np.ndarray, uncertainty: np.ndarray) -> np.ndarray:
-    """What makes a simple eigenvalue better, where the solver has left more than the matrix is uncertain by."""
+    """Correction of a simple eigenvalue, or 0 where it is within the uncertainty or too large to be trusted."""
     others = np.abs(np.delete(w, k) - w[k]).min(initial=np.inf)
     return np.where((np.abs(by) > uncertainty[k]) & (np.abs(by) < CORRECTION_LIMIT * others), by, 0.0)
 
@@ -110,14 +113,15 @@ def _correction(w: np.ndarray, k: int, by: np.ndarray, uncertainty: np.ndarray) 
 def _separate_group(
     out: Spectrum, group: list[int], B: np.ndarray, E: Sequence[tuple[np.ndarray, np.ndarray]], uncertainty: np.ndarray
 ) -> None:
-    """Replace eigenvalues that are one by their mean; those that are not leave the group, one after the other."""
+    """Replace equal eigenvalues by their mean; eigenvalues that differ are removed from the group one by one."""
     w = out.raw
     while len(group) > 1:
         mean, blurred, X, squares = _group_mean(B, E, w[group])
         total, power = w[group].sum(), (w[group] ** 2).sum()
         far = group[int(np.argmax(np.abs(w[group] - mean)))]
         if X is not None and blurred < abs(mean.real) and abs(power - total**2) <= squares:
-            out.values[far], uncertainty[far] = total.real, len(group) * blurred  # one beside others that are zero
+            # One eigenvalue is nonzero, all others are zero.
+            out.values[far], uncertainty[far] = total.real, len(group) * blurred
             mean, blurred, X, _ = _group_mean(B, E, w[group], 0j)
             group.remove(far)
             out.groups.append([far])
@@ -159,14 +163,14 @@ def _balanced_eigenpairs(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 
 def _without_rounding(w: np.ndarray, uncertainty: np.ndarray) -> np.ndarray:
-    """Eigenvalues without parts that are rounding."""
+    """Set real and imaginary parts that are within the uncertainty to 0."""
     return np.where(np.abs(w.real) <= uncertainty, 0.0, w.real) + 1j * np.where(
         np.abs(w.imag) <= uncertainty, 0.0, w.imag
     )
 
 
 def equal_groups(w: np.ndarray, uncertainty: np.ndarray) -> list[list[int]]:
-    """Indices of eigenvalues that are the same as far as can be told, where ``uncertainty`` is what each is uncertain by."""
+    """Indices of eigenvalues that cannot be distinguished, given the ``uncertainty`` of each."""
     size = np.abs(w)
     near = np.abs(w[:, None] - w) <= np.maximum(
         np.minimum(uncertainty[:, None], uncertainty), EQUAL_TOLERANCE * np.minimum(size[:, None], size)
@@ -185,11 +189,11 @@ def equal_groups(w: np.ndarray, uncertainty: np.ndarray) -> list[list[int]]:
 def _group_mean(
     B: np.ndarray, E: Sequence[tuple[np.ndarray, np.ndarray]], w: np.ndarray, centre: complex | None = None
 ) -> tuple[complex, float, np.ndarray | None, float]:
-    """Of eigenvalues that may be one: mean, what it is uncertain by, eigenvectors; what squares are uncertain by.
+    """Mean of possibly equal eigenvalues, its uncertainty, their eigenvectors, and the uncertainty of their squares.
 
-    There are no vectors if they are not one: the sum of squared distances from the mean is found as exactly as the
-    matrix is known, however ill-conditioned each of them is by itself. With ``centre`` it is known that all but one are
-    that, which is then returned for the mean.
+    The eigenvectors are None if the eigenvalues are not equal. The test uses the sum of squared distances from the
+    mean, which is as accurate as the matrix even where each eigenvalue by itself is ill-conditioned. If ``centre`` is
+    given, all but one of the eigenvalues are known to equal it, and it is returned as the mean.
     """
     V, W = invariant_subspace(B, w), invariant_subspace(B.conj().T, w.conj())
     inner = np.linalg.pinv(W.conj().T @ V) @ W.conj().T
@@ -211,7 +215,7 @@ def _group_mean(
 
 
 def invariant_subspace(B: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Orthonormal basis (n, k) of what belongs to k eigenvalues."""
+    """Orthonormal basis (n, k) of the invariant subspace of k eigenvalues."""
     from scipy.linalg import schur
 
     def nearest(z: complex) -> float:

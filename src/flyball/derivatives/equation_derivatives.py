@@ -1,9 +1,9 @@
 """Exact derivatives of the equations of motion at a state, by complex steps through the compiled formulas.
 
-With a step i h along one direction the imaginary part of the result is h times the derivative, to rounding: nothing
-is subtracted (Lyness and Moler 1967; Squire and Trapp 1998). The equations are the residuals of
-``engine/residual.py``: nothing in them is solved. Directions that no equation depends on together are taken in
-one step (Curtis, Powell and Reid 1974), so that a chain of a thousand bodies needs as many steps as one of three.
+With a step i h along one direction the imaginary part of the result is h times the derivative, to rounding, because
+nothing is subtracted (Lyness and Moler 1967; Squire and Trapp 1998). The equations are the residuals of
+``engine/residual.py``; no equation is solved in them. Directions that do not affect a common equation share one step
+(Curtis, Powell and Reid 1974), so that a chain of a thousand bodies needs as many steps as one of three.
 
 Joint friction depends on the reactions of its joint: in r = M vdot - f - G^T lam the forces f then depend on lam,
 so that dr/dlam = -G^T + F. F is found by a complex step of each multiplier that loads a joint with friction.
@@ -28,44 +28,46 @@ from ..tables.table_definitions import ALONG, SLIDING, System, Work, with_number
 from ..tables.values import Values, values
 
 COMPLEX_STEP = 1e-40
-SELF_STRESS_LIMIT = 1e-8  # singular values of rows of unit size below this part of the largest are none
-COUPLING_LIMIT = 1e-9  # part of its largest entry below which F leaves a self-stress alone
+SELF_STRESS_LIMIT = 1e-8  # singular values of unit rows below this part of the largest count as zero
+# Columns of F below this part of the largest entry of G are rounding.
+COUPLING_LIMIT = 1e-9
 
 
 def complex_step_derivative(x: np.ndarray) -> np.ndarray:
-    """By what carries a complex step, of numbers that followed it.
+    """Derivatives from the imaginary parts of numbers computed with a complex step.
 
-    The third order leaves STEP^2 / 6 of the third derivative: of a law without a slope, such as a cube at 0, too.
+    The third-order term leaves COMPLEX_STEP^2 / 6 times the third derivative, even where the first derivative is zero
+    (a cube at 0). Values of this size are set to 0.
     """
     found = np.imag(x) / COMPLEX_STEP
     return np.where(np.abs(found) <= COMPLEX_STEP, 0.0, found)
 
 
 def friction_load_rows(s: Structure) -> np.ndarray:
-    """The rows whose multipliers some friction depends on."""
+    """Indices of the constraint rows whose multipliers load a joint with friction."""
     terms = s.tables["load_terms"].term if s.loads else np.zeros(0, int)
     return np.unique(s.tables["terms"].row[terms[terms >= 0] % len(s.terms)])
 
 
 def complex_system(system: System) -> System:
-    """The same tables in complex numbers."""
+    """Copy the tables with complex numbers."""
     return with_numbers(system, lambda _, x: x.astype(complex))
 
 
 def complex_tables(c: CompiledMechanism) -> tuple[System, Work]:
-    """Tables and scratch in complex numbers."""
+    """Tables and work arrays in complex numbers."""
     system = complex_system(c.values.system)
     return system, allocate_work(c.structure, system, complex)
 
 
 def friction_by_multipliers(x: MechanismState, system: System, W: Work) -> np.ndarray:
-    """F, what is added to -G^T in the derivatives of r by the multipliers, (nv, rows).
+    """F (nv, rows), the part that joint friction adds to -G^T in the derivatives of r by the multipliers.
 
     Parameters
     ----------
-    x : State
+    x : MechanismState
     system, W : System, Work
-        Its tables and scratch in complex numbers.
+        The tables and work arrays of the state in complex numbers.
     """
     s = x.c.structure
     nv, nr = s.nv, len(s.rows)
@@ -88,7 +90,7 @@ def friction_by_multipliers(x: MechanismState, system: System, W: Work) -> np.nd
 
 
 def has_reaction_friction(x: MechanismState, system: System, W: Work) -> bool:
-    """Whether the equations of motion depend on the multipliers by more than -G^T; arguments as `friction_by_multipliers`."""
+    """Whether joint friction makes dr/dlam differ from -G^T; arguments as in `friction_by_multipliers`."""
     s = x.c.structure
     nv, nr = s.nv, len(s.rows)
     random = np.random.default_rng(0).uniform(1.0, 2.0, nr)
@@ -103,19 +105,19 @@ def has_reaction_friction(x: MechanismState, system: System, W: Work) -> bool:
 
 
 def refuse_undetermined_friction(s: Structure, G: np.ndarray, F: np.ndarray) -> None:
-    """Refuse friction under reactions that redundancy leaves open: what it does then depends on what nobody knows.
+    """Refuse joint friction whose reactions are undetermined because of redundant constraints.
 
     Parameters
     ----------
     s : Structure
     G : ndarray (rows, nv)
-        Constraint rows, turns counted in lengths.
+        Constraint rows; rotations are scaled to lengths.
     F : ndarray (nv, rows)
 
     Raises
     ------
     ModelError
-        Naming the frictions.
+        With the names of the friction elements.
     """
     size = np.maximum(np.sqrt((G * G).sum(axis=1)), 1e-300)
     free = fundamental_subspaces(G / size[:, None], SELF_STRESS_LIMIT).dependencies / size[:, None]
@@ -136,12 +138,12 @@ def refuse_undetermined_friction(s: Structure, G: np.ndarray, F: np.ndarray) -> 
     )
 
 
-DIRECTIONS_PER_CALL = 128  # directions a call
+DIRECTIONS_PER_CALL = 128  # directions per call
 
 
 @dataclass
 class MechanismState:
-    """A mechanism in motion at an instant, with what follows from it."""
+    """State of a mechanism at one time, with accelerations, multipliers and efforts."""
 
     c: CompiledMechanism
     t: float
@@ -154,15 +156,15 @@ class MechanismState:
 
     @classmethod
     def moving(cls, c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> MechanismState:
-        """With the accelerations and multipliers that the equations of motion give.
+        """State with the accelerations and multipliers that solve the equations of motion.
 
         Raises
         ------
         AnalysisError
-            If they give none.
+            If the equations have no solution.
         """
         if c.at(t, q, v, MOTION)[0] != 0:
-            from ..simulation.diagnosis import reason_without_solution  # simulation stands on derivatives
+            from ..simulation.diagnosis import reason_without_solution  # simulation imports derivatives
 
             raise AnalysisError(f"{c.structure.model.name!r} at t = {t:.6g} s, {reason_without_solution(c, t, abs(t))}")
         W = c.work
@@ -172,7 +174,7 @@ class MechanismState:
 
     @classmethod
     def resting(cls, c: CompiledMechanism, t: float, q: np.ndarray, lam: np.ndarray | None = None) -> MechanismState:
-        """At rest, whatever the forces say, under given multipliers."""
+        """State with zero velocities and accelerations, balanced or not, with the given multipliers (default 0)."""
         nv, nr = c.structure.nv, len(c.structure.rows)
         still = np.zeros(nv)
         c.at(t, q, still)
@@ -214,7 +216,7 @@ class EquationDerivatives:
 
     @cached_property
     def by_position(self):
-        """Derivatives by positions along the velocities, sparse (width, nv)."""
+        """Derivatives by position changes in the velocities' directions, sparse (width, nv)."""
         return self._jacobian(0)
 
     @cached_property
@@ -229,28 +231,28 @@ class EquationDerivatives:
 
     @cached_property
     def by_reactions(self) -> np.ndarray:
-        """Derivatives of r by the rows' multipliers besides -G^T: joint friction's, (nv, rows)."""
+        """Derivatives of r by the multipliers besides -G^T (nv, rows): the part F of joint friction."""
         return friction_by_multipliers(self.state, *self.complex_tables)
 
     def by_parameter(self, name: str) -> np.ndarray:
-        """Derivatives by a parameter of the model, (width,), the state's numbers held."""
+        """Derivatives by a parameter of the model at fixed state, (width,)."""
         return self.by_values(self.stepped(name))
 
     def by_values(self, stepped: Values) -> np.ndarray:
-        """Derivatives along a complex step of the mechanism's numbers, (width,)."""
+        """Derivatives from parameter values that contain a complex step, (width,)."""
         steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
         return complex_step_derivative(self._run(steps, complex_system(stepped.system))[0])
 
     def stepped(self, name: str) -> Values:
-        """Numbers of the mechanism, a complex step along a parameter."""
+        """Values of the mechanism with a complex step of one parameter."""
         return values_with_complex_step(self.state.c, name)
 
     def by_law(self, name: str) -> np.ndarray:
-        """Derivatives by a parameter that stands in laws only, (width,)."""
+        """Derivatives by a parameter that occurs in laws only, (width,)."""
         return self.by_values(self.stepped_law(name))
 
     def stepped_law(self, name: str) -> Values:
-        """The same for a parameter that stands in laws only."""
+        """Values with a complex step of a parameter that occurs in laws only."""
         c = self.state.c
         system = complex_system(c.values.system)
         system.const[list(c.structure.model.parameters).index(name)] += 1j * COMPLEX_STEP
@@ -258,7 +260,7 @@ class EquationDerivatives:
 
     @cached_property
     def complex_tables(self) -> tuple[System, Work]:
-        """Tables and scratch in complex numbers."""
+        """Tables and work arrays of the state in complex numbers."""
         return complex_tables(self.state.c)
 
     def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
@@ -274,7 +276,7 @@ class EquationDerivatives:
         return out
 
     def _not_finite(self, stack: np.ndarray) -> AnalysisError:
-        """The error that names what is no number; ``stack`` is the laws' scratch."""
+        """The error that names what is not finite; ``stack`` is the work array of the laws."""
         from ..simulation.diagnosis import force_fault
 
         x = self.state
@@ -313,14 +315,14 @@ class EquationDerivatives:
 
     @property
     def _groups(self):
-        """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together."""
+        """Sparsity pattern (width, nv), and groups of velocities without a common residual."""
         return sparsity_and_groups(self.state.c.structure, self.width, self.state.c.values.system)
 
 
 def sparsity_and_groups(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
-    """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together, (nv,).
+    """Sparsity pattern (width, nv) of the residuals by the velocities, and each velocity's column group, (nv,).
 
-    ``width`` is that of the residuals.
+    Velocities of one group affect no common residual. ``width`` is the number of residuals.
     """
     return s.kept.get("sparsity", None, 1, lambda: _sparsity(s, width, S))
 
@@ -335,13 +337,13 @@ def _sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
 
 
 def values_with_complex_step(c: CompiledMechanism, name: str) -> Values:
-    """Numbers of a mechanism, a complex step along a parameter."""
+    """Values of a mechanism with a complex step of one parameter."""
     value = c.structure.model.environment(c.parameters)[name]
     return values(c.structure, c.parameters | {name: complex(value, COMPLEX_STEP)})  # type: ignore[arg-type]
 
 
 def prescription_derivatives(x: MechanismState, stepped: Values) -> tuple[np.ndarray, np.ndarray]:
-    """What a complex step of the numbers does to prescribed coordinates: to q - f(t), and to v - f'(t); (n,) each."""
+    """Derivatives (n,) each of q - f(t) and v - f'(t) of prescribed coordinates, from values with a complex step."""
     S = complex_system(stepped.system)
     stack = np.zeros((x.c.structure.depth + 1, 3), complex)
     out = []
@@ -354,7 +356,7 @@ def prescription_derivatives(x: MechanismState, stepped: Values) -> tuple[np.nda
 
 
 def refuse_function_laws(s: Structure) -> None:
-    """Laws that are Python functions have no derivatives."""
+    """Refuse laws that are Python functions: they have no derivatives."""
     if s.functions:
         raise ModelError(
             f"law {s.functions[0].text!r} is a Python function, which has no derivatives; write it as an expression or "
@@ -365,8 +367,8 @@ def refuse_function_laws(s: Structure) -> None:
 def sparsity_pattern(s: Structure, S: System) -> Any:
     """Which residuals can depend on which velocity's coordinate, in absolute coordinates; sparse (width, nv).
 
-    An element's equations and the equations of motion of the bodies it acts on depend on the bodies that it touches;
-    elements with laws that name sensors also on what these measure.
+    The equations of an element, and the equations of motion of the bodies that it loads, depend on the bodies that it
+    connects. Elements whose laws name sensors depend also on the bodies that these sensors measure.
     """
     import scipy.sparse as sp
 

@@ -1,11 +1,11 @@
 """Nonsmooth points of forces: kinks, jumps and infinite slopes at the present state.
 
-Examples are a rope at its free length, ``abs`` at zero and the corner of a table. A law is evaluated a small offset
-to both sides of every quantity that it depends on, and at a tenth of that offset. What differs by as much at a
-tenth has a kink or a jump there; what is smooth differs by a tenth. The slopes on two sides of a kink differ across
-it only (Hadamard), so their difference gives its normal. Slopes that grow towards the point are infinite there:
-sqrt(abs(x)) at zero. Kinks that meet in a point, as in max(0, min(x, y)), are found from slopes in directions all
-around it.
+Examples are a rope at its free length, ``abs`` at zero and the corner of a table. A law is evaluated at a small offset
+on both sides of every quantity that it depends on, and at a tenth of that offset. A difference between the sides that
+stays the same at a tenth of the offset is a kink or a jump; in a smooth law it shrinks to a tenth. Across a kink the
+slopes change only in the direction normal to it (Hadamard), so their difference gives the normal. Slopes that grow
+towards the point are infinite there, such as those of sqrt(abs(x)) at zero. Kinks that meet in a point, as in
+max(0, min(x, y)), are found from slopes in many directions around it.
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ from ..model.model import Model
 from .equation_derivatives import COMPLEX_STEP, EquationDerivatives, complex_step_derivative
 from .output_derivatives import curve_gradients, snapshot
 
-OFFSET = 1e-6  # the little way: of the mechanism's length, a radian, or these in a second
+OFFSET = 1e-6  # relative to the mechanism's length, in radians, or these per second
 NEAR_FRACTION = 0.1
-PERSISTENT_FRACTION = 0.5  # of the difference that far away
+PERSISTENT_FRACTION = 0.5  # of the difference at the full offset
 LAW_ROUNDING = 16.0 * np.finfo(float).eps
-SLOPE_TOLERANCE = 1e-7  # differences of slopes below this part of them are none
+SLOPE_TOLERANCE = 1e-7  # relative difference of slopes that counts as zero
 
-STEEPENING = 1.1  # what slopes to both sides grow by over the last nine tenths of the way, if the slope is infinite
+# A slope is infinite if it grows by this factor from the full offset to a tenth of it.
+STEEPENING = 1.1
 KINK, JUMP, STEEP, NO_VALUE = "has a kink", "jumps", "has an infinite slope", "has no value or no slope"
 
 LawFunction = Callable[[np.ndarray], complex]
@@ -40,19 +41,19 @@ LawFunction = Callable[[np.ndarray], complex]
 
 @dataclass(frozen=True)
 class NonsmoothPoint:
-    """Where a force or a driver's law has two slopes, or none.
+    """Point where the law of a force or driver has two different slopes, or none.
 
     Attributes
     ----------
     element : str
     text : str
-        What has it, and where, in words.
+        Description of the law and of the point.
     jump : bool
-        Whether the value too is another on the other side, or there is none.
+        Whether the value itself is discontinuous or undefined.
     along : ndarray (nv,), (nv,)
-        How what decides changes with positions and velocities.
+        Gradient, by positions and velocities, of the quantity in which the law is not smooth.
     by_parameter : bool
-        Whether it changes with a parameter that was asked for.
+        Whether that quantity depends on a requested parameter.
     """
 
     element: str
@@ -62,7 +63,7 @@ class NonsmoothPoint:
     by_parameter: bool
 
     def is_crossed_by(self, dq: np.ndarray | None, dv: np.ndarray | None) -> bool:
-        """Whether any of some changes of positions and velocities leads across it, (nv, n) each; any at all if None."""
+        """Whether any of the changes ``dq``, ``dv``, (nv, n) each, leads across the point; True if both are None."""
         if dq is None or dv is None:
             return self.by_parameter or bool(np.any(self.along))
         ways = np.abs(self.along[0]) @ np.abs(dq) + np.abs(self.along[1]) @ np.abs(dv)
@@ -73,20 +74,20 @@ class NonsmoothPoint:
 def refuse_nonsmooth(
     e: EquationDerivatives, dq: np.ndarray | None = None, dv: np.ndarray | None = None, to: Sequence[str] = ()
 ) -> None:
-    """Refuse a state where a force has no slope along changes of positions and velocities, or by a parameter.
+    """Refuse a state where a force has no derivative along given changes of state, or by a parameter.
 
     Parameters
     ----------
-    e : Equations
+    e : EquationDerivatives
     dq, dv : ndarray (nv, n)
-        Any at all if not given.
+        Changes of positions and velocities; any change if not given.
     to : sequence of str
         Parameters.
 
     Raises
     ------
     SingularityError
-        Naming the elements and what they decide by.
+        With the names of the elements and the quantities in which they are not smooth.
     """
     found = [k for k in nonsmooth_points(e, to) if k.is_crossed_by(dq, dv)]
     if found:
@@ -94,7 +95,7 @@ def refuse_nonsmooth(
 
 
 def nonsmooth_error(found: Sequence[NonsmoothPoint], t: float, so: str) -> SingularityError:
-    """The error that tells of kinks."""
+    """The error that describes nonsmooth points."""
     texts = "; ".join(dict.fromkeys(k.text for k in found))
     return SingularityError(
         f"{texts}. What is so on one side only says nothing of the other, so {so}. Move the mechanism away from there, "
@@ -106,13 +107,13 @@ def nonsmooth_error(found: Sequence[NonsmoothPoint], t: float, so: str) -> Singu
 
 
 def nonsmooth_points(e: EquationDerivatives, to: Sequence[str] = ()) -> list[NonsmoothPoint]:
-    """All kinks and jumps of forces and drivers at a state.
+    """Find all kinks and jumps of forces and drivers at a state.
 
     Parameters
     ----------
-    e : Equations
+    e : EquationDerivatives
     to : sequence of str
-        Parameters that laws are followed along too.
+        Parameters that count as arguments of the laws, too.
     """
     out: list[NonsmoothPoint] = []
     shot = None
@@ -127,7 +128,7 @@ def nonsmooth_points(e: EquationDerivatives, to: Sequence[str] = ()) -> list[Non
 
 
 def nonsmooth_directions(law: LawFunction, at: np.ndarray, sizes: np.ndarray) -> list[tuple[np.ndarray, str]]:
-    """Kinks of a function of several quantities at a place: (direction that leads across, what it has there)."""
+    """Kinks of a function of several quantities at a point: (direction across the kink, its kind)."""
     out: list[tuple[np.ndarray, str]] = []
     for i, size in enumerate(sizes.tolist()):
         step = np.zeros(len(at))
@@ -162,10 +163,10 @@ def nonsmooth_directions(law: LawFunction, at: np.ndarray, sizes: np.ndarray) ->
 
 @dataclass(frozen=True)
 class OneSidedDifferences:
-    """What differs between a place and its two sides, slopes in units of the sizes.
+    """Differences of a law between a point and its two sides; slopes in units of the sizes.
 
-    ``jump`` of the value, ``bend`` of the slopes, ``across``: by what the slopes of one side exceed those of the other;
-    ``value`` and ``slope`` are how large these are, ``steepest`` the latter at the two sides.
+    ``jump`` is that of the value, ``bend`` that of the slopes, ``across`` (n,) the slopes of one side minus those of
+    the other. ``value`` and ``slope`` are the largest magnitudes, ``steepest`` is the largest slope at the two sides.
     """
 
     jump: float
@@ -177,21 +178,21 @@ class OneSidedDifferences:
 
     @classmethod
     def of(cls, law: LawFunction, at: np.ndarray, step: np.ndarray, sizes: np.ndarray) -> OneSidedDifferences:
-        """To both sides of a place by a step."""
+        """Differences at a point for one step to both sides."""
         (f, df), (g, dg), (h, dh) = (_value_and_slopes(law, at + way, sizes) for way in (step, -step, 0.0 * step))
         middle = 0.5 * (f + g) - h, 0.5 * (df + dg) - dh
         return cls(
             max(abs(f - g), abs(middle[0])),
             float(max(np.abs(df - dg).max(), np.abs(middle[1]).max())),
             df - dg,
-            float(np.max(np.abs([f, g, h]))),  # nan if any is
+            float(np.max(np.abs([f, g, h]))),  # NaN if any of them is NaN
             float(np.max(np.abs([df, dg, dh]))),
             float(np.max(np.abs([df, dg]))),
         )
 
 
 def _value_and_slopes(law: LawFunction, at: np.ndarray, sizes: np.ndarray) -> tuple[float, np.ndarray]:
-    """A law's value and slopes in units of the sizes."""
+    """Value of a law, and its slopes in units of the sizes."""
     steps = 1j * COMPLEX_STEP * np.diag(sizes)
     with np.errstate(all="ignore"):
         found = np.array([law(at + step) for step in steps])
@@ -201,7 +202,7 @@ def _value_and_slopes(law: LawFunction, at: np.ndarray, sizes: np.ndarray) -> tu
 def _force_and_driver_functions(
     e: EquationDerivatives, to: Sequence[str]
 ) -> Iterator[tuple[str, str, list[str], LawFunction]]:
-    """Forces and drivers as functions: (element, its title and law, names of what it depends on, the function)."""
+    """Yield the laws of forces and drivers: (element, title and law, names of the arguments, function)."""
     c = e.state.c
     s = c.structure
     known = {name: complex(value) for name, value in s.model.environment(c.parameters).items()}
@@ -242,7 +243,7 @@ def _force_and_driver_functions(
 
 
 def _law_arguments(model: Model, law: Expression, inputs: dict[str, str], to: Sequence[str]) -> dict[str, str]:
-    """What a law depends on besides time: its names for it, and the curves' (a parameter's is its own)."""
+    """Arguments of a law besides time: name in the law -> curve (a parameter stands for itself)."""
     sensors = {x.name: f"{x.name}.value" for x in model.sensors}
     curves = sensors | inputs | {name: name for name in (*to, *law.names) if name in to or "." in name}
     return {name: curves[name] for name in sorted(law.names) if name in curves}
@@ -258,7 +259,7 @@ def _law_value(law: Expression, names: list[str], known: dict[str, complex], tab
 def _effort_value(
     force: CoordinateForce, par: tuple, law: Expression, names: list[str], known: dict, tables: dict, x: np.ndarray
 ) -> complex:
-    """The effort of a force along a coordinate; its first two names are the coordinate and its rate."""
+    """Effort of a force along a coordinate; its first two arguments are the coordinate and its rate."""
     o = 0.0 * x[0]
     return complex(force.effort(par, x[0], x[1], (_law_value(law, names, known, tables, x), o, o), o))
 
@@ -268,9 +269,14 @@ def _parameter_value(e: EquationDerivatives, name: str) -> float:
 
 
 def _nonsmooth_point(
-    e: EquationDerivatives, element: str, text: str, at: Sequence[tuple[str, float, tuple]], normal: np.ndarray, what: str,
+    e: EquationDerivatives,
+    element: str,
+    text: str,
+    at: Sequence[tuple[str, float, tuple]],
+    normal: np.ndarray,
+    what: str,
     to: Sequence[str],
-) -> NonsmoothPoint:  # fmt: skip
+) -> NonsmoothPoint:
     x, nv = e.state, len(e.state.v)
     curves = [name for name, _, _ in at if name not in to]
     sizes = np.array([x.c.values.length if unit.startswith("m") else 1.0 for _, _, (unit, _) in at])
@@ -286,41 +292,41 @@ def _nonsmooth_point(
     return NonsmoothPoint(element, f"{text} {what} at {where}", what not in (KINK, STEEP), along, by)
 
 
-# Kinks that meet in a place: the pieces of a function around it, seen from it in many directions.
+# Kinks that meet in a point: directions around the point find the smooth pieces of the function.
 #
-# Along its quantities one by one a function may be smooth where it has kinks between them: max(0, min(x, y)). So it is
-# looked at a little way off in directions all around. Across a face between two pieces of a continuous function slopes
-# differ along the face's normal only (Hadamard), so the faces are found where, on the way from a direction in one piece
-# to one in another, the slopes change.
+# A function can be smooth along each of its quantities and have kinks between them: max(0, min(x, y)). It is therefore
+# sampled at a small distance in directions all around the point. Across a face between two pieces of a continuous
+# function the slopes differ along the face's normal only (Hadamard). Two directions whose slopes differ lie in
+# different pieces; bisection between them finds the faces.
 
 
-PLANE_DIRECTIONS = 13  # directions around a place in a plane; odd, so that no two are opposite
-DIRECTIONS_PER_QUANTITY = 12  # directions for each of more quantities than two
-FIRST_ANGLE = 0.123  # angle of the first: faces are seldom there
-MAX_HALVINGS = 12  # times that the way between two pieces is parted
-MAX_SMOOTH_REGIONS = 8  # at most that are told apart
+PLANE_DIRECTIONS = 13  # directions around a point in a plane; odd, so that no two are opposite
+DIRECTIONS_PER_QUANTITY = 12  # directions per quantity, for more than two quantities
+FIRST_ANGLE = 0.123  # angle [rad] of the first direction: faces are seldom there
+MAX_HALVINGS = 12  # bisections between two directions
+MAX_SMOOTH_REGIONS = 8  # largest number of smooth pieces
 
 ValueAndSlopes = Callable[[np.ndarray], tuple[float, np.ndarray]]  # value and slopes a scaled step from the place
 
 
 class SmoothPiece:
-    """A direction (n,), and value and slopes far and near along it."""
+    """A direction (n,), with the value and slopes at a far and a near point along it."""
 
     def __init__(self, of: ValueAndSlopes, way: np.ndarray, far: float, near: float, same: float, flat: float) -> None:
         self.of, self.sizes, self.way, self.same, self.flat = of, (far, near), way / np.linalg.norm(way), same, flat
 
     @cached_property
     def far(self) -> np.ndarray:
-        """Slopes far away, (n,)."""
+        """Slopes at the far point, (n,)."""
         return self.of(self.sizes[0] * self.way)[1]
 
     @cached_property
     def near(self) -> np.ndarray:
-        """Slopes near the place, (n,)."""
+        """Slopes at the near point, (n,)."""
         return self.of(self.sizes[1] * self.way)[1]
 
     def across(self, other: SmoothPiece) -> np.ndarray | None:
-        """By what the slopes of another exceed these, (n,); None if they are of one piece."""
+        """Slopes of another direction minus these, (n,); None if both lie in one smooth piece."""
         near = other.near - self.near
         size = max(np.abs(self.near).max(), np.abs(other.near).max())
         if not np.abs(near).max() > self.flat * size:
@@ -328,32 +334,33 @@ class SmoothPiece:
         return near if np.abs(near).max() > self.same * np.abs(other.far - self.far).max() else None
 
     def to(self, other: SmoothPiece, part: float) -> SmoothPiece:
-        """A direction between the two."""
+        """A direction between the two, a fraction ``part`` of the way."""
         return SmoothPiece(self.of, (1.0 - part) * self.way + part * other.way, *self.sizes, self.same, self.flat)
 
 
 def face_normals(of: ValueAndSlopes, n: int, far: float, near: float, same: float, flat: float) -> list[np.ndarray]:
-    """Normals (n,) of the faces between the pieces around a place.
+    """Normals (n,) of the faces between the smooth pieces around a point.
 
     Parameters
     ----------
     of : callable
-        Value and slopes a step away, in units of the sizes.
+        Value and slopes at a step from the point, in units of the sizes.
     n : int
-        Quantities.
+        Number of quantities.
     far, near : float
         Two lengths of steps.
     same : float
-        Slopes that differ near by less than this part of what they differ by far away are of one smooth piece.
+        Two directions lie in one piece if their slopes differ at the near step by less than this part of their
+        difference at the far step.
     flat : float
-        The same, of the slopes themselves.
+        The same limit, relative to the slopes themselves.
     """
     found: list[SmoothPiece] = []
     for way in _directions_around(n):
         other = SmoothPiece(of, way, far, near, same, flat)
         if len(found) <= MAX_SMOOTH_REGIONS and all(known.across(other) is not None for known in found):
             found.append(other)
-    if len(found) > MAX_SMOOTH_REGIONS:  # slopes that change all around, as those of a cone do
+    if len(found) > MAX_SMOOTH_REGIONS:  # slopes change everywhere, as on a cone
         return list(np.eye(n))
     out: list[np.ndarray] = []
     for a, b in itertools.combinations(found, 2):
@@ -365,7 +372,7 @@ def face_normals(of: ValueAndSlopes, n: int, far: float, near: float, same: floa
 
 
 def _directions_around(n: int) -> np.ndarray:
-    """Directions of n quantities, evenly around in a plane, else at random."""
+    """Directions of n quantities: evenly spaced in a plane, random in more dimensions."""
     if n < 2:
         return np.zeros((0, n))
     if n > 2:
@@ -375,7 +382,7 @@ def _directions_around(n: int) -> np.ndarray:
 
 
 def _slope_differences_between(a: SmoothPiece, b: SmoothPiece, halvings: int) -> list[np.ndarray]:
-    """Differences of the slopes of all pieces that are passed on the way from one to another."""
+    """Differences of slopes across all faces between two directions."""
     across = a.across(b)
     if across is None:
         return []

@@ -1,8 +1,8 @@
 """Output curves at one state, and their derivatives along given directions or by all state variables.
 
-Outputs are named as the curves of a result. The formulas of the results run on complex arrays as on real ones,
-every direction being one of the times. Outputs that redundant constraints leave undetermined (reactions that a
-self-stress changes) are refused.
+Outputs are named like the curves of a result. The formulas of the results accept complex arrays: each direction is
+treated as one of the times. Outputs that redundant constraints leave undetermined (reactions that a self-stress
+changes) are refused.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from ..tables.values import Values
 from .equation_derivatives import COMPLEX_STEP, MechanismState, complex_step_derivative
 from .reduced_equations import minimum_norm_solution, prescribed_rows
 
-DIRECT_LIMIT = 400  # numbers up to which curves are differentiated by each of them at once
-SUBGROUPS = 32  # that a group of them is split into
-DIRECTIONS_AT_ONCE = 64  # directions that are looked at together
+DIRECT_LIMIT = 400  # up to so many variables curves are differentiated by each of them
+SUBGROUPS = 32  # number of parts that a group of variables is split into
+DIRECTIONS_AT_ONCE = 64  # directions per evaluation
 
 
 def snapshot(x: MechanismState, values: Values | None = None) -> Result:
-    """The state as a result with one time; one can go on from it."""
+    """Result with the state as its only time; a simulation can start from it."""
     result = _result_at_state(x, values or x.c.values, *(np.zeros((1, n)) for n in _block_sizes(x)))
     x.c.at(x.t, x.q, x.v)
     rows = x.c.work.rows
@@ -59,23 +59,24 @@ def curve_derivatives(
 
     Parameters
     ----------
-    x : State
+    x : MechanismState
     names : sequence of str
         Sensors, or curves of the result such as ``"slider.x"``.
     d : four arrays (directions, nv), (.., nv), (.., nv), (.., multipliers)
         Changes of positions along the velocities, of velocities, accelerations and multipliers.
     values : Values, optional
-        The mechanism's numbers, already a complex step along a parameter (for one direction).
+        The mechanism's values, already with a complex step of a parameter (for one direction).
     """
     result = _result_at_state(x, values or x.c.values, *(1j * COMPLEX_STEP * np.asarray(part) for part in d))
     return np.array([complex_step_derivative(result.curve(name)[1]) for name in names]).T.reshape(len(d[0]), len(names))
 
 
 def curve_gradients(x: MechanismState, names: Sequence[str]) -> Any:
-    """Derivatives of curves by everything, sparse (names, 3 nv + multipliers): positions, velocities, and so on.
+    """Derivatives of curves by all state variables, sparse (names, 3 nv + multipliers).
 
-    A curve depends on few of many numbers. They are looked for in groups, taken along random ways: groups that change
-    nothing are left, others are parted.
+    The columns are positions, velocities, accelerations, then multipliers and efforts. A curve depends on few of many
+    variables. They are found by bisection: groups of variables are tested along random directions, groups without
+    influence are dropped, the others are split.
     """
     import scipy.sparse as sp
 
@@ -98,7 +99,7 @@ def curve_gradients(x: MechanismState, names: Sequence[str]) -> Any:
 def _group_derivatives(
     x: MechanismState, names: Sequence[str], groups: Sequence[np.ndarray], weights: np.ndarray
 ) -> np.ndarray:
-    """Derivatives of curves along all numbers of each group together, (groups, names)."""
+    """Derivatives of curves along one direction per group of variables, (groups, names)."""
     ends = np.cumsum(_block_sizes(x))
     out = [np.zeros((0, len(names)))]
     for first in range(0, len(groups), DIRECTIONS_AT_ONCE):
@@ -121,11 +122,11 @@ def curve_derivatives_over_time(
     names : sequence of str
         Sensors, or curves of the result.
     values : Values
-        The mechanism's numbers, a complex step along the parameter.
+        The mechanism's values with a complex step of the parameter.
     d : four arrays (n, nv), (n, nv), (n, nv), (n, multipliers)
         Changes of positions along the velocities, of velocities, accelerations and multipliers.
     z : ndarray (n, states)
-        Changes of works.
+        Changes of the works (integral states).
     """
     dq, dv, da, dlam = (1j * COMPLEX_STEP * part for part in d)
     q = motion.q.T.astype(complex)
@@ -144,7 +145,7 @@ def _block_sizes(x: MechanismState) -> tuple[int, int, int, int]:
 def _result_at_state(
     x: MechanismState, values: Values, dq: np.ndarray, dv: np.ndarray, da: np.ndarray, dlam: np.ndarray
 ) -> Result:
-    """A result whose times are the state with changes."""
+    """Result whose times are copies of the state, each with one of the changes."""
     n = len(dq)
     q = np.repeat(x.q[:, None], n, axis=1).astype(dq.dtype)
     retract(values.system, q, dq.T)
@@ -158,25 +159,25 @@ def _result_at_state(
 
 
 def depend_on_reactions(x: MechanismState, names: Sequence[str]) -> bool:
-    """Whether any of some curves depends on what joints and drivers carry."""
+    """Whether any of the curves depends on reactions of joints or efforts of drivers."""
     n = len(x.lam) + len(x.c.structure.prescribed)
     still = np.zeros((n, x.c.structure.nv))
     return bool(np.any(curve_derivatives(x, names, (still, still, still, np.eye(n))))) if names and n else False
 
 
 def refuse_undetermined_outputs(x: MechanismState, names: Sequence[str]) -> None:
-    """Refuse curves that multipliers which act on nothing change.
+    """Refuse curves that depend on multipliers which redundant constraints leave undetermined.
 
     Parameters
     ----------
-    x : State
+    x : MechanismState
     names : sequence of str
         Sensors, or curves of the result.
 
     Raises
     ------
     ModelError
-        Naming the first of them, and the elements that share what is not determined.
+        With the name of the first such curve and of the redundant elements.
     """
     import scipy.sparse as sp
 
@@ -199,9 +200,10 @@ def refuse_undetermined_outputs(x: MechanismState, names: Sequence[str]) -> None
 
 
 def refuse_undetermined_outputs_sparse(x: MechanismState, names: Sequence[str], C: Any) -> None:
-    """The same of a large mechanism: what a curve takes of the multipliers must be what the rows make of some motion.
+    """Like `refuse_undetermined_outputs`, for a large mechanism.
 
-    ``C`` (names, 3 nv + rows) are the curves' derivatives by everything.
+    A curve is determined if its derivatives by the multipliers are G times some motion. ``C`` (names, 3 nv + rows) are
+    the derivatives of the curves by all state variables.
     """
     x.c.at(x.t, x.q, x.v)
     G, size, _ = scaled_jacobian(x.c)
@@ -216,12 +218,12 @@ def refuse_undetermined_outputs_sparse(x: MechanismState, names: Sequence[str], 
 
 
 def _force_effect(x: MechanismState, shot: Result, name: str) -> float:
-    """What one unit of force does to a curve at most, roughly."""
+    """Estimate of the largest change of a curve by one unit of force."""
     return x.c.values.length if "m" in shot.curve(name)[0] else 1.0
 
 
 def _undetermined_error(x: MechanismState, name: str, part: np.ndarray) -> ModelError:
-    """The error that names the elements whose constraints have a part in it."""
+    """The error that names the elements whose constraints take part in the dependency."""
     of = [r.element.name for r in x.c.structure.rows] + list(x.c.structure.prescribed)
     among = dict.fromkeys(n for n, p in zip(of, part, strict=False) if p > CHANGE_TOLERANCE)
     return ModelError(

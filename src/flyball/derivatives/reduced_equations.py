@@ -1,20 +1,20 @@
-"""Linear equations of motion in free coordinates: the constraints are taken out.
+"""Linear equations of motion in free coordinates, with the constraints eliminated.
 
-In this order: minimum-norm solutions of redundant equations; free coordinates (bases of the motions that
-constraints allow, the identity in the rows of named coordinates); force balance (what acts in each equation, what
-rounding may leave of it: Vignes 1993); bounds of what rounding may have made of coefficients (Parlett and Reinsch
-1969; Watkins 2006); the reduction itself.
+The parts of this module, in order: minimum-norm solutions of redundant equations; free coordinates (bases of the
+motions that constraints allow, with identity rows for the chosen coordinates); force balance (magnitude of the forces
+in each equation, and their rounding error: Vignes 1993); bounds of the rounding errors of coefficients (Parlett and
+Reinsch 1969; Watkins 2006); the reduction itself.
 
-With x a change of position along the velocities, u one of velocity, both seen from an evenly turning frame (see
-`steady_motion`), and inputs w, the perturbed kinematics, equations of motion and constraints at a state are
+Let x be a change of position along the velocities, u a change of velocity, both seen from an evenly turning frame (see
+`steady_motion`), w the inputs. The perturbed kinematics, equations of motion and constraints at a state are
 
     x' + H x = u + N x,    M (u' + H u) + D u + K x + r_w w = G^T l,
     G x + g_w w = 0,       G u + V x + n_w w + g_w w' = 0
 
-K holds everything that forces, inertia and *reactions* do when positions change: joint forces turn with the bodies,
-so it is not the stiffness of the springs. With x = Z a + X w and u = Zv b + P a + U w + U1 w' the multipliers drop
-out of the equations along Zv; joint friction follows the reactions, adds F to the -G^T that they act by, and needs
-another projection (``_multiplier_free_directions``). Inputs that move the mechanism act through their rates too.
+K contains the change of forces, inertia and *reactions* when positions change. Joint forces turn with the bodies, so K
+is not only the stiffness of the springs. With x = Z a + X w and u = Zv b + P a + U w + U1 w' the multipliers drop out
+of the equations along Zv. Joint friction depends on the reactions, adds F to -G^T, and needs another projection
+(``_multiplier_free_directions``). Inputs that move the mechanism act through their rates, too.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ from ..tables.structure_definition import VelocityName, velocity_names
 from ..tables.table_definitions import with_numbers
 from .equation_derivatives import EquationDerivatives, MechanismState, refuse_undetermined_friction
 
-DENSE_UNKNOWNS = 400  # unknowns up to which singular values decide
-SINGULAR_VALUE_LIMIT = 1e-11  # singular values below this part of the largest are none
-REGULARISATION = 1e-10  # what is added to the sparse equations' diagonal, of their entries
-MAX_REFINEMENTS = 4  # times that a solution is improved, at most
+DENSE_UNKNOWNS = 400  # up to so many unknowns the solution uses singular values
+SINGULAR_VALUE_LIMIT = 1e-11  # singular values below this part of the largest count as zero
+REGULARISATION = 1e-10  # added to the diagonal of sparse equations, relative to their entries
+MAX_REFINEMENTS = 4  # iterative refinements at most
 
 
 def minimum_norm_solution(A, b: np.ndarray) -> np.ndarray:
-    """The smallest x that leaves the least of A x = b; A is sparse, or an array if it is small.
+    """Minimum-norm least-squares solution x of A x = b; A is sparse, or an array if it is small.
 
-    It is refined: a part of b that has nothing to do with a larger one is met to its own last digits.
+    Iterative refinement makes the small parts of b as accurate, relative to themselves, as the large ones.
     """
     A = A.toarray() if max(A.shape) <= DENSE_UNKNOWNS and not isinstance(A, np.ndarray) else A
     solve = _dense_solver(A) if max(A.shape) <= DENSE_UNKNOWNS else _sparse_solver(A)
@@ -67,7 +67,7 @@ def _dense_solver(A) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _sparse_solver(A) -> Callable[[np.ndarray], np.ndarray]:
-    """By the normal form [-e I, A; A^T, e I]."""
+    """Solver that factorises the regularised augmented matrix [-e I, A; A^T, e I]."""
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
 
@@ -77,28 +77,30 @@ def _sparse_solver(A) -> Callable[[np.ndarray], np.ndarray]:
     return lambda b: factor.solve(np.r_[b, np.zeros(n)])[m:]
 
 
-DENSE_ROWS = 150  # rows up to which singular values decide; of more, where they may depend on one another
-BASIS_ROUNDING = 1e-14  # entries of a basis below this are none, where its largest are about 1
-VANISHING = 1e-13  # part of the largest that rounding makes of no force, or no constraint
-CLOSURE_TOLERANCE = 1e-10  # of the mechanism's length
+# Up to so many rows the null space follows from singular values; above, only if the rows may be dependent.
+DENSE_ROWS = 150
+BASIS_ROUNDING = 1e-14  # basis entries below this are zero; the largest are about 1
+VANISHING = 1e-13  # forces or constraint entries below this part of the largest are rounding
+CLOSURE_TOLERANCE = 1e-10  # relative to the mechanism's length
 CLOSURE_ITERATIONS = 20
-NEARBY_STEP = 1e-2  # part of a radian that the mechanism is moved by to see whether its rank is the usual one
+# Distance [rad, or mechanism lengths] of the nearby position whose constraint rank is compared.
+NEARBY_STEP = 1e-2
 
 
 @dataclass
 class FreeCoordinates:
-    """Freedoms at a state.
+    """Free coordinates and velocities of a mechanism at a state.
 
     Attributes
     ----------
-    names : list of Named
-        Of all velocities.
+    names : list of VelocityName
+        Names of all velocities.
     holonomic, rows : ndarray
-        Constraints on positions (n, nv), and those on velocities, which they are among (m, nv); prescribed coordinates
-        are constraints here.
+        Jacobian rows of the constraints on positions (n, nv), and of all constraints (m, nv). Prescribed
+        coordinates count as constraints.
     Z, Zv : ndarray (nv, f), (nv, fv)
-        Bases of what they allow, turns that mean nothing (`massless_rotations`) left out: the identity in the rows ``chosen`` and
-        ``chosen_v``.
+        Bases of the motions that these rows allow, without the rotations of point masses (`massless_rotations`).
+        The rows ``chosen`` and ``chosen_v`` of the bases are the identity.
     """
 
     names: list[VelocityName]
@@ -109,9 +111,9 @@ class FreeCoordinates:
     chosen: np.ndarray
     chosen_v: np.ndarray
     scale: np.ndarray
-    left: np.ndarray  # (f, nv): takes the chosen coordinates' changes from those of all
+    left: np.ndarray  # (f, nv): selects the changes of the chosen coordinates
     left_v: np.ndarray  # the same for velocities
-    on_positions: np.ndarray  # (m,): which rows are constraints on positions
+    on_positions: np.ndarray  # (m,): True for constraints on positions
 
     @property
     def labels(self) -> list[str]:
@@ -119,25 +121,25 @@ class FreeCoordinates:
         return [self.names[d].name for d in self.chosen]
 
     def turned(self, T: np.ndarray, later_equations: EquationDerivatives) -> FreeCoordinates:
-        """The same motions turned by T (nv, nv), under the constraints of a later instant."""
+        """The same motions turned by T (nv, nv), with the constraints of a later time."""
         other = free_coordinates(later_equations)
         back = np.linalg.inv(T)
         bases = {"Z": T @ self.Z, "Zv": T @ self.Zv, "left": self.left @ back, "left_v": self.left_v @ back}
         return replace(self, holonomic=other.holonomic, rows=other.rows, **bases)
 
     def solve(self, right: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
-        """The smallest x (nv, n) with rows x = right; the rows are all of them if not given."""
+        """Minimum-norm x (nv, n) with rows x = right; by default with all rows."""
         A = self.rows if rows is None else rows
         return self.scale[:, None] * np.linalg.lstsq(A * self.scale, right, rcond=RANK_TOLERANCE)[0]
 
     @staticmethod
     def unseen(x: np.ndarray, basis: np.ndarray, left: np.ndarray) -> np.ndarray:
-        """The x that differs by the basis' motions and changes no chosen coordinate."""
+        """Add motions of the basis to x so that no chosen coordinate changes."""
         return x - basis @ (left @ x)
 
 
 def free_coordinates(e: EquationDerivatives, like: FreeCoordinates | None = None) -> FreeCoordinates:
-    """Freedoms at the state of some equations, told by the coordinates that those of another are told by, if given."""
+    """Free coordinates at the state of the equations; with the chosen coordinates of ``like`` if given."""
     c = e.state.c
     s = c.structure
     names = velocity_names(s)
@@ -158,14 +160,14 @@ def free_coordinates(e: EquationDerivatives, like: FreeCoordinates | None = None
 
 
 def _selection_rows(which: np.ndarray, n: int) -> np.ndarray:
-    """Unit rows (m, n) that take some of n numbers."""
+    """Unit rows (m, n) that select m of n numbers."""
     out = np.zeros((len(which), n))
     out[np.arange(len(which)), which] = 1.0
     return out
 
 
 def massless_rotations(e: EquationDerivatives) -> np.ndarray:
-    """Velocities that mean nothing: turns of point masses, which have no inertia and on which nothing acts."""
+    """Indices of the rotations of point masses, which have no inertia and on which nothing acts."""
     M, D, K = (X[e.at["r"]] for X in (e.by_acceleration, e.by_velocity, e.by_position))
     none = np.flatnonzero(M.diagonal() == 0.0)
     if not len(none):
@@ -178,7 +180,7 @@ def massless_rotations(e: EquationDerivatives) -> np.ndarray:
 
 
 def prescribed_rows(c: CompiledMechanism) -> np.ndarray:
-    """Unit rows (n, nv) for the coordinates that drivers prescribe, in the order of the structure's."""
+    """Unit rows (n, nv) of the coordinates that drivers prescribe, in the order of ``Structure.prescribed``."""
     tree = c.structure.tables["tree"]
     out = np.zeros((len(c.structure.prescribed), c.structure.nv))
     for k, b in enumerate(c.structure.prescribed.values()):
@@ -193,7 +195,7 @@ def constraint_rank(G: np.ndarray, scale: np.ndarray) -> int:
 
 
 def _null_space(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Orthonormal basis of the scaled motions that rows allow."""
+    """Orthonormal basis of the scaled motions that the rows allow."""
     import scipy.sparse as sp
 
     A = normalised_rows(G, scale)
@@ -203,14 +205,14 @@ def _null_space(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
 
 
 def normalised_rows(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Rows of unit size, turns counted in lengths."""
+    """Rows scaled to unit norm, rotations scaled to lengths."""
     A = G * scale
     size = np.sqrt((A * A).sum(axis=1))
     return A / np.where(size > 0.0, size, 1.0)[:, None]
 
 
 def gap_lengths(g: np.ndarray, G: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Values of rows as lengths, whatever they are in: what is left of each, by the size of its row."""
+    """Constraint violations as lengths: each value divided by the norm of its row."""
     size = np.linalg.norm(G * scale, axis=1)
     return np.asarray(g / np.where(size > 0.0, size, 1.0))
 
@@ -229,7 +231,7 @@ def _free_basis(G: np.ndarray, scale: np.ndarray, chosen: np.ndarray | None) -> 
 
 
 def pivot_rows(N: np.ndarray) -> np.ndarray:
-    """Rows of an orthonormal basis (nv, f) that tell the others, (f,): as complete pivoting would choose them."""
+    """Indices (f,) of the rows of an orthonormal basis (nv, f) that determine the others, by pivoted QR."""
     from scipy.linalg import qr
 
     if not N.shape[1]:
@@ -239,12 +241,12 @@ def pivot_rows(N: np.ndarray) -> np.ndarray:
 
 
 def refuse_singular_position(e: EquationDerivatives, f: FreeCoordinates) -> None:
-    """Refuse a position where the constraints lose rank: nothing linear holds there.
+    """Refuse a position where the constraints lose rank, because no linear model exists there.
 
     Raises
     ------
     SingularityError
-        Naming the elements whose rows depend on each other here and do not nearby.
+        With the names of the elements whose rows are dependent here and independent nearby.
     """
     c, x = e.state.c, e.state
     if not len(f.holonomic) or not f.Z.shape[1]:
@@ -273,7 +275,7 @@ def singular_position_error(t: float, names: tuple[str, ...]) -> SingularityErro
 def _nearby_jacobian(
     c: CompiledMechanism, t: float, q: np.ndarray, step: np.ndarray, scale: np.ndarray
 ) -> np.ndarray | None:
-    """Rows of the constraints on positions at the closed position near a step away; None if none is found."""
+    """Rows of the position constraints at the assembled position nearest to a step; None if assembly fails."""
     z, q, still = c.z.copy(), q.copy(), np.zeros(len(step))
     which = np.array([r.holonomic for r in c.structure.rows], bool)
     G = np.zeros((0, len(step)))
@@ -298,7 +300,7 @@ def _nearby_jacobian(
 
 
 def _dependent_elements(f: FreeCoordinates, G: np.ndarray, c: CompiledMechanism) -> tuple[str, ...]:
-    """Elements whose rows take part in dependencies that are not there nearby."""
+    """Elements whose rows take part in dependencies that nearby positions do not have."""
     here, there = (
         fundamental_subspaces(normalised_rows(f.holonomic, f.scale)).dependencies,
         fundamental_subspaces(normalised_rows(G, f.scale)).span,
@@ -309,12 +311,12 @@ def _dependent_elements(f: FreeCoordinates, G: np.ndarray, c: CompiledMechanism)
 
 
 PERTURBED_SAMPLES = 4
-PERTURBATION = 4.0 * np.finfo(float).eps  # what positions and multipliers are changed by, of their size
-ROUNDING_MARGIN = 8.0  # than the samples: what is below so many times their spread is nothing
+PERTURBATION = 4.0 * np.finfo(float).eps  # relative perturbation of positions and multipliers
+ROUNDING_MARGIN = 8.0  # differences below so many times the spread of the samples are rounding
 
 
 def force_magnitudes(e: EquationDerivatives) -> np.ndarray:
-    """What acts in every equation of motion: the total force, and each constraint's, (nv,)."""
+    """Magnitude of the forces in every equation of motion: total force plus each reaction, (nv,)."""
     x, at = e.state, e.at
     G = e.by_velocity[at["n"]]
     M = e.by_acceleration[at["r"]]
@@ -323,9 +325,10 @@ def force_magnitudes(e: EquationDerivatives) -> np.ndarray:
 
 
 def force_rounding(e: EquationDerivatives) -> np.ndarray:
-    """What rounding may leave of every equation of motion, (nv,).
+    """Rounding error of every equation of motion, (nv,).
 
-    Constraints hand on what they carry: the largest of all that is connected, in energy, counts for each.
+    Constraints transmit rounding errors. Each equation therefore gets the largest error, as energy, of its connected
+    part of the mechanism.
     """
     size = e.state.c.sizes
     spread = np.zeros(len(size))
@@ -338,10 +341,10 @@ def force_rounding(e: EquationDerivatives) -> np.ndarray:
 
 
 def _connected_parts(e: EquationDerivatives) -> np.ndarray:
-    """Numbers of the parts of the mechanism that nothing connects, for every velocity, (nv,).
+    """Number of the connected part of the mechanism that each velocity belongs to, (nv,).
 
-    All that a constraint can act on is connected, whether it does in this position or not: an equation may hold nothing
-    but a multiplier that is rounding itself, and what acts beside it tells of what.
+    Two velocities are connected if a constraint can act on both, even if it does not in this position. An equation may
+    contain only a multiplier that is itself rounding; the forces connected to it give its magnitude.
     """
     from scipy.sparse.csgraph import connected_components
 
@@ -351,7 +354,7 @@ def _connected_parts(e: EquationDerivatives) -> np.ndarray:
 
 
 def stiffness_rounding(e: EquationDerivatives) -> list:
-    """What rounding makes of the stiffness: some samples, sparse (nv, nv)."""
+    """Samples of the rounding error of the stiffness, sparse (nv, nv) each."""
     K = e.by_position[e.at["r"]]
     return [
         ROUNDING_MARGIN * (EquationDerivatives(other).by_position[e.at["r"]] - K) for other in perturbed_states(e.state)
@@ -359,7 +362,7 @@ def stiffness_rounding(e: EquationDerivatives) -> list:
 
 
 def static_equations(e: EquationDerivatives) -> EquationDerivatives:
-    """The equations without accelerations, under the multipliers and efforts that leave the least of them."""
+    """Equations with zero accelerations, and the multipliers and efforts that balance the forces best."""
     import scipy.sparse as sp
 
     x, c = e.state, e.state.c
@@ -375,25 +378,25 @@ def static_equations(e: EquationDerivatives) -> EquationDerivatives:
 
 
 def is_balanced(e: EquationDerivatives, part: float) -> bool:
-    """Whether every equation of motion is balanced, but for a part of what acts in it, and rounding."""
+    """Whether the residual of every equation is below ``part`` of its forces plus rounding."""
     return is_balanced_beyond_rounding(e, part) or bool(
         (np.abs(e.block("r")) <= part * force_magnitudes(e) + force_rounding(e)).all()
     )
 
 
 def is_balanced_beyond_rounding(e: EquationDerivatives, part: float) -> bool:
-    """The same without rounding, which where a force jumps may be all of it."""
+    """Like `is_balanced` without the rounding allowance, which is too large where a force jumps."""
     return bool((np.abs(e.block("r")) <= part * force_magnitudes(e)).all())
 
 
 def unbalanced_fraction(e: EquationDerivatives) -> float:
-    """The largest force that is left, of those that act in its equation; zero where rounding leaves as much."""
+    """Largest residual relative to the forces of its equation; 0 where it is within rounding."""
     left, acts = np.abs(e.block("r")), force_magnitudes(e)
     return float(np.where(left > force_rounding(e), left / np.where(acts > 0.0, acts, 1.0), 0.0).max(initial=0.0))
 
 
 def perturbed_states(x: MechanismState) -> Iterator[MechanismState]:
-    """The state and the mechanism's numbers with other last digits: the same for all that can be told."""
+    """Yield copies of the state and the mechanism's values with random changes of the last digits."""
     S = x.c.values.system
     size = x.c.sizes
     for b in range(len(S.tree.parent)):
@@ -410,24 +413,22 @@ def perturbed_states(x: MechanismState) -> Iterator[MechanismState]:
         yield replace(x, c=c, q=q, v=v, vdot=vdot, lam=lam, effort=effort)
 
 
-COEFFICIENT_ROUNDING = 2e-14  # of the largest term of an equation: what is uncertain of its coefficients
-DIRECTION_ROUNDING = 1e-15  # of the largest term of the equations of the same bodies
-SLOWEST_FRACTION = (
-    1e-3  # of the speed that the terms would give if nothing cancelled: that of the fastest motion at least
-)
+COEFFICIENT_ROUNDING = 2e-14  # uncertainty of coefficients, relative to the largest term of the equation
+DIRECTION_ROUNDING = 1e-15  # the same, relative to the largest term of all equations of the same bodies
+SLOWEST_FRACTION = 1e-3  # lower bound of the fastest rate, relative to the rate that the uncancelled terms would give
 
 
 class TermSizes(NamedTuple):
-    """Sizes of what the coefficients of linear equations are sums of; n coordinates and velocities, p columns.
+    """Magnitudes of the terms whose sums are the coefficients; n coordinates and velocities, p columns.
 
     Attributes
     ----------
     mass : ndarray (fv, fv)
         Mass matrix of the free velocities.
     rates : ndarray (f, p)
-        In the rates of the free coordinates.
+        Terms in the rates of the free coordinates.
     forces : ndarray (nv, p)
-        In the equations of motion.
+        Terms in the equations of motion.
     Y, M : ndarray (nv, fv), (nv, nv)
         Directions along which the multipliers drop out; mass matrix.
     """
@@ -440,7 +441,7 @@ class TermSizes(NamedTuple):
 
 
 class MatrixUncertainty(NamedTuple):
-    """What is uncertain of a matrix: A + by X with any X no entry of which is larger than that of ``size``, (n, n)."""
+    """Uncertainty of a matrix A: A + by X, with any X whose entries do not exceed those of ``size``, (n, n)."""
 
     by: np.ndarray
     size: np.ndarray
@@ -454,22 +455,22 @@ def remove_rounding(
     f: FreeCoordinates,
     speed_scales: np.ndarray | None = None,
 ) -> MatrixUncertainty:
-    """Set coefficients that are rounding to 0, and say what is uncertain of the others.
+    """Set coefficients within rounding to 0 and return the uncertainty of the others.
 
-    The entries of an equation are compared in units of the coordinates' natural sizes, rates at the speed of the
-    fastest motion: the terms that cancel in one column are rounded as those that do not in another. What acts on a body
-    along one axis shows along the others by the rounding of its directions.
+    The entries of an equation are compared in the natural units of the coordinates, and rates in units of the fastest
+    motion. Terms that cancel in one column have the same rounding error as terms that do not cancel in another. A force
+    on a body along one axis also appears along the other axes because the directions are rounded.
 
     Parameters
     ----------
-    terms : Terms
-        Its mass matrix loses its rounding, too.
+    terms : TermSizes
+        Entries of its mass matrix that are rounding are also set to 0.
     a_dot : ndarray (f, p)
         Rates of the free coordinates.
     forces : ndarray (fv, p)
-        What acts along the directions in which the multipliers drop out.
+        Forces along the directions in which the multipliers drop out.
     speed_scales : ndarray (nv,), optional
-        Large speeds of what has a size of its own, because it stands for something else; 0 of all others.
+        Large speeds of auxiliary bodies, whose velocities stand for other quantities; 0 for all others.
     """
     (a, fv), nv = (len(a_dot), len(forces)), len(f.scale)
     n = a + fv
@@ -477,7 +478,7 @@ def remove_rounding(
     inertia = np.sqrt(np.maximum(np.abs(np.diag(terms.mass)), 1e-300))
     terms.mass[np.abs(terms.mass) <= COEFFICIENT_ROUNDING * np.outer(inertia, inertia)] = 0.0
     inverse = np.linalg.inv(terms.mass) if fv else terms.mass
-    turned = _coupled_maximum(force_magnitudes(e), terms.M, e, f.scale)  # by a radian, or a length
+    turned = _coupled_maximum(force_magnitudes(e), terms.M, e, f.scale)  # change of the forces by a rotation of 1 rad
     unit = scale.copy()
     large = np.zeros(fv) if speed_scales is None else speed_scales[f.chosen_v]
     if fv:
@@ -502,9 +503,9 @@ def remove_rounding(
 
 
 def _fastest_rate(A: np.ndarray, uncancelled: np.ndarray, a: int, pushed: float) -> float:
-    """Rate [1/s] of the fastest motion, from accelerations and what cancels in them, (fv, n), in natural units.
+    """Rate [1/s] of the fastest motion, from accelerations and their uncancelled terms (fv, n), in natural units.
 
-    ``pushed`` are accelerations by what has a size of its own: where nothing else acts all other is rounding.
+    ``pushed`` is the largest acceleration caused by auxiliary bodies; if nothing else acts, the rest is rounding.
     """
 
     def rate(by_position: np.ndarray, by_velocity: np.ndarray) -> float:
@@ -516,7 +517,7 @@ def _fastest_rate(A: np.ndarray, uncancelled: np.ndarray, a: int, pushed: float)
 
 
 def _coupled_maximum(rows: np.ndarray, M: np.ndarray, e: EquationDerivatives, scale: np.ndarray) -> np.ndarray:
-    """The largest of what acts on the bodies that the mass matrix couples with each, as seen from each velocity."""
+    """Largest entry on all bodies coupled by the mass matrix, for each velocity in its own units."""
     from scipy.sparse.csgraph import connected_components
 
     nv = e.state.c.structure.tables["tree"].nv
@@ -534,13 +535,13 @@ class TurningFrame:
     Attributes
     ----------
     turning : ndarray (3,) [rad/s]
-        Its angular velocity, along the world's axes.
+        Angular velocity in world axes.
     H : ndarray (nv, nv) [1/s]
-        Rate at which co-moving changes of positions and velocities turn.
+        Generator of the turning of co-moving changes of positions and velocities.
     N : ndarray (nv, nv) [1/s]
         (rate of a change of position) = (change of velocity) + N (change of position).
     told : str
-        What it is, for people; empty at rest.
+        Description for messages and reports; empty at rest.
     """
 
     turning: np.ndarray
@@ -551,7 +552,7 @@ class TurningFrame:
 
 @dataclass
 class InputTerms:
-    """What m inputs do to the equations at a fixed state: r_w (nv, m), g_w (holonomic rows, m), n_w (all rows, m)."""
+    """Derivatives of the equations by m inputs at a fixed state: r_w (nv, m), g_w (holonomic, m), n_w (rows, m)."""
 
     r: np.ndarray
     g: np.ndarray
@@ -562,18 +563,18 @@ class InputTerms:
 class ReducedEquations:
     """Linear equations in the changes s = (a, b) of the free coordinates and velocities, and the inputs.
 
-    Every array has columns for s (n), inputs, their first and their second rates (m each).
+    The columns of every array belong to s (n), the inputs, and their first and second rates (m each).
 
     Attributes
     ----------
     rate : ndarray (n, n + 3 m)
-        s' as it follows from s and the inputs.
+        s' as a linear function of s and the inputs.
     position, velocity, acceleration, multipliers : ndarray
         Changes of all positions, velocities, accelerations, multipliers and efforts of prescribed coordinates.
     M, D, K : ndarray (f, f) or None
-        M a'' + D a' + K a = 0 where all constraints are on positions.
-    doubt : Doubt
-        What is uncertain of A by rounding.
+        Matrices of M a'' + D a' + K a = 0; None unless all constraints are on positions.
+    uncertainty : MatrixUncertainty
+        Uncertainty of A due to rounding.
     """
 
     rate: np.ndarray
@@ -592,7 +593,7 @@ class ReducedEquations:
         return self.rate[:, : len(self.rate)]
 
     def inputs(self, part: np.ndarray) -> list[np.ndarray]:
-        """Columns of the inputs, of their first and of their second rates."""
+        """Columns of the inputs, of their first rates and of their second rates."""
         return np.split(part[:, len(self.rate) :], 3, axis=1)
 
 
@@ -603,12 +604,12 @@ def reduced_equations(
     w: InputTerms | None = None,
     speed_scales: np.ndarray | None = None,
 ) -> ReducedEquations:
-    """Take the constraints out; ``speed_scales`` is as in `reduced_equations.remove_rounding`.
+    """Eliminate the constraints; ``speed_scales`` is as in `remove_rounding`.
 
     Raises
     ------
     ModelError
-        If something free moves without inertia.
+        If a free motion has no inertia.
     """
     r, nv = e.at["r"], len(f.scale)
     M, D, K = (X[r].toarray() for X in (e.by_acceleration, e.by_velocity, e.by_position))
@@ -657,7 +658,7 @@ def reduced_equations(
 
 
 def massless_motion_error(name: str) -> ModelError:
-    """The error that names what moves without inertia."""
+    """The error that names a free motion without inertia."""
     return ModelError(
         f"nothing with inertia moves along {name}: there is no linear equation of motion; give it a mass or a moment "
         f"of inertia"
@@ -665,9 +666,9 @@ def massless_motion_error(name: str) -> ModelError:
 
 
 def _multiplier_free_directions(e: EquationDerivatives, f: FreeCoordinates) -> np.ndarray:
-    """Y (nv, fv) with Y^T dr/dl = 0, so that the multipliers drop out; Zv where no friction follows the reactions.
+    """Y (nv, fv) with Y^T dr/dl = 0, so that the multipliers drop out; equal to Zv without joint friction.
 
-    Y is Zv less what the constraints' own directions C make up for: Y^T = Zv^T - Zv^T R (C^T R)^+ C^T.
+    Y^T = Zv^T - Zv^T R (C^T R)^+ C^T, with R = dr/dl and C a basis of the constraint directions.
     """
     F = np.zeros(f.rows.T.shape)
     F[:, : e.block("n").size] = e.by_reactions

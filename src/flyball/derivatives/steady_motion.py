@@ -1,15 +1,14 @@
 """Steady motions (relative equilibria): constant as seen from an evenly turning frame.
 
-Along such a motion the linear equations x' = A(t) x have coefficients that only turn: A(t) = T A(0) T^-1 with T =
-exp(t H). In co-moving coordinates y = T^-1 x they are constant, y' = (A(0) - H) y; in any others their eigenvalues
-mean nothing (a conical pendulum seen from the ground). H turns positions with the frame, and takes from the
-rotations, which have components along the bodies' axes, the spin of each body against the frame: a wheel that spins
-about its axis of symmetry is the same wheel. Where a motion is steady from several frames, that which stands still
-or turns least is taken.
-
-With B(t) the changes of the bodies' positions and rotations, seen from the frame they are T(t)^-1 B(t), T = exp(t
-H_B), whatever the coordinates. Coordinates x with B = J x turn by H where J H = H_B J - dJ/dt. So the choice of a
-frame does not depend on the coordinates, and neither do the eigenvalues that are seen from it.
+Along such a motion the coefficients of the linear equations x' = A(t) x only turn: A(t) = T A(0) T^-1 with
+T = exp(t H). In co-moving coordinates y = T^-1 x they are constant, y' = (A(0) - H) y. In other coordinates the
+eigenvalues of A(t) have no meaning (a conical pendulum seen from the ground). H turns positions with the frame.
+Rotations have components along the axes of the bodies; H turns them by the spin of each body relative to the frame.
+A wheel that spins about its axis of symmetry is therefore steady. Where a motion is steady in several frames, the
+frame that stands still or turns slowest is taken.
+Let B(t) be the changes of the bodies' positions and rotations. Seen from the frame they are T(t)^-1 B(t) with
+T = exp(t H_B), in any coordinates. Coordinates x with B = J x turn by H, where J H = H_B J - dJ/dt. The choice of the
+frame therefore does not depend on the coordinates, nor do the eigenvalues in that frame.
 """
 
 from __future__ import annotations
@@ -34,13 +33,13 @@ from .reduced_equations import (
     static_equations,
 )
 
-TURNING_TOLERANCE = 1e-9  # singular values below this part of the largest leave the frame's turning open
-IN_PLANE = (0, 1, 5)  # x, y and the angle about z, of a body's six
-MATRIX_ROUNDING = 1e-13  # of the largest: entries of H that are none
+TURNING_TOLERANCE = 1e-9  # singular values below this part of the largest leave the frame's rotation undetermined
+IN_PLANE = (0, 1, 5)  # indices of x, y and the angle about z among the six coordinates of a body
+MATRIX_ROUNDING = 1e-13  # entries of H below this part of the largest are rounding
 
 
 def kinematic_matrix(x: MechanismState) -> np.ndarray:
-    """N of `TurningFrame`: changes of rotations have components along axes that turn, (nv, nv)."""
+    """N of `TurningFrame`, (nv, nv): the changes of rotations have components along turning body axes."""
     S = x.c.values.system
     N = np.zeros((len(x.v),) * 2)
     for b in range(len(S.tree.parent)):
@@ -52,10 +51,10 @@ def kinematic_matrix(x: MechanismState) -> np.ndarray:
 
 
 def candidate_frames(x: MechanismState) -> list[TurningFrame]:
-    """Frames from which the motion may look steady, the most likely first.
+    """Frames in which the motion may be steady, the most likely first.
 
-    All bodies' velocities and angular velocities then turn with the frame: a = W x v, alpha = W x w. What this leaves
-    open is chosen so that the frame stands still, or so that it turns with one of the bodies.
+    In such a frame all velocities and angular velocities turn with the frame: a = W x v, alpha = W x w. The part of W
+    that this leaves undetermined is chosen so that the frame stands still, or so that it turns with one of the bodies.
     """
     c = x.c
     c.at(x.t, x.q, x.v)
@@ -73,13 +72,13 @@ def candidate_frames(x: MechanismState) -> list[TurningFrame]:
         if min(np.abs(other - seen).max() for seen in turns) > TURNING_TOLERANCE * (1.0 + np.abs(w).max()):
             turns.append(other)
     fast = max(np.abs(w).max(), np.abs(v).max() / length)
-    turns = [np.where(np.abs(t) > TURNING_TOLERANCE * fast, t, 0.0) for t in turns]  # the rest is rounding
+    turns = [np.where(np.abs(t) > TURNING_TOLERANCE * fast, t, 0.0) for t in turns]  # smaller components are rounding
     N = kinematic_matrix(x)
     return [TurningFrame(turning, turning_matrix(x, turning), N) for turning in turns]
 
 
 def frame_description(x: MechanismState, frame: TurningFrame, frozen: bool) -> str:
-    """Where linear equations about a motion are seen from, for people; empty at rest."""
+    """Text that describes the frame of linear equations about a motion; empty at rest."""
     if not np.abs(x.v).max(initial=0.0) > 0.0:
         return ""
     if frozen:
@@ -90,7 +89,7 @@ def frame_description(x: MechanismState, frame: TurningFrame, frozen: bool) -> s
 
 
 def turning_matrix(x: MechanismState, turning: np.ndarray) -> np.ndarray:
-    """H of `TurningFrame`: how changes of positions turn with a frame that turns with ``turning`` [rad/s], (nv, nv)."""
+    """H of `TurningFrame` (nv, nv), for a frame with the angular velocity ``turning`` [rad/s]."""
     s, S = x.c.structure, x.c.values.system
     if s.tree:
         return _joint_turning_matrix(x, turning)
@@ -101,13 +100,13 @@ def turning_matrix(x: MechanismState, turning: np.ndarray) -> np.ndarray:
         own = _body_turning_matrix(
             np.array(x.c.work.BK[b, 3:12]).reshape(3, 3), np.array(x.c.work.BK[b, 12:15]), turning
         )
-        kept = (IN_PLANE if s.model.planar else range(6))[:n]  # a point mass has no turn
+        kept = (IN_PLANE if s.model.planar else range(6))[:n]  # a point mass has no rotation
         H[v0 : v0 + n, v0 : v0 + n] = own[np.ix_(kept, kept)]
     return H
 
 
 def _body_turning_matrix(R: np.ndarray, w: np.ndarray, turning: np.ndarray) -> np.ndarray:
-    """H_B of a body: its place turns with the frame; its rotation, along its axes, by its spin against the frame."""
+    """H_B of a body: position turns with the frame, rotation (body axes) with the spin relative to the frame."""
     H = np.zeros((6, 6))
     H[:3, :3] = _cross_product_matrix(turning)
     H[3:, 3:] = -_cross_product_matrix(R.T @ (w - turning))
@@ -115,7 +114,7 @@ def _body_turning_matrix(R: np.ndarray, w: np.ndarray, turning: np.ndarray) -> n
 
 
 def _joint_turning_matrix(x: MechanismState, turning: np.ndarray) -> np.ndarray:
-    """H in joint coordinates: J and dJ/dt from a complex step along the motion."""
+    """H in joint coordinates, with J and dJ/dt from a complex step along the motion."""
     c, nv = x.c, len(x.v)
     S, one = c.values.system, np.eye(nv)
     ahead = np.zeros_like(x.q)
@@ -142,21 +141,24 @@ def _cross_product_matrix(w: np.ndarray) -> np.ndarray:
     return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
 
 
-COMPARISON_ANGLE = 0.1  # angle [rad] or part of the mechanism's length that it moves by between the instants compared
+# Motion between the two times compared: angle [rad] or distance relative to the mechanism's length.
+COMPARISON_ANGLE = 0.1
 COMPARISON_STEPS = 16
-BALANCE_TOLERANCE = 1e-6  # unbalanced forces of an equilibrium, of those that act
-POSITION_TOLERANCE = 1e-9  # step in radians, or parts of the mechanism's length, that an equilibrium may be off
-COEFFICIENT_TOLERANCE = 1e-5  # relative difference of linear equations that are the same
-REST_SPEED = 1e-9  # speed below which nothing moves, of what gravity or the fastest body gives
+BALANCE_TOLERANCE = 1e-6  # largest residual of an equilibrium, relative to the forces
+# Position error allowed at an equilibrium [rad, or relative to the mechanism's length].
+POSITION_TOLERANCE = 1e-9
+COEFFICIENT_TOLERANCE = 1e-5  # relative difference below which linear equations are equal
+# A state is at rest below this speed, relative to the speed that gravity or the largest acceleration gives.
+REST_SPEED = 1e-9
 
 
 def is_steady(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, frame: TurningFrame) -> bool:
-    """Whether a moment later, moved on with the frame, the accelerations and linear equations are the same."""
+    """Whether accelerations and linear equations are unchanged a short time later, as seen from the frame."""
     from scipy.linalg import expm
 
     size = np.abs(x.v / f.scale).max() ** 2 + np.abs(x.vdot / f.scale).max()
     if not np.abs((x.vdot - frame.H @ x.v) / f.scale).max() <= COEFFICIENT_TOLERANCE * size:
-        return False  # the velocities do more than turn with the frame
+        return False  # the velocities do not just turn with the frame
     tau, later = _advanced_state(x, frame)
     T = expm(tau * frame.H)
     if not np.abs((later.vdot - T @ x.vdot) / f.scale).max() <= COEFFICIENT_TOLERANCE * size:
@@ -175,7 +177,7 @@ def is_steady(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, fra
 
 
 def is_still(x: MechanismState) -> bool:
-    """Whether nothing moves, compared with the mechanism's own rate, or with what forces give."""
+    """Whether all speeds are negligible compared with the mechanism's characteristic rate or its accelerations."""
     scale, pace = x.c.sizes / x.c.values.length, float(x.c.values.system.scales.rate.real)
     given = np.sqrt(pace**2 + np.abs(x.vdot / scale).max(initial=0.0))
     return not (np.abs(x.v) / scale).max(initial=0.0) > REST_SPEED * given
@@ -184,15 +186,15 @@ def is_still(x: MechanismState) -> bool:
 def steady_frame(
     x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, speed_scales: np.ndarray | None = None
 ) -> TurningFrame:
-    """The frame from which the state is steady: the world at an equilibrium; ``speed_scales`` is as in `refuse_unbalanced`.
+    """Frame in which the state is steady, the world at an equilibrium; ``speed_scales`` as in `refuse_unbalanced`.
 
     Raises
     ------
     AnalysisError
-        If the state is neither an equilibrium nor a steady motion; the message says what is accelerated.
+        If the state is neither an equilibrium nor a steady motion. The message names an unbalanced acceleration.
     """
     none = np.zeros((len(x.v),) * 2)
-    if not f.Zv.shape[1]:  # drivers leave no freedom: there is nothing to be steady
+    if not f.Zv.shape[1]:  # drivers prescribe the whole motion
         return TurningFrame(np.zeros(3), none, none)
     if is_still(x):
         refuse_unbalanced(x, e, speed_scales)
@@ -211,20 +213,20 @@ def steady_frame(
 
 
 def refuse_unbalanced(x: MechanismState, e: EquationDerivatives, speed_scales: np.ndarray | None = None) -> None:
-    """Refuse a state at rest that does not stay there.
+    """Refuse a state at rest that is not an equilibrium.
 
     Parameters
     ----------
-    x : State
-    e : Equations
-        There.
+    x : MechanismState
+    e : EquationDerivatives
+        The equations at the state.
     speed_scales : ndarray (nv,), optional
-        Speeds of which the equilibrium may be off by a part, because they stand for something else.
+        Large speeds of auxiliary bodies, whose velocities stand for other quantities; they widen the tolerance.
 
     Raises
     ------
     AnalysisError
-        Naming what is accelerated most.
+        With the name of the velocity with the largest acceleration.
     """
     left = remaining_accelerations(x, e, speed_scales)
     if not left.any():
@@ -240,7 +242,7 @@ def refuse_unbalanced(x: MechanismState, e: EquationDerivatives, speed_scales: n
 def remaining_accelerations(
     x: MechanismState, e: EquationDerivatives, speed_scales: np.ndarray | None = None
 ) -> np.ndarray:
-    """Accelerations (nv,) in natural units of what does not stay at rest, zero elsewhere; arguments of `refuse_unbalanced`."""
+    """Unbalanced accelerations (nv,) in natural units, zero where balanced; arguments as in `refuse_unbalanced`."""
     rest = static_equations(e)
     left = np.abs(rest.block("r"))
     may = BALANCE_TOLERANCE * force_magnitudes(rest) + POSITION_TOLERANCE * (abs(e.by_position[e.at["r"]]) @ x.c.sizes)
@@ -252,7 +254,7 @@ def remaining_accelerations(
 
 
 def has_time_laws(S: System) -> bool:
-    """Whether a law of a force follows time."""
+    """Whether a force law depends on time."""
     for law in S.forces.laws.ravel().tolist():
         if law >= 0:
             program = S.code[law + 2 : law + 2 + 2 * S.code[law]].reshape(-1, 2)
@@ -262,7 +264,7 @@ def has_time_laws(S: System) -> bool:
 
 
 def _refuse_time_dependence(x: MechanismState, e: EquationDerivatives, f: FreeCoordinates, frame: TurningFrame) -> None:
-    """Refuse linear equations that are others a moment later, though the mechanism rests."""
+    """Refuse linear equations that change with time although the mechanism rests."""
     now = reduced_equations(e, f, frame).A
     fastest = float(np.sqrt(np.abs(now).max(initial=0.0))) or 1.0
     z = x.c.z.copy()
@@ -276,7 +278,7 @@ def _refuse_time_dependence(x: MechanismState, e: EquationDerivatives, f: FreeCo
 
 
 def time_dependence_error() -> AnalysisError:
-    """The error for linear equations that are others a moment later."""
+    """The error for linear equations that change with time at rest."""
     return AnalysisError(
         "the mechanism rests, but laws of its forces change with time, and its linear equations with them; ask for "
         "those of this very instant with frozen=True"
@@ -286,7 +288,7 @@ def time_dependence_error() -> AnalysisError:
 def advanced_equations(
     x: MechanismState, f: FreeCoordinates, frame: TurningFrame
 ) -> tuple[EquationDerivatives, FreeCoordinates, TurningFrame]:
-    """The same equations a short while later, the bases turned with the frame."""
+    """Equations, free coordinates and frame a short time later; the bases are turned with the frame."""
     from scipy.linalg import expm
 
     tau, later = _advanced_state(x, frame)
@@ -296,7 +298,7 @@ def advanced_equations(
 
 
 def _advanced_state(x: MechanismState, frame: TurningFrame) -> tuple[float, MechanismState]:
-    """(time, state) a short while later if velocities turn with the frame: no forces are asked, so nothing is stiff."""
+    """(time, state) a short time later if velocities turn with the frame; kinematics only, so never stiff."""
     from scipy.linalg import expm
 
     c, z, q = x.c, x.c.z.copy(), x.q.copy()

@@ -1,23 +1,23 @@
-"""Mass matrix of a forest by composite bodies, and x = M^-1 f in O(n) by the articulated-body recursion.
+"""Mass matrix of a forest by composite rigid bodies, and x = M^-1 f in O(n) by the articulated-body recursion.
 
 Composite rigid bodies: Walker and Orin 1982; Featherstone 2008, table 6.2. Articulated bodies: Featherstone 2008,
-chapter 7, as a factor and solves with it. Where every body is connected to ground by FREE, PLANAR or POINT, M is
-constant and block diagonal and none of this runs.
+chapter 7, split into a factorisation and solves with it. Where every body is connected to ground by FREE, PLANAR or
+POINT, M is constant and block diagonal and none of this runs.
 
 Wrenches and twists are taken about the reference points of the tree joints, W.O, with components along the world's
-axes: from a body to its parent there is a shift and no rotation, and mechanisms far from the world's origin lose no
-accuracy. A joint of several velocities is a chain of joints with one each, all at its point: one twist column X is
-eliminated at a time. Of the inertia
+axes. From a body to its parent there is then a shift and no rotation, and mechanisms far from the world's origin lose
+no accuracy. A joint of several velocities is treated as a chain of joints with one velocity each, all at its point: one
+twist column X is eliminated at a time. Let
 
     I = [J H; H^T K]: (angular velocity, velocity of the point) -> (moment, force)
 
-of everything beyond the joint, with U = I X and D = X . U, the parent sees I - U U^T / D. M itself is not formed.
-Gravity, gyroscopic terms and bias accelerations are in f, so no velocity occurs here. A velocity that a driver
-prescribes is not eliminated: its acceleration is given, and the driver's effort results.
+be the articulated inertia of everything beyond the joint. With U = I X and D = X . U, the parent sees I - U U^T / D. M
+itself is not formed. Gravity, gyroscopic terms and bias accelerations are contained in f, so no velocity occurs here. A
+velocity that a driver prescribes is not eliminated: its acceleration is given, and the driver's effort is computed.
 
-Bodies are in the table after their parents. Where a body directly follows its parent, as in a chain, what goes from
-one to the other stays in registers; everything else is kept in W.IC[b]. W.X[d] holds, after the twist of velocity
-d, U, D and 1 / D.
+Parents precede their children in the body table. Where a body directly follows its parent, as in a chain, the
+quantities passed between the two stay in registers; all others are stored in W.IC[b]. W.X[d] holds the twist of
+velocity d, then U, D and 1 / D.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .kinematics import twist_column
 
 @formula
 def load_symmetric(A, k, o):
-    """Six neighbours of row k of a table, from column o: a symmetric matrix as xx, xy, xz, yy, yz, zz."""
+    """Load a symmetric matrix (xx, xy, xz, yy, yz, zz) from row k of a table, columns o to o + 5."""
     return (A[k, o], A[k, o + 1], A[k, o + 2], A[k, o + 3], A[k, o + 4], A[k, o + 5])
 
 
@@ -54,7 +54,7 @@ def add_symmetric(a, b):
 
 @formula
 def rotated_inertia(R, I):
-    """R I R^T of a symmetric I: I_zz times the identity, and what the first two columns of R make of the rest."""
+    """R I R^T of a symmetric I, as I_zz times the identity plus the contribution of the first two columns of R."""
     x, y = I[0] - I[8], I[4] - I[8]
     u = (x * R[0], x * R[3], x * R[6])
     w = (y * R[1], y * R[4], y * R[7])
@@ -93,7 +93,7 @@ def body_inertia(S, W, b):
 
 @formula
 def shifted_inertia(J, e, d):
-    """J + 2 (e . d) 1 - (e d^T + d e^T): inertia about a point that lies at -d from the one of J.
+    """J + 2 (e . d) 1 - (e d^T + d e^T): inertia about a point displaced by -d from the reference point of J.
 
     ``e`` is the first moment about the point halfway between the two.
     """
@@ -110,7 +110,10 @@ def shifted_inertia(J, e, d):
 
 @formula
 def store_root_twists(S, W, b):
-    """Twist columns of body b into W.X, where those of all others stand, if it is a root: FREE, PLANAR or POINT."""
+    """Store the twist columns of body b in W.X if it is a root: FREE, PLANAR or POINT.
+
+    Those of all other bodies are there already.
+    """
     if S.tree.joint[b] <= POINT:
         for k in range(S.tree.nv[b]):
             w, v = twist_column(S, W, b, k)
@@ -120,8 +123,9 @@ def store_root_twists(S, W, b):
 
 @formula
 def update_composite_bodies(S, W):
-    """Mass, first moment and inertia of every subtree about the reference point of its root, and where that lies from
-    the one of the root's parent.
+    """Mass, first moment and inertia of every subtree about the reference point of its root.
+
+    Also stores the vector from the reference point of the root's parent to that of the root.
     """
     C = W.IC
     n = S.tree.parent.shape[0]
@@ -146,9 +150,9 @@ def update_composite_bodies(S, W):
 
 @formula
 def mass_entries(S, W):
-    """Entries of M, in the order of `MassEntries`: for each velocity of each body, itself and those of its ancestors.
+    """Entries of M in the order of `MassEntries`: each velocity with itself and with those of the body's ancestors.
 
-    The momentum that a unit of the velocity gives all that hangs on the body, taken along the ancestors' columns.
+    An entry is the momentum of the subtree at unit velocity, projected on the twist column of the body or ancestor.
     """
     update_composite_bodies(S, W)
     C = W.IC
@@ -175,11 +179,11 @@ def mass_entries(S, W):
                 a = S.tree.parent[a]
 
 
-# columns of W.IC: parts of an inertia, after J; whether any waits there; a wrench or acceleration that does
+# columns of W.IC: parts of an inertia, after J; whether a pending inertia is stored; pending wrench or acceleration
 COUPLING, LINEAR, ELIMINATED, TOTAL_MASS, HAS_PENDING, PASSED_ON = 6, 15, 21, 22, 23, 24
 # columns of W.X
 RESPONSE, PIVOT, PIVOT_INVERSE = 6, 12, 13
-PIVOT_ROUNDING = 1e-14  # of what it would be with all joints beyond it held: a smaller inertia is none
+PIVOT_ROUNDING = 1e-14  # relative to the inertia with all joints beyond locked; a smaller pivot counts as zero
 
 
 @formula
@@ -189,7 +193,7 @@ def factor_articulated(S, W):
     Returns
     -------
     int
-        0, or 1 + the velocity that moves no inertia.
+        0, or 1 + the index of the velocity that moves no inertia.
     """
     A = W.IC
     n = S.tree.parent.shape[0]
@@ -215,7 +219,7 @@ def factor_articulated(S, W):
 
 @formula
 def zero_inertia(o):
-    """No inertia: J, H, K; how much was lost of the trace of J; mass."""
+    """Zero articulated inertia: J, H, K; eliminated part of the trace of J; mass."""
     zero = (o, o, o, o, o, o)
     return zero, (o, o, o, o, o, o, o, o, o), zero, o, o
 
@@ -231,7 +235,7 @@ def add_inertias(I, other):
 
 @formula
 def pending_inertia(A, b):
-    """The inertia that others have left for body b."""
+    """Sum of the inertias that children have stored for body b."""
     return (
         load_symmetric(A, b, 0),
         load9(A, b, COUPLING),
@@ -243,7 +247,7 @@ def pending_inertia(A, b):
 
 @formula
 def add_pending_inertia(A, b, I):
-    """Leave an inertia for body b, beside what waits there."""
+    """Add an inertia to the one stored for body b."""
     if A[b, HAS_PENDING].real > 0.0:
         I = add_inertias(I, pending_inertia(A, b))
     store_symmetric(A, b, 0, I[0])
@@ -256,7 +260,7 @@ def add_pending_inertia(A, b, I):
 
 @formula
 def add_body_inertia(S, W, b, I):
-    """The inertia handed to body b, with its own and what waits there."""
+    """Articulated inertia of body b: ``I``, its own inertia and the inertia stored by other children."""
     J, H, K, lost, mass = I
     m, h, own = body_inertia(S, W, b)
     H = (H[0], H[1] - h[2], H[2] + h[1], H[3] + h[2], H[4], H[5] - h[0], H[6] - h[1], H[7] + h[0], H[8])
@@ -268,9 +272,9 @@ def add_body_inertia(S, W, b, I):
 
 @formula
 def eliminate_velocities(S, W, b, I):
-    """Take the velocities of body b out of the inertia, the last one first. Returns (status, what is left).
+    """Eliminate the velocities of body b from the inertia, the last one first. Returns (status, remaining inertia).
 
-    An inertia along a velocity counts as none if it is but the rounding errors of those that were taken out before.
+    An inertia along a velocity counts as zero if it is not above the rounding errors of earlier eliminations.
     """
     J, H, K, lost, mass = I
     size = J[0] + J[3] + J[5] + lost
@@ -323,7 +327,7 @@ def downdate_coupling(H, a, b):
 
 @formula
 def shifted_articulated(I, d):
-    """The inertia about a point that lies at -d from its own: H + d~ K, J + d~ (H + d~ K)^T - H d~."""
+    """Articulated inertia about a point displaced by -d: H + d~ K, J + d~ (H + d~ K)^T - H d~."""
     J, H, K, lost, mass = I
     x = add((H[0], H[3], H[6]), cross(d, (K[0], K[1], K[2])))
     y = add((H[1], H[4], H[7]), cross(d, (K[1], K[3], K[4])))
@@ -348,12 +352,12 @@ def solve_articulated(S, W, f, x, effort):
     S : System
     W : Work
     f : array, shape (nv,)
-        Generalised forces [N, N m], those of the drivers not among them; kept.
+        Generalised forces [N, N m] without those of the drivers; not changed.
     x : array, shape (nv,)
-        Accelerations, out. Where a driver prescribes one it is taken as it comes in.
+        Accelerations, output. Where a driver prescribes one, its value is input.
     effort : array, shape (nv,)
-        At the velocities that a driver prescribes: the generalised force (M x - f)[d] that it has to add. The other
-        entries are left alone.
+        Output at the velocities that a driver prescribes: the generalised force (M x - f)[d] that the driver adds.
+        The other entries are not changed.
     """
     A = W.IC
     n = S.tree.parent.shape[0]
@@ -391,9 +395,9 @@ def solve_articulated(S, W, f, x, effort):
 
 @formula
 def pass_wrench_inwards(S, W, b, wrench, f, x, effort):
-    """The wrench that goes from body b to its parent, from the one handed to it and what waits there.
+    """Wrench that body b passes to its parent, from the wrench passed to it and the pending one in W.IC.
 
-    Forces that are left for its own velocities go to x, or to effort where a driver prescribes them.
+    The remaining forces along its own velocities go to x, or to effort where a driver prescribes them.
     """
     t, p = wrench
     if W.IC[b, HAS_PENDING].real > 0.0:
@@ -414,7 +418,7 @@ def pass_wrench_inwards(S, W, b, wrench, f, x, effort):
 
 @formula
 def pass_acceleration_outwards(S, W, b, parent_acceleration, x, effort):
-    """Accelerations of body b's velocities into x, and of the body, from the one at which its parent carries it."""
+    """Accelerations of body b: along its velocities (stored in x) and as a body, given its parent's acceleration."""
     w, v = parent_acceleration
     for d in range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b]):
         s = dot(load3(W.X, d, RESPONSE), w) + dot(load3(W.X, d, RESPONSE + 3), v)

@@ -1,25 +1,25 @@
-"""Tasks of the engine's kernel by number, calls of it from integrator loops, and calls of generated code.
+"""Task numbers of the engine's kernel, calls of the kernel from integrator loops, and calls of generated code.
 
-The tuple ``A`` of an integrator loop begins with the engine's address, tables, workspace, tableau, its own
-integrator state, its output buffer, and the group with indeterminate forces.
+The tuple ``A`` of an integrator loop begins with the engine's address, tables, workspace, tableau, integrator state,
+output buffer, and the group with indeterminate forces.
 
-Code made for one mechanism (`codegen/`) is straight-line code that fills the same arrays at the same places; all
+Code generated for one mechanism (`codegen/`) is straight-line code that fills the same arrays at the same places; all
 decisions stay in the engine. Its addresses are in `System.flat`. It is used for tasks after which the kinematics of
-bodies and frames in `Work` is not read: the code stores only what the engine itself needs. Every function takes (S,
-W, t, a, b, c, d), four arrays among them, and returns a float:
+bodies and frames in `Work` is not read: the code stores only what the engine itself needs. Every function takes (S, W,
+t, a, b, c, d), where a to d are arrays, and returns a float:
 
     PREPARE        a: q, b: v                   `set_prescribed`
     PLACE          a: q, b: z                   `update_positions`
     MOVE           a: v, b: z                   `update_velocities`
     LOADS          a: state, b: rates of works  forces into `W.velocities.applied`
     FACTOR, REUSE                               `factor`, 0 or 1 + the singular unknown; `reuse_factor`
-    STEP           a: f, b: gamma, c: x, d: lam  begin of a solve; without rows all of it
+    STEP           a: f, b: gamma, c: x, d: lam  start of a solve; without rows the whole solve
     STEP_UNLOADED  the same with f = 0
-    REFINE         the same                     a pass; returns and leaves in W.flat what `remainder_coupled` returns
-    FINISH         a: state, b: derivative, c: x, d: lam  the derivative from the solution; 0, or it is not finite
+    REFINE         the same                     a refinement pass; results as `remainder_coupled`, also in W.flat
+    FINISH         a: state, b: derivative, c: x, d: lam  the derivative from the solution; 0 if it is finite
     SHOW           a: q                         poses of frames that are needed only at ends of steps
-    SAMPLED        no address: where those of the laws that `sample_law` evaluates begin in `System.flat`, in the
-                   order of `law_at`; t and a: sensors, inputs of a force in W.flat
+    SAMPLED        not an address: index in `System.flat` of the laws that `sample_law` evaluates, in the order of
+                   `law_at`; t, a: sensors; the inputs of a force are in W.flat
     DRIFT          a: v, b: nu - G v            `velocity_violation`: the largest; the size of its terms in W.flat
 """
 
@@ -37,21 +37,21 @@ RESIDUAL_STEPS, RESIDUAL_DRIVEN, CONSTRAINT_GAPS, RESIDUAL_TERMS, INERTIAL_TERMS
 
 
 class OutputBuffer(NamedTuple):
-    """Where the engine writes."""
+    """Output buffer of the engine."""
 
     rows: Float2
 
 
 class ResidualBatch(NamedTuple):
-    """A state, steps from it, and what the residuals are there; all complex."""
+    """A state, finite or complex steps from it, and the residuals there; all complex."""
 
     t: Complex1  # (1,) [s]
     state: Complex1  # (nq + nv + nz,)
     vdot: Complex1  # (nv,)
     lam: Complex1  # (nr,)
-    steps: Complex2  # (n, 3 nv + 1): of positions (along the velocities), velocities, accelerations, and of time;
-    # behind these, if there are more, of states of controllers
-    out: Complex2  # (n, nv + 3 nr + 3 nm), or more: what x' = f misses of these where they do not change
+    steps: Complex2  # (n, 3 nv + 1): steps of positions (along the velocities), velocities, accelerations, and of time;
+    # followed, if there are more columns, by steps of controller states
+    out: Complex2  # (n, nv + 3 nr + 3 nm), or more: residuals x' - f of the controller states with x' = 0
 
 
 ENGINE, S_, W_, R_, OWN, OUTPUT, GROUP = range(7)
@@ -59,19 +59,19 @@ ENGINE, S_, W_, R_, OWN, OUTPUT, GROUP = range(7)
 
 @formula
 def call_engine(A, task):
-    """Have the engine do a task at the state on its desk."""
+    """Run a task of the engine at the time and state in its integrator state."""
     return call(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[OUTPUT], task)
 
 
 @formula
 def call_step_method(method, A, K, R, c, task):
-    """What a loop asks of a method behind a door."""
+    """Run a task of a step method that is called by address."""
     return call_bound(method, task)
 
 
 @formula
 def set_state(clock, t, y):
-    """Lay a time and a state on the engine's desk."""
+    """Store a time and a state in the engine's integrator state."""
     clock.real.t = t
     for i in range(y.shape[0]):
         clock.y[0, i] = y[i]
@@ -79,7 +79,7 @@ def set_state(clock, t, y):
 
 @formula
 def engine_arrive(t, y, dy, A, K):
-    """Put y on the constraints, in place, and evaluate there; how far it moved."""
+    """Project y on the constraints, in place, and evaluate there. Returns (status, distance moved)."""
     own = A[OWN]
     set_state(own, t, y)
     status = call_engine(A, ARRIVE)
@@ -92,7 +92,7 @@ def engine_arrive(t, y, dy, A, K):
 
 @formula
 def engine_tangent(y, e, A, K):
-    """Take from an error what the projection takes."""
+    """Remove from an error what the projection removes."""
     own = A[OWN]
     set_state(own, own.real.t, y)
     for i in range(e.shape[0]):
@@ -104,7 +104,7 @@ def engine_tangent(y, e, A, K):
 
 @formula
 def engine_inspect(t, h, span, first, buffer, A, K):
-    """What laws do within a step; see ``within.inspect``."""
+    """Detect brief actions of laws within a step; see `pulse_detection.inspect_step`."""
     if buffer.shape[1] == 0:
         return 0, 0.0, 0.0
     own = A[OWN]
@@ -137,7 +137,7 @@ def call_generated(address, S, W, t, a, b, c, d):  # type: ignore[no-untyped-def
 
 @formula
 def select_generated_code(S, W, task):
-    """Say whether code made for the mechanism is in use for this task."""
+    """Select for this task whether the code generated for the mechanism is used."""
     wanted = task == INTEGRATE or task == COMPLETE or task == FOLLOW
     if W.options.stabilization == PARTITIONING:
         wanted = False
@@ -157,7 +157,7 @@ def _register() -> None:
 
     @intrinsic
     def jump(typing, address, S, W, t, a, b, c, d):  # type: ignore[no-untyped-def]
-        arrays = [getattr(x, "array", x) for x in (a, b, c, d)]  # whole ones, if not parts of tables
+        arrays = [getattr(x, "array", x) for x in (a, b, c, d)]  # the whole arrays where these are fields of tables
         if any(x.layout != "C" for x in arrays):
             raise TypingError("code made for a mechanism takes arrays without gaps")
 

@@ -1,8 +1,8 @@
 """Calls of the elements' formulas by kind: rows, forces, counted turns and places on curves.
 
-The lists of kinds are written from the registries, so no kind is named here. An unknown kind gives nan, which a run
-reports; it is never answered by another element's formula. The formulas of a user's own class are not part of these
-lists: they are called by address (`compiler/kernels.py`).
+The lists of kinds are generated from the registries, so no kind is named here. An unknown kind gives nan, which a run
+reports; the formula of another element is never used instead. The formulas of user classes are not part of these lists:
+they are called by address (`compiler/kernels.py`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def turn_rates(S, W, z, dz):
 
 @formula
 def curve_place_rates(S, W, z, dz, kind, foot, progress):
-    """Rates of the states that say where the terms of a kind are on their curves."""
+    """Rates of the states that hold the places of a kind's terms on their curves."""
     for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
         F = load_record(W.FK, S.terms.F[k])
         M = load_record(W.FK, S.terms.M[k])
@@ -43,7 +43,7 @@ def curve_place_rates(S, W, z, dz, kind, foot, progress):
 
 @formula
 def remember_turns(S, W, z):
-    """Put the states that count turns where the poses in W say they are."""
+    """Set the states that count turns to the values given by the poses in W."""
     for k in range(S.angles.F.shape[0]):
         F = load_record(W.FK, S.angles.F[k])
         M = load_record(W.FK, S.angles.M[k])
@@ -53,7 +53,7 @@ def remember_turns(S, W, z):
 
 @formula
 def remember_places(S, W, z, kind, foot):
-    """Put the places of a kind's terms where the poses in W say they are."""
+    """Set the states that hold the places of a kind's terms on their curves to those given by the poses in W."""
     for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
         F = load_record(W.FK, S.terms.F[k])
         M = load_record(W.FK, S.terms.M[k])
@@ -76,7 +76,7 @@ _rare = dispatch_by_kind(
 
 @formula
 def rare(kind, par, F, M, hint, data):
-    """The formula of a kind of row that has no loop of its own; of a user's own by the address of its code table."""
+    """Formula of a kind of row without a loop of its own; for a user-defined row by the address of its code table."""
     if kind <= BY_ADDRESS:
         return _rare(kind, par, F, M, hint, data)
     x = nan + 0.0 * par[0]
@@ -88,7 +88,7 @@ def rare(kind, par, F, M, hint, data):
 INPUT, WRENCH, EFFORT, BRANCH = range(len(SIGNATURES))
 
 inputs = dispatch_by_kind(__name__, "inputs", SIGNATURES[INPUT].arguments, INPUTS, f"({NAN}, {NAN})", INPUT)
-"""What the laws of a force between frames may depend on."""
+"""Inputs of the laws of a force between frames."""
 
 wrench = dispatch_by_kind(__name__, "wrench", SIGNATURES[WRENCH].arguments, WRENCHES, f"({NONE}, {NONE})", WRENCH)
 """Wrench of a force between frames on M."""
@@ -96,7 +96,7 @@ wrench = dispatch_by_kind(__name__, "wrench", SIGNATURES[WRENCH].arguments, WREN
 branch = dispatch_by_kind(
     __name__, "branch", SIGNATURES[BRANCH].arguments, BRANCHES, f"({NAN}, {NAN}, {NAN}, {NAN}, {NAN})", BRANCH
 )
-"""On which branch of its formula a force between frames is, for kinds whose formula breaks; see `forces.BRANCHES`."""
+"""Branch of a force between frames, for kinds whose formula is discontinuous; see `forces.BRANCHES`."""
 
 breaks = generated_formula(
     __name__,
@@ -105,7 +105,7 @@ breaks = generated_formula(
     [*(f"if kind == {k}:\n        return True" for k in sorted(BRANCHES)), f"return has_formula(kind, {BRANCH})"],
     {"has_formula": has_formula},
 )
-"""Whether the formula of a kind of force breaks somewhere."""
+"""Whether the formula of a kind of force is discontinuous somewhere."""
 
 effort = dispatch_by_kind(__name__, "effort", SIGNATURES[EFFORT].arguments, EFFORTS, NAN, EFFORT)
 """Force along a measured quantity."""
@@ -113,7 +113,7 @@ effort = dispatch_by_kind(__name__, "effort", SIGNATURES[EFFORT].arguments, EFFO
 
 @formula
 def force_kind(S, k):
-    """What the formulas above know force k by: the number of its kind, or the address of its class's code table."""
+    """Number of the kind of force k, or the address of its class's code table, for the formulas above."""
     return S.force_code[k] if S.force_code[k] != 0 else S.forces.kind[k]
 
 
@@ -132,7 +132,7 @@ row_values = generated_formula(
     ],
     _LOOPS | _ROWS | {"each_value": rows.each_value, "rare_values": rows.rare_values},
 )
-"""Values, Jacobian and rates of all constraint rows, from the poses; ``z`` are the states that angles lean on."""
+"""Values, Jacobian and rates of all constraint rows, from the poses; ``z`` holds the turns of angles."""
 
 row_biases = generated_formula(
     __name__,
@@ -146,7 +146,7 @@ row_biases = generated_formula(
     ],
     _LOOPS | _ROWS | {"each_bias": rows.each_bias, "rare_biases": rows.rare_biases},
 )
-"""Gamma of all constraint rows and rates of what is measured, from poses and velocities."""
+"""Gamma of all constraint rows and rates of measured quantities, from poses and velocities."""
 
 whole_rows = generated_formula(
     __name__,
@@ -160,7 +160,7 @@ whole_rows = generated_formula(
     ],
     _ROWS | {name: getattr(rows, name) for name in ("begin_rows", "each_row", "rare_rows", "end_rows")},
 )
-"""Both in one pass, where poses and motions are there; without biases of what is measured unless ``whole``."""
+"""Both in one pass, from poses and motions; biases of measured quantities only if ``whole``."""
 
 _PLACES = [k for k in KINDS if k.place]
 _FEET = {f"foot_{k.number}": k.foot for k in _PLACES}
@@ -182,4 +182,4 @@ remember = generated_formula(
     ["remember_turns(S, W, z)", *(f"remember_places(S, W, z, {k.number}, foot_{k.number})" for k in _PLACES)],
     _FEET | {"remember_turns": remember_turns, "remember_places": remember_places},
 )
-"""Put the states that count turns and places where the poses in W say they are: no drift over long motions."""
+"""Set the states that count turns and places to the values given by the poses in W: no drift over long motions."""

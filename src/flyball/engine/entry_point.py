@@ -1,12 +1,11 @@
-"""The engine's kernel: everything that needs the right-hand side, compiled once, called by address with a task.
+"""The engine's kernel: all tasks that need the right-hand side, compiled once and called by address with a task number.
 
-Any loop may call it (an implicit method, time stepping with contact): it passes its own integrator state, with the
-time in ``real[T]`` and the state in ``y[0]``. A loop never contains the right-hand side, so that it compiles in
-half a second.
+Any loop may call it (an implicit method, time stepping with contact): it passes its own integrator state, with the time
+in ``real.t`` and the state in ``y[0]``. A loop never contains the right-hand side, so it compiles in half a second.
 
-Also here: the workspace of one run (`Work`) and the tables as compiled code takes them; and the dependent
-constraints at many states, in absolute coordinates, with one sparse factor of G M^-1 G^T's pattern each (rows are
-divided by their size and velocities counted in lengths).
+This module also allocates the workspace of one run (`Work`), describes the tables for compiled code, and finds
+dependent constraints at many states in absolute coordinates with one sparsity pattern of the factor (rows are divided
+by their norm and velocities are scaled to lengths).
 """
 
 from __future__ import annotations
@@ -73,11 +72,11 @@ from .projection import project_error, update_positions, update_velocities
 from .pulse_detection import INSPECTION_ROWS, inspect_step
 from .residual import force_slopes, residual
 
-MAX_KEPT_LAYOUTS = 4  # kinds of scratch, and tables, of a structure that are known
+MAX_KEPT_LAYOUTS = 4  # layouts of workspaces and tables that are cached for each structure
 
 
 def allocate_work(structure: Structure, system: System, dtype: Any = None) -> Work:
-    """Scratch arrays for one run: of the tables' own kind of numbers, if not told."""
+    """Workspace arrays for one run; ``dtype`` is that of the tables unless given."""
     dtype = np.dtype(system.const.dtype if dtype is None else dtype)
     if dtype.kind in "fc":
         return pooled_work(structure, system, dtype).fields  # type: ignore[no-any-return]
@@ -88,7 +87,7 @@ def allocate_work(structure: Structure, system: System, dtype: Any = None) -> Wo
 
 
 def pooled_work(structure: Structure, system: System, dtype: Any) -> PooledBuffer:
-    """The same as compiled code has it."""
+    """Workspace for one run, as a pooled buffer for compiled code."""
     key = np.dtype(dtype).char, int(system.flat[SCRATCH])
     made = structure.kept.get(
         "scratch", key, MAX_KEPT_LAYOUTS, lambda: StructPool(zero_work(structure, system, dtype))
@@ -98,11 +97,11 @@ def pooled_work(structure: Structure, system: System, dtype: Any) -> PooledBuffe
 
 
 def initialise_work(structure: Structure, system: System, array: Callable[[str], np.ndarray]) -> None:
-    """Put into blank scratch, whose arrays are found by name, what the tables say of it."""
+    """Initialise a zeroed workspace, whose arrays are found by name, from the tables."""
     if len(system.switch_numbers.lower):
         array("modes.lower")[:], array("modes.upper")[:] = system.switch_numbers.lower, system.switch_numbers.upper
     if n := system.sizes.ground_frames:
-        frames = system.frames  # told by their address
+        frames = system.frames  # passed by address
         _, at_rest = structure.kept.get(
             "ground", id(frames), MAX_KEPT_LAYOUTS, lambda: (frames, ground_records(system))
         )
@@ -110,10 +109,10 @@ def initialise_work(structure: Structure, system: System, array: Callable[[str],
 
 
 def struct_tables(structure: Structure, system: System) -> StructBuffer:
-    """The tables as compiled code has them."""
+    """Tables as a struct buffer for compiled code."""
     return structure.kept.get(
         "written", id(system), MAX_KEPT_LAYOUTS, lambda: _new_struct_tables(structure, system)
-    )  # whose address it keeps from others
+    )  # the buffer keeps this address alive
 
 
 def _new_struct_tables(structure: Structure, system: System) -> StructBuffer:
@@ -122,20 +121,20 @@ def _new_struct_tables(structure: Structure, system: System) -> StructBuffer:
 
 
 def ground_records(system: System) -> np.ndarray:
-    """Records of the frames on ground: they stand first in `Work.FK`, and nothing writes them again."""
+    """Kinematic records of the frames on ground: the first rows of `Work.FK`, never written again."""
     W = FrameRecords(np.zeros((system.sizes.ground_frames, 24), system.const.dtype))
     store_ground_frames(system, W)
     return W.FK
 
 
 class FrameRecords(NamedTuple):
-    """Of frames."""
+    """Kinematic records of frames."""
 
     FK: np.ndarray
 
 
 def zero_work(structure: Structure, system: System, dtype: Any) -> Work:
-    """Scratch of zeros."""
+    """Workspace filled with zeros."""
     nb, nf, nr, nv = len(system.tree.parent), len(system.frame_body), len(system.rows.law), structure.nv
     n, ny, nl, nw = (
         len(system.ldl.perm),
@@ -150,7 +149,8 @@ def zero_work(structure: Structure, system: System, dtype: Any) -> Work:
 
     return Work(
         z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_entries.row)),
-        z(len(system.column)), z(len(system.column)), z(len(structure.terms) if structure.loads or structure.reads else 0, 6),
+        z(len(system.column)), z(len(system.column)),
+        z(len(structure.terms) if structure.loads or structure.reads else 0, 6),
         RowScratch(*(z(nr) for _ in RowScratch._fields)), VelocityScratch(*(z(nv) for _ in VelocityScratch._fields)),
         z(INVERSE_JACOBIAN + nl, 2 * len(structure.measured) + nl + ne + nc + nw),
         Modes(*(z(nw) for _ in Modes._fields[:-1]), z(nw, nw)),  # type: ignore[call-arg]
@@ -162,7 +162,7 @@ def zero_work(structure: Structure, system: System, dtype: Any) -> Work:
 
 @formula
 def perform_task(S, W, R, clock, out, task):
-    """One task; see `run_task`. A formula, so that callees have one caller's flags and are compiled once."""
+    """Run one task; see `run_task`. A formula, so that its callees have one caller and are compiled once."""
     t = clock.real.t
     y = clock.y[0]
     select_generated_code(S, W, task)
@@ -226,39 +226,40 @@ def perform_task(S, W, R, clock, out, task):
 
 @kernel
 def engine(S: System, W: Work, R: Tableau, clock: StepState, output: OutputBuffer, task: int) -> int:
-    """`perform_task` behind an address."""
+    """`perform_task` as a kernel."""
     return perform_task(S, W, R, clock, output.rows, task)
 
 
 def run_task(S: System, W: Work, R: Tableau, clock: StepState, out: np.ndarray, task: int) -> int:
-    """Have the engine do a task.
+    """Run one task of the engine.
 
     Parameters
     ----------
     S, W : System, Work
-        Tables and scratch; kinematics and rows at the state are left in W.
+        Tables and workspace; kinematics and rows at the state are left in W.
     R : Tableau
-        The integrator's coefficients; only INTEGRATE looks at them.
-    clock : Clock
+        The integrator's coefficients; used by INTEGRATE only.
+    clock : StepState
         Time and state.
     out : (n, width)
         Rows of output.
     task : int
-        POSITION: kinematics and rows; the state's turns and places on curves are brought up to it. MOTION: also its
-        derivative, in ``clock.K[0]``. ARRIVE: the state is put on the constraints, and how far that moved it goes to
-        ``out[0, 0]``. REPORT: its row of output, in ``out[0]``. COMPLETE: rows of
-        ``out`` whose accelerations and multipliers were left for later. RESIDUAL: of the equations at the accelerations
-        ``out[1]`` and multipliers ``out[2]``, in ``out[0]``. SOLVE: at the state last evaluated, accelerations
-        ``out[2]`` and multipliers ``out[3]`` that other forces ``out[0]`` and right-hand sides of the rows ``out[1]``
-        make; see ``motion.respond``. TANGENT: an error ``clock.K[0]`` less what the projection takes off it. INSPECT:
-        see ``within.inspect``; in and out by the clock. SLOPES: of every force, see
-        ``slopes.slopes``. WATCH: MOTION, and what is watched, into ``out[0]``; see `guards`.
-        INTEGRATE: go on with the integration; FOLLOW: go on with what the drivers prescribe.
+        POSITION: kinematics and rows; the turns and places on curves in the state are updated. MOTION: also the
+        derivative of the state, in ``clock.K[0]``. ARRIVE: the state is projected on the constraints; the distance
+        moved goes to ``out[0, 0]``. REPORT: its row of output, in ``out[0]``. COMPLETE: fill in the rows of ``out``
+        whose accelerations and multipliers were deferred. RESIDUAL: residual of the equations at the accelerations
+        ``out[1]`` and multipliers ``out[2]``, in ``out[0]``. SOLVE: at the state last evaluated, the accelerations
+        ``out[2]`` and multipliers ``out[3]`` caused by forces ``out[0]`` and right-hand sides of the rows
+        ``out[1]``; see ``motion.solve_response``. TANGENT: the error ``clock.K[0]`` less the part that the
+        projection removes. INSPECT: see ``pulse_detection.inspect_step``; arguments and results in ``clock``.
+        SLOPES: stiffness and damping of every force, see ``residual.force_slopes``. GUARD_VALUES: MOTION, and the
+        guards in ``out[0]``; see `guards`. INTEGRATE: continue the integration; FOLLOW: continue the motion that
+        drivers prescribe.
 
     Returns
     -------
     int
-        Of INTEGRATE and FOLLOW the number of rows written, of the others a status.
+        Number of rows written for INTEGRATE and FOLLOW, otherwise a status.
     """
     return int(engine(S, W, R, clock, OutputBuffer(out), task))
 
@@ -266,7 +267,7 @@ def run_task(S: System, W: Work, R: Tableau, clock: StepState, out: np.ndarray, 
 def evaluate_state(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[int, np.ndarray]:
     """Evaluate at one state; returns (status, derivative) and leaves kinematics and rows in W.
 
-    With POSITION the turns and places in ``y`` are brought up to date.
+    With POSITION the turns and places in ``y`` are updated.
     """
     clock = _clock_pool(len(y)).new()
     clock.array("real").t = t
@@ -279,7 +280,7 @@ def evaluate_state(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tu
 
 @lru_cache
 def _clock_pool(ny: int) -> StructPool:
-    """Clocks that stand, of states of so many numbers."""
+    """Pool of integrator states without integration, for states of length ``ny``."""
     none, one = np.zeros(0, np.int64), np.zeros((1, ny))
     return StructPool(
         StepState(StepReals.blank(), StepCounts.blank(), np.zeros(0), np.zeros((STATE_ROWS, ny)), one, none,
@@ -289,7 +290,7 @@ def _clock_pool(ny: int) -> StructPool:
 
 @cache
 def _idle_tableau() -> StructBuffer:
-    """Coefficients of an integrator, for tasks that integrate nothing."""
+    """Placeholder tableau for tasks that do not integrate."""
     return StructBuffer(tableau("rk45"))
 
 
@@ -298,12 +299,12 @@ def _no_output() -> StructBuffer:
     return StructBuffer(OutputBuffer(np.zeros((0, 0))))
 
 
-ADDED_DIAGONAL = 1e-13  # to the diagonal, where rows of unit length have 1
+ADDED_DIAGONAL = 1e-13  # added to the diagonal, which is 1 for rows of unit norm
 
 
 @formula
 def unit_rows(S, W, scale):
-    """Rows of unit size in W.H, of velocities counted in lengths; what they were divided by in `W.rows.diagonal`."""
+    """Rows divided by their norms, into W.H; velocities are scaled to lengths. The norms go to `W.rows.diagonal`."""
     for k in range(S.rows.law.shape[0]):
         s = 0.0
         for e in range(S.row_start[k], S.row_start[k + 1]):
@@ -317,7 +318,7 @@ def unit_rows(S, W, scale):
 
 @formula
 def factor_square(S, W):
-    """Factor H H^T and a little on its diagonal; as `ldl_factor`."""
+    """Factor H H^T with a small addition to its diagonal; returns as `ldl_factor`."""
     for e in range(W.A.shape[0]):
         W.A[e] = 0.0
     for e in range(S.pairs.first.shape[0]):
@@ -336,7 +337,7 @@ def dependencies_at_states(address, S, W, R, clock, output, states, scale, block
     for n in range(states.shape[0]):
         clock.real.t = states[n, 0]
         for i in range(clock.y.shape[1]):
-            if states[n, 1 + i] == states[n, 1 + i]:  # what is not told goes on from the state before
+            if states[n, 1 + i] == states[n, 1 + i]:  # a value that is not given (nan) continues from the state before
                 clock.y[0, i] = states[n, 1 + i]
         call(address, S, W, R, clock, output, POSITION)
         unit_rows(S, W, scale)
@@ -368,32 +369,32 @@ def dependencies_kernel(
     combinations: Float3,
     out: Float2,
 ) -> None:
-    """The weakest combinations of rows at every state; ``block`` ends with a vector for the largest singular value."""
+    """Weakest combinations of rows at every state; ``block`` ends with a vector for the largest singular value."""
     dependencies_at_states(address, S, W, R, clock, output, states, scale, block, combinations, out)
 
 
 def dependent_rows(
     S: System, W: Work, states: np.ndarray, scale: np.ndarray, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The weakest combinations of the rows at many states, of which as many as ``count`` are to be dependencies.
+    """Weakest combinations of the rows at many states, of which ``count`` are expected to be dependencies.
 
     Parameters
     ----------
     S, W : System, Work
         In absolute coordinates, with rows.
     states : ndarray (n, 1 + ny)
-        Times and states; nan: turns and places that are those nearest to the ones before.
+        Times and states; nan: turns and places nearest to those of the state before.
     scale : ndarray (nv,)
-        What velocities are counted in.
+        Scale of each velocity.
     count : int
 
     Returns
     -------
     multipliers : ndarray (n, nr, count)
-        What should act on nothing.
+        Multipliers whose forces cancel.
     sizes : ndarray (n, 3)
-        The largest singular value of the rows of unit size; the least of those that are not to be dependencies; the
-        largest of those that are. nan where the rows are.
+        The largest singular value of the rows of unit size; the smallest of those that are not expected to be
+        dependencies; the largest of those that are. nan where the rows are nan.
     """
     n, nr = len(states), len(S.rows.law)
     ny = states.shape[1] - 1

@@ -1,7 +1,7 @@
-"""Steps of the two methods of fixed steps, generalised alpha and the variational integrator, called by address.
+"""Steps of the two fixed-step methods, generalised alpha and the variational integrator, called by address.
 
-The variational method integrates in absolute coordinates: masses are constant, bodies are coupled by rows and
-forces alone, and each rotates freely within a step.
+The variational method integrates in absolute coordinates: masses are constant, bodies are coupled by rows and forces
+only, and each body rotates freely within a step.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from .solve import apply_inverse_mass
 
 
 class AlphaWorkspace(NamedTuple):
-    """`Workshop` of this method."""
+    """Workspace of the generalised-alpha method; the counterpart of `ImplicitWorkspace`."""
 
     WC: ComplexWork
     moved: ResidualBatch
@@ -48,18 +48,18 @@ class AlphaWorkspace(NamedTuple):
 
 
 class AlphaArguments(NamedTuple):
-    """`Means` of this method."""
+    """Arguments of the generalised-alpha method; the counterpart of `ImplicitArguments`."""
 
     SC: ComplexSystem
     own: AlphaWorkspace
 
 
-SMALL_HALF_TURN = 1e-3  # half a turn [rad] below which arctan(x) / x is its series
+SMALL_HALF_TURN = 1e-3  # half rotation angle [rad] below which the series of arctan(x) / x is used
 
 
 @formula
 def constant_velocity_increments(d, out, A):
-    """Increments into those of constant velocity: of turns, Cayley's step into the rotation vector."""
+    """Convert increments to those of constant velocity: the Cayley step of a rotation to its rotation vector."""
     for i in range(d.shape[0]):
         out[i] = d[i]
     turns = A[PLAN].turns
@@ -73,7 +73,7 @@ def constant_velocity_increments(d, out, A):
 
 @formula
 def alpha_residual(t, k, A, K, c):
-    """What the equations miss at the end of the step; rates of increments are those of constant velocities."""
+    """Residual of the equations at the end of the step; rates of increments are those of constant velocities."""
     status = stabilised_residual(t, k, A, K, c)
     for i in range(K.v.shape[1]):
         K.out[k, i] = K.dd[k, i] - K.out[k, i]
@@ -84,7 +84,7 @@ def alpha_residual(t, k, A, K, c):
 
 @formula
 def alpha_jacobian(t, k, A, K, c):
-    """As `implicit_steps.stage_jacobian`; rates of increments do not depend on these."""
+    """Jacobian as `implicit_steps.stage_jacobian`, where the rates of increments do not depend on the increments."""
     status = stage_jacobian(t, k, A, K, c)
     P = A[PLAN]
     for e in range(9 * P.turns.shape[0]):
@@ -94,7 +94,7 @@ def alpha_jacobian(t, k, A, K, c):
 
 @formula
 def by_alpha(S, W, M, engine_arguments, run_state, task):
-    """The generalised-alpha method."""
+    """Run a task of the generalised-alpha method."""
     callbacks = (
         alpha_residual,
         alpha_jacobian,
@@ -120,19 +120,19 @@ def by_alpha(S, W, M, engine_arguments, run_state, task):
 def alpha_steps(
     S: System, W: Work, M: AlphaArguments, engine_arguments: EngineArguments, run_state: RunState, task: int
 ) -> int:
-    """`by_alpha` behind an address."""
+    """`by_alpha` as a kernel."""
     return by_alpha(S, W, M, engine_arguments, run_state, task)
 
 
-MAX_ROTATION_ITERATIONS = 20  # iterations for a turn
-MOMENTUM_TOLERANCE = 1e-15  # part of a turn's momentum that its equation may miss
-STALLED_TOLERANCE = 1e-12  # what it misses that does not fall
-SMALL_ROTATION = 0.02  # turn [rad] below which functions of it are series
+MAX_ROTATION_ITERATIONS = 20  # Newton iterations for one rotation
+MOMENTUM_TOLERANCE = 1e-15  # accepted residual of the rotation equation, relative to the momentum
+STALLED_TOLERANCE = 1e-12  # accepted residual, likewise, if the iteration no longer reduces it
+SMALL_ROTATION = 0.02  # rotation angle [rad] below which series are used
 
 
 @formula
 def momenta_of_velocities(v, p, A):
-    """Momenta of velocities: of turns along the body's axes."""
+    """Momenta p from velocities v; angular momenta along the body's axes."""
     S = A[S_]
     for b in range(S.tree.parent.shape[0]):
         i, n = S.tree.v[b], S.tree.nv[b]
@@ -148,7 +148,7 @@ def momenta_of_velocities(v, p, A):
 
 @formula
 def velocities_of_momenta(p, v, A):
-    """Velocities of momenta."""
+    """Velocities v from momenta p."""
     S = A[S_]
     for b in range(S.tree.parent.shape[0]):
         apply_inverse_mass(S, b, p, S.tree.v[b], v, S.tree.v[b])
@@ -156,7 +156,7 @@ def velocities_of_momenta(p, v, A):
 
 @formula
 def free_flight(p, h, d, p1, A):
-    """Ways d of bodies, and momenta on arrival; see `free_rotation`. Returns a status."""
+    """Displacements d of free bodies in a step, and momenta p1 at its end; see `free_rotation`. Returns a status."""
     S = A[S_]
     velocities_of_momenta(p, d, A)
     for i in range(d.shape[0]):
@@ -175,8 +175,9 @@ def free_flight(p, h, d, p1, A):
 def free_rotation(J, p, h, d, p1, i):
     """Solve h p = J x + x~ J x / 2 + c x~ x~ J x for the rotation vector x of a step.
 
-    That is T(-x)^T J x, T being the inverse of the differential of the exponential map; on arrival x~ J x / 2 has the
-    other sign: p1 = p - x~ J x / h. Cayley's step of the same turn goes to place i of d. Returns a status.
+    The right-hand side is T(-x)^T J x, T being the inverse of the differential of the exponential map. At the end of
+    the step x~ J x / 2 has the other sign: p1 = p - x~ J x / h. The Cayley step of the same rotation goes to d[i].
+    Returns a status.
     """
     x = (d[i], d[i + 1], d[i + 2])
     w = (h * p[i], h * p[i + 1], h * p[i + 2])
@@ -205,9 +206,9 @@ def free_rotation(J, p, h, d, p1, i):
 
 @formula
 def store_free_rotation(p, x, d, p1, i):
-    """Cayley's step x to place i of d, and p in axes that are turned by it: that is p - x~ J x / h, but keeps |p|.
+    """Store the Cayley step x at d[i], and p in the rotated axes: equal to p - x~ J x / h, but preserving |p|.
 
-    Written as what it changes: what is equal in all steps must not round the same way ten million times.
+    Computed as an increment, so that equal steps do not accumulate the same rounding error.
     """
     more = rotation_change(x, (p[i], p[i + 1], p[i + 2]))
     for k in range(3):
@@ -217,7 +218,7 @@ def store_free_rotation(p, x, d, p1, i):
 
 @formula
 def rotation_coefficients(angle):
-    """Of a turn: (1 - y cot y) / (4 y^2) and tan(y) / y, y being half the angle."""
+    """(1 - y cot y) / (4 y^2) and tan(y) / y, where y is half the angle of a rotation."""
     y = 0.5 * angle
     if angle < SMALL_ROTATION:
         s = angle * angle
@@ -228,14 +229,14 @@ def rotation_coefficients(angle):
 
 @formula
 def rotation_derivative(Ju, x, L, c, u):
-    """Derivative of J x + x~ J x / 2 + c x~ x~ J x along u, but for that of c; Ju = J u, L = J x."""
+    """Derivative of J x + x~ J x / 2 + c x~ x~ J x along u at constant c; Ju = J u, L = J x."""
     bend = add(cross(u, L), cross(x, Ju))
     return add(add(Ju, scale(0.5, bend)), scale(c, add(cross(u, cross(x, L)), cross(x, bend))))
 
 
 @formula
 def solve3(columns, r):
-    """Solve for three unknowns, by the columns of the matrix."""
+    """Solution of three linear equations, given the columns of the matrix."""
     a, b, c = columns
     bc = cross(b, c)
     by = 1.0 / dot(a, bc)
@@ -244,7 +245,7 @@ def solve3(columns, r):
 
 @formula
 def force_momenta(t, y, lam, f, A):
-    """Generalised forces at a state, but for those of inertia and of rows; friction presses with ``lam``."""
+    """Generalised forces at a state without those of inertia and of rows; friction uses the multipliers ``lam``."""
     S, W, own, rows = A[S_], A[W_], A[OWN], A[OUTPUT].rows
     nv, nq = f.shape[0], S.sizes.coordinates
     own.real.t = t
@@ -271,7 +272,7 @@ def force_momenta(t, y, lam, f, A):
 
 @formula
 def position_gaps(t, y, g, A):
-    """What positions miss of the constraints, into g, and the largest of it; turns in y are brought up to date."""
+    """Constraint violations of the positions, into g; returns the largest. The turns in y are updated."""
     W, own = A[W_], A[OWN]
     own.real.t = t
     for i in range(y.shape[0]):
@@ -290,7 +291,7 @@ def position_gaps(t, y, g, A):
 
 @formula
 def position_multipliers(g, lam, A):
-    """Multipliers that move positions by M^-1 G^T lam to where g is none."""
+    """Multipliers such that the displacement M^-1 G^T lam removes the violations g."""
     S, rows = A[S_], A[OUTPUT].rows
     for r in range(g.shape[0]):
         rows[1, r] = -g[r]
@@ -304,7 +305,7 @@ def position_multipliers(g, lam, A):
 
 @formula
 def add_constraint_momenta(G, lam, by, p, A):
-    """Add by G^T lam to momenta."""
+    """Add ``by`` times G^T lam to the momenta p."""
     S = A[S_]
     for r in range(lam.shape[0]):
         for e in range(S.row_start[r], S.row_start[r + 1]):
@@ -313,19 +314,21 @@ def add_constraint_momenta(G, lam, by, p, A):
 
 @formula
 def copy_rows(G, A):
-    """Keep the rows as last evaluated."""
+    """Copy the Jacobian entries last evaluated to G."""
     for e in range(G.shape[0]):
         G[e] = A[W_].G[e]
 
 
 @formula
 def by_variation(S, W, M, engine_arguments, run_state, task):
-    """The variational method; places in A are those of `implicit`."""
+    """Run a task of the variational method; the places in A are those of `implicit_steps`."""
     A = (
-        engine_arguments.doors[0], S, W, engine_arguments.R, engine_arguments.clock, engine_arguments.output, run_state.group, 0, 0, 0, 0, 0, 0, M.turns, run_state, interpolate_hermite,
+        engine_arguments.doors[0], S, W, engine_arguments.R, engine_arguments.clock, engine_arguments.output,
+        run_state.group, 0, 0, 0, 0, 0, 0, M.turns, run_state, interpolate_hermite,
     )  # fmt: skip
     callbacks = (
-        compose_state, project_step_end, engine_inspect, momenta_of_velocities, velocities_of_momenta, free_flight, force_momenta, position_gaps, position_multipliers, add_constraint_momenta, copy_rows,
+        compose_state, project_step_end, engine_inspect, momenta_of_velocities, velocities_of_momenta,
+        free_flight, force_momenta, position_gaps, position_multipliers, add_constraint_momenta, copy_rows,
     )  # fmt: skip
     return run_variational_task(callbacks, A, M, run_state.clock, task)
 
@@ -334,5 +337,5 @@ def by_variation(S, W, M, engine_arguments, run_state, task):
 def variational_steps(
     S: System, W: Work, M: VariationalStepWorkspace, engine_arguments: EngineArguments, run_state: RunState, task: int
 ) -> int:
-    """`by_variation` behind an address."""
+    """`by_variation` as a kernel."""
     return by_variation(S, W, M, engine_arguments, run_state, task)

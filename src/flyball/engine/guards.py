@@ -2,24 +2,24 @@
 
 A guard is a number whose zero crossing is an event:
 
-    a law of the user's            its value
-    a stop that is open            x - lower, upper - x
-    one that is closed, a latch    direction * lam: as long as it pushes
-    friction that sticks           static limit - |lam|
-    friction that slides           direction * rate
-    a freewheel that overruns      rate
-    a corner of a law              direction * u; where the motion is held on u = 0: 1 - |direction|
-    an elastic stop that is open   -d, the distance, or past it -(d + c ddot / k) where that is more
-    one that is pressed            its force, k d + c ddot
+    a user's event expression      its value
+    an open stop                   x - lower, upper - x
+    a closed stop, a latch         direction * lam: positive while it pushes
+    sticking friction              static limit - |lam|
+    sliding friction               direction * rate
+    an overrunning freewheel       rate
+    a nonsmooth point of a law     direction * u; while the motion is held on u = 0: 1 - |direction|
+    an open elastic stop           -d, the distance, or past it -(d + c ddot / k) where that is more
+    a closed elastic stop          its force, k d + c ddot
     a contact point                see `contact_guard`
 
-A guard that has no meaning in the present mode is nan. Modes and directions are in `Work` and change between steps
-only.
+A guard without meaning in the present mode is nan. Modes and directions are in `Work` and change between steps only.
 
-Where constraints are redundant, multipliers are those of least squares plus any combination of ``null``, the forces
-in balance by themselves. A group holds as long as some combination keeps all of its rows within their bounds: a
-sticking contact point |(t1, t2)| <= mu N, sticking friction |lam| <= limit, a stop or latch direction * lam >= 0.
-The margin of the best combination is the guard of the group; the guards of its rows are not evaluated.
+Where constraints are redundant, the multipliers are those of least squares plus any combination of ``null``, the
+multipliers of self-balanced forces. A group stays active as long as some combination keeps all of its rows within their
+bounds: for a sticking contact point |(t1, t2)| <= mu N, for sticking friction |lam| <= limit, for a stop or latch
+direction * lam >= 0. The margin of the best combination is the guard of the group; the guards of its rows are not
+evaluated.
 """
 
 from __future__ import annotations
@@ -71,9 +71,9 @@ from .loads import contact_guard, force_law, force_row, is_sliding, loads_end
 from .rows import characteristic_rate, controller_column, count_measured, direction_column, largest_measured_rate
 
 INACTIVE_GUARD = float("nan")
-POSITION_ROUNDING = 2e-15  # of the mechanism's length, or a radian: a distance that is none
-RELATIVE_ROUNDING = 1e-13  # part of the fastest rate, of the strongest force, that is rounding of another
-KINEMATIC_GUARDS = (G_LOWER, G_UPPER, G_SLIDES, G_BACK, G_TURNS)  # of where something is, and how fast it goes
+POSITION_ROUNDING = 2e-15  # relative to the mechanism's length, or a radian: a smaller distance counts as zero
+RELATIVE_ROUNDING = 1e-13  # relative to the fastest rate, or the largest force: rounding error of another rate or force
+KINEMATIC_GUARDS = (G_LOWER, G_UPPER, G_SLIDES, G_BACK, G_TURNS)  # guards of positions and rates
 MODE_GUARDS = (
     G_LOWER,
     G_UPPER,
@@ -83,16 +83,16 @@ MODE_GUARDS = (
     G_BACK,
     G_CONE,
     G_SHARED,
-)  # guards above zero as long as modes are right
-GRAZING_DEPTH = 1e-12  # of the same: an elastic stop that looks where it is by itself is pressed from there on
-RESTING_RATE = 1e-9  # of the same, at the mechanism's own rate: not coming nearer
-CREEP_RATE = 1e-13  # of the same: a rate that is none
-WRONG_SIDE = 1e-9  # of what decides a law's side: it is on the other one
+)  # guards that are positive as long as the modes are right
+GRAZING_DEPTH = 1e-12  # likewise: penetration at which an elastic stop counts as closed if nothing else has decided
+RESTING_RATE = 1e-9  # likewise, times the characteristic rate: a slower approach counts as none
+CREEP_RATE = 1e-13  # likewise: a smaller rate counts as zero
+WRONG_SIDE = 1e-9  # relative to the terms of a corner function: beyond this the law is on the other side
 
 
 @formula
 def evaluate_guards(S, W, t, out):
-    """Value of every guard into ``out`` (ng,), kinematics, rows and solution at t being in W."""
+    """Write the value of every guard to ``out`` (ng,), with the kinematics, rows and solution at t in W."""
     for g in range(S.guards.kind.shape[0]):
         kind, of = S.guards.kind[g], S.guards.of[g]
         if kind == G_LAW:
@@ -140,13 +140,16 @@ def switch_guard(S, W, t, kind, s):
 
 @formula
 def significant_rate(S, m, rate):
-    """The rate of quantity m; none where that is rounding, as of what nothing moves, or what something else holds."""
+    """Rate of quantity m, or 0 where it is only rounding.
+
+    That is so for a quantity that does not move or is held by constraints.
+    """
     return 0.0 if magnitude(rate) <= CREEP_RATE * characteristic_rate(S, m) else rate
 
 
 @formula
 def stop_distance(S, m, x, rate):
-    """How far quantity m is from a stop; none where that is rounding, as where it parts with no speed."""
+    """Distance of quantity m from a stop, or 0 where it is only rounding, as at separation with zero speed."""
     return (
         0.0
         if magnitude(x) <= POSITION_ROUNDING * S.units[m] and rate >= -RESTING_RATE * characteristic_rate(S, m)
@@ -156,9 +159,10 @@ def stop_distance(S, m, x, rate):
 
 @formula
 def guard_rounding(S, W, t, trial, so_far, out):
-    """What is rounding of every guard at the state last evaluated, into ``out`` (ng,).
+    """Write the rounding error of every guard at the state last evaluated to ``out`` (ng,).
 
-    ``trial`` is scratch of the shape of ``W.sensed``, ``so_far`` the fastest rate: what was rounded of that is kept.
+    ``trial`` is scratch of the shape of ``W.sensed``; ``so_far`` is the largest rate so far, whose rounding errors
+    persist.
     """
     fastest, strongest = largest_measured_rate(S, W), 0.0
     for k in range(S.rows.law.shape[0]):
@@ -183,10 +187,10 @@ def guard_rounding(S, W, t, trial, so_far, out):
 
 @formula
 def law_rounding(S, W, t, at, trial, most_of):
-    """By how much a law changes with the last places of what it is asked with.
+    """Change of a law when its arguments change by their rounding errors.
 
-    Of each by itself: what is zero by symmetry does not change as all of them do. ``most_of``: the largest rate, 1
-    where rates count as no less than the mechanism's own, the largest force.
+    Each argument is varied by itself: a value that is zero by symmetry does not change if all vary together.
+    ``most_of``: the largest rate, 1 where rates are compared at least with the characteristic rate, the largest force.
     """
     nm, first, last = count_measured(S), loads_end(S, W), controller_column(S, W, 0)
     f = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), W.sensed)
@@ -215,7 +219,7 @@ def law_rounding(S, W, t, at, trial, most_of):
 
 @formula
 def sensor_repeated(S, at, i):
-    """Whether what step i of the law at ``at`` reads is read by an earlier one."""
+    """Whether instruction i of the law at ``at`` reads a sensor that an earlier instruction reads."""
     n = 0
     for k in range(at + 2, i, 2):
         if S.code[k] == SENSOR and S.code[k + 1] == S.code[i + 1]:
@@ -225,9 +229,10 @@ def sensor_repeated(S, at, i):
 
 @formula
 def corner_tolerances(S, W, t, out):
-    """How far below zero guards of laws' corners may be on the side that was taken, into ``out`` (ng,).
+    """Write to ``out`` (ng,) how far below zero the guard of a law's corner may be on the chosen side.
 
-    Less is rounding of velocities that something holds. Farther off the side is wrong, whatever it was taken by.
+    Smaller values are rounding of velocities that constraints hold. Farther off, the chosen side is wrong, however it
+    was chosen.
     """
     fastest = -1.0
     for g in range(S.guards.kind.shape[0]):
@@ -239,7 +244,7 @@ def corner_tolerances(S, W, t, out):
 
 @formula
 def corner_terms(S, W, t, s, fastest):
-    """Size of what the function u of a corner is the sum of: no input less than what it is told from."""
+    """Size of the terms of a corner function u: no input counts less than the quantity it is computed from."""
     nm, at = count_measured(S), S.switches.law[s]
     size = magnitude(t * evaluate_jet(S.code, S.const, at, W.stack, t, W.sensed, BY_TIME)[1])
     for i in range(at + 2, at + 2 + 2 * S.code[at], 2):
@@ -256,26 +261,26 @@ def corner_terms(S, W, t, s, fastest):
 
 @formula
 def pressed_guard(S, W, s, kind, direction):
-    """Of an elastic switch that is pressed at a side: what it pushes with there; of an open side: how far that is."""
+    """Guard of an elastic stop: the force on a closed side, the distance on an open side."""
     m, side = S.switches.measured[s], 1.0 if kind == G_PRESS_LOWER else -1.0
     bound = W.modes.lower[s] if kind == G_PRESS_LOWER else W.modes.upper[s]
     depth = side * (bound - W.sensed[VALUE, m])
     push = S.switch_numbers.stiffness[s] * depth - S.switch_numbers.damping[s] * side * W.sensed[RATE, m]
-    told = direction > -1.5  # an interpolated one is not exact; one that looks where it is by itself is far below
+    told = direction > -1.5  # interpolated values are not exact; a side that has to decide for itself is far below
     if told and direction * side > 0.5:
         return push
     if told and direction * side < -0.5:
         return INACTIVE_GUARD
-    if not told:  # it begins at the side, with nothing that tells where it goes
+    if not told:  # at the side, with nothing that determines where it goes
         return GRAZING_DEPTH * S.units[m] - depth
-    # where it goes out faster than it is pushed it is open: without a jump as it leaves, so that nothing else that
-    # happens there takes it for a zero
+    # where it separates faster than the force decays it is open: continuous at separation, so that no other event there
+    # is mistaken for a zero
     return max(-depth, -push / S.switch_numbers.stiffness[s])
 
 
 @formula
 def friction_limit(S, W, t, k):
-    """The most that force k holds along its quantity at rest: its own law, asked for that."""
+    """Largest force that friction k can hold at rest, from its own law."""
     x = W.sensed[VALUE, S.forces.F[k]]
     load = W.sensed[RETURNED, S.forces.load[k]] if S.forces.load[k] >= 0 else 0.0
     laws = (force_law(S, W, k, 0, (t, x, 0.0)), 0.0, STATIC)
@@ -284,29 +289,29 @@ def friction_limit(S, W, t, k):
 
 @formula
 def corner_value(S, W, t, s):
-    """The function u whose sign says on which side of its corner a law is."""
+    """Corner function u of switch s, whose sign selects the side of the corner."""
     return evaluate(S.code, S.const, S.switches.law[s], W.stack, (t, 0.0 * t, 0.0 * t), W.sensed)
 
 
-BALANCE_TOLERANCE = 1e-12  # of its terms: what the forces of a null vector leave
-GROUP_ROUNDING = 1e-10  # of the largest force: rounding of the guard
-MAX_BISECTIONS = 50  # of the way from the shares of least squares to the best ones
+BALANCE_TOLERANCE = 1e-12  # residual of a null vector, relative to its terms
+GROUP_ROUNDING = 1e-10  # rounding of the group's guard, relative to the largest force
+MAX_BISECTIONS = 50  # bisections between the least-squares distribution and the best one
 NO_MARGIN = float("nan")
 
 
 class ForceDistribution(NamedTuple):
-    """The group: empty where ``Q.count[OPEN]`` is 0."""
+    """Group of active constraints with indeterminate forces; empty where ``Q.count[OPEN]`` is 0."""
 
-    null: Float2  # (ns, nr): multipliers in balance by themselves, the first Q.count[OPEN] rows in use
-    bend: Float2  # (ns, ns): how the most that the friction of a switch holds follows each of them
-    size: Float1  # (1,): the largest force of the group, by its weight
-    t: Float1  # (1,): the time at which its guard is asked for [s]
-    door: Int1  # (1,): address of `group_guard_kernel`, once there is a group
+    null: Float2  # (ns, nr): multipliers of self-balanced forces; the first Q.count[OPEN] rows are in use
+    bend: Float2  # (ns, ns): change of the friction limit of each switch with each of them
+    size: Float1  # (1,): the largest force of the group, weighted
+    t: Float1  # (1,): time at which the guard is evaluated [s]
+    door: Int1  # (1,): address of `group_guard_kernel`, set once there is a group
     Q: ConeProgram
 
 
 def empty_distribution(ns: int, nr: int) -> ForceDistribution:
-    """No group, and room for one."""
+    """Empty group with space for ``ns`` switches and ``nr`` rows."""
     return ForceDistribution(
         np.zeros((ns, nr)),
         np.zeros((ns, ns)),
@@ -319,7 +324,7 @@ def empty_distribution(ns: int, nr: int) -> ForceDistribution:
 
 @formula
 def fill_cell(S, W, t, G, s, c):
-    """Bounds of switch s into cell c. Returns whether it has one."""
+    """Write the bounds of switch s to cell c. Returns whether it has bounds."""
     D, k, kind = G.Q.D, G.Q.count[UNKNOWN_COUNT], S.switches.kind[s]
     row, other = S.switches.row[s], S.switches.partner[s] if kind == SLIP else -1
     if -1 < other < s:
@@ -343,7 +348,7 @@ def fill_cell(S, W, t, G, s, c):
             D[c, 0, 1 + j], D[c, 1, 1 + j] = G.bend[j, s], G.null[j, row]
     else:
         way = W.sensed[VALUE, direction_column(S, W, s)]
-        if way == 0.0:  # it holds both ways
+        if way == 0.0:  # holds in both directions
             return False
         D[c, 0, 0] = way * W.rows.multiplier[row]
         for j in range(k):
@@ -356,7 +361,7 @@ def fill_cell(S, W, t, G, s, c):
 
 @formula
 def fill_cells(S, W, t, G):
-    """Bounds of all that is in the group, by the multipliers in W."""
+    """Write the bounds of all members of the group, from the multipliers in W."""
     c, size = 0, 0.0
     for s in range(S.switches.row.shape[0]):
         if W.modes.shared[s] > 0.0 and fill_cell(S, W, t, G, s, c):
@@ -369,7 +374,7 @@ def fill_cells(S, W, t, G):
 
 @formula
 def group_margin(S, W, t, G):
-    """By how much the group can stay within its bounds; nan where there is none."""
+    """Margin by which the group can stay within its bounds; nan where there is no group."""
     if G.Q.count[UNKNOWN_COUNT] == 0:
         return NO_MARGIN
     fill_cells(S, W, t, G)
@@ -378,7 +383,7 @@ def group_margin(S, W, t, G):
 
 @formula
 def group_terms(G, out, first):
-    """What `group_margin` just came from, from a place on: q, a, b of every cell, which are smooth. Returns how many."""
+    """Write the smooth terms of the last `group_margin` (q, a, b of every cell) to ``out``. Returns their number."""
     if G.Q.count[UNKNOWN_COUNT] == 0:
         return 0
     n = 0
@@ -391,9 +396,10 @@ def group_terms(G, out, first):
 
 @formula
 def call_group_guard(S, W, t, G, K, row):
-    """The guard of the group by W, the last of a row of guards, and behind it its terms: row of ``K.g``, or -1 - j.
+    """Evaluate the group's guard, the last one of a row of guards, and its terms behind it, into ``K.g[row]``.
 
-    -1 - j: place j of those within a step, ``K.met_g[j]``. Behind a door, so that loops do not contain all laws.
+    A negative row -1 - j stands for place j of those within a step. The kernel is called by address, so that loops do
+    not contain the code of all laws.
     """
     if G.Q.count[UNKNOWN_COUNT] > 0:
         G.t[0] = t
@@ -408,7 +414,7 @@ def call_group_guard(S, W, t, G, K, row):
 
 @formula
 def store_group_guard(S, W, G, K, row):
-    """`group_margin` and `group_terms` into that row."""
+    """Store `group_margin` and `group_terms` in that row."""
     out, last = K.g[row] if row >= 0 else K.compared_values[-1 - row], K.way.shape[0] - 1
     out[last] = group_margin(S, W, G.t[0], G)
     K.count.terms = group_terms(G, out, last + 1)
@@ -417,13 +423,13 @@ def store_group_guard(S, W, G, K, row):
 
 @kernel
 def group_guard_kernel(S: System, W: Work, G: ForceDistribution, K: GuardState, _: GuardState, row: int) -> int:
-    """`store_group_guard` behind an address."""
+    """`store_group_guard` as a kernel."""
     return store_group_guard(S, W, G, K, row)
 
 
 @formula
 def update_null_vectors(address, S, W, R, engine_clock, output, G):
-    """The null vectors at the state last evaluated: what is not in balance any more is taken from them."""
+    """Update the null vectors to the state last evaluated: remove from each the part that is no longer balanced."""
     out, nr = output.rows, S.rows.law.shape[0]
     for j in range(G.Q.count[UNKNOWN_COUNT]):
         terms, left = 0.0, 0.0
@@ -445,7 +451,7 @@ def update_null_vectors(address, S, W, R, engine_clock, output, G):
 
 @formula
 def distribute_forces(S, W, t, G):
-    """Put shares within all bounds in place of those of least squares: as near to these as on the way to the best."""
+    """Replace the least-squares distribution by the nearest one within all bounds, on the line to the best one."""
     if not group_margin(S, W, t, G) > 0.0:
         return
     Q, low, high = G.Q, 0.0, 1.0
@@ -464,7 +470,7 @@ def distribute_forces(S, W, t, G):
 
 @formula
 def within_bounds(Q, x):
-    """Whether shares at a part x of the way to the best are within all bounds."""
+    """Whether the distribution at fraction x of the way to the best one is within all bounds."""
     for c in range(Q.count[CONE_COUNT]):
         q, a, b = cell_value(Q, c, 0, x), cell_value(Q, c, 1, x), cell_value(Q, c, 2, x)
         if not q >= sqrt(a * a + b * b):
@@ -474,7 +480,7 @@ def within_bounds(Q, x):
 
 @formula
 def cell_value(Q, c, i, x):
-    """A number of a cell there."""
+    """Value i of cell c at fraction x of that way."""
     s = Q.D[c, i, 0]
     for j in range(Q.count[UNKNOWN_COUNT]):
         s += x * Q.D[c, i, 1 + j] * Q.y[j]

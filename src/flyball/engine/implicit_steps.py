@@ -1,7 +1,7 @@
 """Steps of implicit methods, called by address: stage residuals, Jacobians, ends of steps.
 
-Stage residuals are the engine's own; Jacobians come from the same formulas by complex steps (`stage_residual`); ends of
-steps and rows of output are projected and solved as everywhere.
+Stage residuals are the engine's own; Jacobians come from the same formulas by complex steps (`stage_residual`). Ends of
+steps and rows of output are projected and solved as in explicit methods.
 """
 
 from __future__ import annotations
@@ -43,42 +43,42 @@ from .kinematics import retract
 from .rows import direction_column
 
 COMPLEX_STEP = 1e-40
-MAX_INCREMENT_SQUARE = 12.0  # square of an increment 2 tan(angle / 2): a third of a turn in a step is the most
+MAX_INCREMENT_SQUARE = 12.0  # square of an increment 2 tan(angle / 2): a step rotates by a third of a turn at most
 RESIDUALS, SC_, WC_, STATE_BATCH, ACCELERATION_BATCH, MULTIPLIER_BATCH, PLAN, RUN, BETWEEN = range(7, 16)
-# entries of Plan.first: numbers of the Jacobian that begin there
+# entries of JacobianPlan.first: where each group of Jacobian entries begins
 PICKED, PICKED_MASS, ROWS, ROWS_METRIC, ROWS_HELD, SIZES, TURNS, PRESSES, END = range(9)
 
 
 class JacobianPlan(NamedTuple):
-    """Where the numbers of the Jacobian come from."""
+    """Sources of the Jacobian's entries."""
 
     first: Int1  # (END + 1,)
-    pick: Int2  # (n, 3): by positions and velocities: number, step, place in what is found; sums of these
-    mass: Int2  # (n, 3): the same by accelerations
+    pick: Int2  # (n, 3): derivatives by positions and velocities: entry, step, index in the residuals; summed
+    mass: Int2  # (n, 3): the same for accelerations
     metric: Float1  # (nv,): D
     holonomic: Int1  # (nr,): whether a row restrains positions
-    valued: Int1  # (nr,): and does so in its present mode
+    valued: Int1  # (nr,): whether it does so in its present mode
     turns: Int1  # first angular velocity of each quaternion
-    pressing: Int1  # rows whose multipliers some friction depends on
-    fixed: Int1  # (1,): whether the mass matrix does not change
-    negative: Int1  # numbers whose negatives stand behind all others and a -1
-    light: Float1  # (nv,): inertia that bodies without any have in the Jacobian, or nothing
-    own_mass: Int1  # (nv,): numbers of the inertia of each velocity alone
+    pressing: Int1  # rows whose multipliers load some friction
+    fixed: Int1  # (1,): whether the mass matrix is constant
+    negative: Int1  # entries whose negatives follow all others and a -1
+    light: Float1  # (nv,): inertia added to the Jacobian for bodies without inertia, else 0
+    own_mass: Int1  # (nv,): entries of the diagonal inertia of each velocity
 
 
 class ImplicitWorkspace(NamedTuple):
-    """What steps of an implicit method write to, and what they read it by."""
+    """Workspace of an implicit method's steps."""
 
     WC: ComplexWork
     moved: ResidualBatch  # with steps of positions and velocities
-    pushed: ResidualBatch  # of accelerations
-    pressed: ResidualBatch  # without
+    pushed: ResidualBatch  # with steps of accelerations
+    pressed: ResidualBatch  # without steps
     plan: JacobianPlan
-    desk: RadauStepWorkspace  # of the method
+    desk: RadauStepWorkspace  # workspace of the method
 
 
 class ImplicitArguments(NamedTuple):
-    """What steps of an implicit method work with."""
+    """Arguments of an implicit method's steps."""
 
     SC: ComplexSystem
     own: ImplicitWorkspace
@@ -86,7 +86,7 @@ class ImplicitArguments(NamedTuple):
 
 @formula
 def compose_state(y, d, v, z, out, A):
-    """The state with positions an increment d from those of y, and velocities v."""
+    """State with the positions of y incremented by d, and velocities v."""
     nq = A[S_].sizes.coordinates
     nv = v.shape[0]
     for i in range(nq):
@@ -100,7 +100,7 @@ def compose_state(y, d, v, z, out, A):
 
 @formula
 def stage_residual(t, k, A, K, c):
-    """What the equations miss at stage k, into its row; rates of integrals there. Returns a status."""
+    """Write the residual of stage k to its row, and the rates of integrals. Returns a status."""
     status = stabilised_residual(t, k, A, K, c)
     out = K.out[k]
     increment_rates(A[PLAN], K.d[k], out)
@@ -113,10 +113,10 @@ def stage_residual(t, k, A, K, c):
 
 @formula
 def stabilised_residual(t, k, A, K, c):
-    """The same, but that the first rows are v + D G^T mu, which increments follow. Returns a status.
+    """As `stage_residual`, but the first rows hold v + D G^T mu, the velocities that the increments follow.
 
-    The last rows are x' - f, x being states of controllers. Of index 3 only positions are held to the constraints, and
-    mu is none.
+    The last rows are x' - f, x being states of controllers. With index 3 only positions are held on the constraints,
+    and mu is zero. Returns a status.
     """
     S, W, P, own, rows = A[S_], A[W_], A[PLAN], A[OWN], A[OUTPUT].rows
     nv, nr = K.v.shape[1], K.lam.shape[1]
@@ -151,7 +151,7 @@ def stabilised_residual(t, k, A, K, c):
 
 @formula
 def turned_too_far(P, d):
-    """Whether a quaternion is turned by more than a step may: near half a turn its increment has no bounds."""
+    """Whether a quaternion rotates by more than a step allows: near half a turn its increment is unbounded."""
     for n in range(P.turns.shape[0]):
         i = P.turns[n]
         if d[i] * d[i] + d[i + 1] * d[i + 1] + d[i + 2] * d[i + 2] > MAX_INCREMENT_SQUARE:
@@ -161,7 +161,7 @@ def turned_too_far(P, d):
 
 @formula
 def increment_rates(P, d, w):
-    """Velocities w into rates of increments, in place."""
+    """Convert velocities w to rates of increments, in place."""
     for n in range(P.turns.shape[0]):
         i = P.turns[n]
         out = cayley_rate((d[i], d[i + 1], d[i + 2]), (w[i], w[i + 1], w[i + 2]))
@@ -190,7 +190,7 @@ def integral_rates(A, K, k):
 
 @formula
 def stage_jacobian(t, k, A, K, c):
-    """The numbers of the Jacobian at stage k, or at the state at which the step begins. Returns a status."""
+    """Entries of the Jacobian at stage k, or at the state at which the step begins. Returns a status."""
     S, W, P, own = A[S_], A[W_], A[PLAN], A[OWN]
     own.real.t = t
     compose_state(c.y[CURRENT], K.d[k], K.v[k], K.z[k], own.y[0], A)
@@ -221,10 +221,10 @@ def stage_jacobian(t, k, A, K, c):
 
 @formula
 def store_row_entries(S, W, K, P, k):
-    """Entries of the rows, those along the metric of the stabilisation, and natural sizes of rows.
+    """Entries of the rows, of the rows times the stabilisation metric, and natural sizes of rows.
 
-    The sizes are those of the engine's own solve, as it last factored: so redundant rows share as they do there, and
-    rows of nothing but rounding weigh enough to hold nothing.
+    The sizes are those of the engine's own solve at its last factorisation. Redundant rows then share forces as they do
+    there, and rows of rounding errors only have sizes large enough to carry no force.
     """
     J = K.J[k]
     for r in range(S.rows.law.shape[0]):
@@ -241,7 +241,7 @@ def store_row_entries(S, W, K, P, k):
 
 @formula
 def set_batch_state(y, k, A, B, K):
-    """Put stage k on a bench of the residuals, its state being y."""
+    """Set the base state of a residual batch to y with the accelerations and multipliers of stage k."""
     B.t[0] = complex(A[OWN].real.t, 0.0)
     for i in range(B.state.shape[0]):
         B.state[i] = complex(y[i], 0.0)
@@ -250,12 +250,12 @@ def set_batch_state(y, k, A, B, K):
     for r in range(K.lam.shape[1]):
         B.lam[r] = complex(K.lam[k, r], 0.0)
     for n in range(B.out.shape[0]):
-        B.out[n, 0] = complex(np.nan, np.nan)  # what is not found is no number
+        B.out[n, 0] = complex(np.nan, np.nan)  # entries that are not computed are nan
 
 
 @formula
 def complex_step_entries(A, B, task, pick, numbers):
-    """Numbers of the Jacobian, by the steps on that bench. Returns a status."""
+    """Entries of the Jacobian by the steps in a residual batch. Returns a status."""
     call(A[RESIDUALS], A[SC_], A[WC_], B, B, B, task)
     for e in range(numbers.shape[0]):
         numbers[e] = 0.0
@@ -270,7 +270,7 @@ def complex_step_entries(A, B, task, pick, numbers):
 
 @formula
 def multiplier_derivatives(A, K, k, n):
-    """How the equations of motion change with a multiplier that some friction depends on. Returns a status."""
+    """Derivatives of the equations of motion with respect to a multiplier that loads friction. Returns a status."""
     P, B, nv = A[PLAN], A[MULTIPLIER_BATCH], K.v.shape[1]
     r = P.pressing[n]
     set_batch_state(A[OWN].y[0], k, A, B, K)
@@ -286,7 +286,10 @@ def multiplier_derivatives(A, K, k, n):
 
 @formula
 def project_with_multipliers(t, y, dy, A, K):
-    """Put y on the constraints, in place, and evaluate there; how far it moved. Multipliers go to ``K.found``."""
+    """Project y on the constraints, in place, and evaluate there; the multipliers go to ``K.found``.
+
+    Returns (status, distance moved).
+    """
     status, moved = arrive_there(t, y, dy, A, K)
     if status == 0:
         for r in range(K.found.shape[0]):
@@ -296,7 +299,7 @@ def project_with_multipliers(t, y, dy, A, K):
 
 @formula
 def project_step_end(t, y, dy, A, K):
-    """`project_with_multipliers`; at the end of a step guards are kept within it first."""
+    """`project_with_multipliers`, after storing the guards within the step."""
     own, c, watch = A[OWN], A[RUN].clock, A[RUN].watch
     h, begin = c.real.tried, c.real.t
     restore_start_rates(K, c)
@@ -314,7 +317,10 @@ def project_step_end(t, y, dy, A, K):
 
 @formula
 def copy_modes(A):
-    """Tell the residuals the present modes and ways, and which rows restrain positions: between steps they stay."""
+    """Copy to the residuals the present modes and directions, and which rows restrain positions.
+
+    They do not change within a step.
+    """
     S, W, WC, P = A[S_], A[W_], A[WC_], A[PLAN]
     for s in range(S.switches.row.shape[0]):
         WC.modes.mode[s], WC.modes.hold[s] = complex(W.modes.mode[s], 0.0), complex(W.modes.hold[s], 0.0)
@@ -327,10 +333,11 @@ def copy_modes(A):
 
 @formula
 def perform_implicit(method, callbacks, S, W, M, engine_arguments, run_state, task):
-    """What a loop asks of an implicit method."""
+    """Run a task of an implicit method."""
     A = (
-        engine_arguments.doors[0], S, W, engine_arguments.R, engine_arguments.clock, engine_arguments.output, run_state.group, engine_arguments.doors[1], M.SC, M.own.WC, M.own.moved,
-        M.own.pushed, M.own.pressed, M.own.plan, run_state, method[1],
+        engine_arguments.doors[0], S, W, engine_arguments.R, engine_arguments.clock, engine_arguments.output,
+        run_state.group, engine_arguments.doors[1], M.SC, M.own.WC, M.own.moved, M.own.pushed, M.own.pressed,
+        M.own.plan, run_state, method[1],
     )  # fmt: skip
     if task == BEGIN_SEGMENT:
         copy_modes(A)
@@ -339,7 +346,7 @@ def perform_implicit(method, callbacks, S, W, M, engine_arguments, run_state, ta
 
 @formula
 def by_radau(S, W, M, engine_arguments, run_state, task):
-    """Radau IIA of order 5."""
+    """Run a task of Radau IIA of order 5."""
     method = (attempt_radau_step, between_radau, enter_radau, reject_radau_step)
     return perform_implicit(
         method,
@@ -357,5 +364,5 @@ def by_radau(S, W, M, engine_arguments, run_state, task):
 def radau_steps(
     S: System, W: Work, M: ImplicitArguments, engine_arguments: EngineArguments, run_state: RunState, task: int
 ) -> int:
-    """`by_radau` behind an address."""
+    """`by_radau` as a kernel."""
     return by_radau(S, W, M, engine_arguments, run_state, task)

@@ -1,13 +1,12 @@
-"""Integration loops: steps of any method called by address, with event detection or without; explicit methods.
+"""Integration loops: steps of any method called by address, with or without event detection; explicit methods.
 
-A step method is a kernel that a loop calls by address; the explicit methods are here, others in `implicit_steps`
-and `fixed_step_methods`. The loops are those of `numerics/integrators`, which call the engine and the method by
-address.
+A step method is a kernel that a loop calls by address. The explicit methods are here, others in `implicit_steps` and
+`fixed_step_methods`. The loops are those of `numerics/integrators`, which call the engine and the method by address.
 
-With events, what guards depend on is kept at the ends of every step, and multipliers and loads at some places
-within it; between the ends guards are the same formula on another `Work`, whose measured quantities and multipliers
-are interpolated. Without events, everything the loop needs is laid out once and copied for each run
-(`kernels.StructPool`).
+With events, the quantities that guards depend on are stored at the ends of every step, and multipliers and loads also
+at some places within it. Between the ends, guards are evaluated by the same formula on another `Work`, whose measured
+quantities and multipliers are interpolated. Without events, the arrays of a loop are laid out once and copied for each
+run (`kernels.StructPool`).
 """
 
 from __future__ import annotations
@@ -83,25 +82,25 @@ from .sampled_controllers import advance_between_samples as from_instant_to_inst
 
 
 class EngineArguments(NamedTuple):
-    """What goes to the engine's door besides tables and scratch."""
+    """Arguments of the engine besides tables and workspace."""
 
-    clock: StepState  # its desk: time and state that it is asked for
+    clock: StepState  # the engine's integrator state: time and state at which it evaluates
     output: OutputBuffer
     R: Tableau
-    doors: Int1  # addresses of the engine, and of the residuals where they are asked
+    doors: Int1  # addresses of the engine, and of the residuals where they are used
 
 
 class RunState(NamedTuple):
-    """A motion that is going on."""
+    """State of a running integration."""
 
     clock: StepState
     watch: GuardState
-    group: ForceDistribution  # what holds together
+    group: ForceDistribution  # active constraints with indeterminate forces
 
 
 @formula
 def store_levels(A, K, at):
-    """Keep what has no known rate."""
+    """Store the values whose rates are not known: multipliers, loads and the like."""
     W = A[W_]
     n = K.rows.shape[0]
     for k in range(n):
@@ -112,7 +111,7 @@ def store_levels(A, K, at):
 
 @formula
 def store_guards_within(A, K, j):
-    """Keep guards and levels at place j of those that are met within a step; the engine has just done WATCH there."""
+    """Store guards and levels at place j within a step; the engine has just run GUARD_VALUES there."""
     S, last = A[S_], K.way.shape[0] - 1
     for i in range(last + 1):
         K.compared_values[j, i] = A[OUTPUT].rows[0, i]
@@ -125,7 +124,7 @@ def store_guards_within(A, K, j):
 
 @formula
 def stage_derivative(t, y, dy, A, K):
-    """The right-hand side; guards and what they depend on are kept at the stages chosen for it."""
+    """Evaluate the right-hand side; store guards and their inputs at the stages chosen for it."""
     own = A[OWN]
     set_state(own, t, y)
     K.count.stage += 1
@@ -144,7 +143,7 @@ def stage_derivative(t, y, dy, A, K):
 
 @formula
 def perform_explicit(S, W, R, engine_arguments, run_state, task):
-    """`explicit_runge_kutta.run_explicit_task`, asked of the engine."""
+    """Run a task of `explicit_runge_kutta.run_explicit_task` with the engine."""
     if task == TRY_STEP:
         run_state.watch.count.stage = 0
     A = (engine_arguments.doors[0], S, W, R, engine_arguments.clock, engine_arguments.output, run_state.group)
@@ -157,7 +156,7 @@ def perform_explicit(S, W, R, engine_arguments, run_state, task):
 def explicit_steps(
     S: System, W: Work, R: Tableau, engine_arguments: EngineArguments, run_state: RunState, task: int
 ) -> int:
-    """`perform_explicit` behind an address."""
+    """`perform_explicit` as a kernel."""
     return perform_explicit(S, W, R, engine_arguments, run_state, task)
 
 
@@ -169,7 +168,7 @@ class ExplicitMethod:
     R : Tableau
     """
 
-    failed, width = None, 0  # what it has the engine write is a row of output
+    failed, width = None, 0  # the engine writes a row of output
 
     def __init__(self, R: Tableau) -> None:
         self.R, self.c, self.stages = R, R.c, int(R.order_i[1])
@@ -182,17 +181,18 @@ class ExplicitMethod:
         run_state: StructBuffer,
         doors: np.ndarray,
     ) -> BoundKernel:
-        """The door with these tuples bound to it."""
+        """The kernel bound to these structures."""
         return BoundKernel(explicit_steps, tables, scratch, StructBuffer(self.R), engine_arguments, run_state)
 
 
 INTERPOLATED = 7
-HELD_RESIDUE = 1e-10  # of `Watch.tied`, of the fastest rate: what rows that hold leave of others
+# relative to `GuardState.tied`, or the fastest rate: what active rows leave of quantities they keep at zero
+HELD_RESIDUE = 1e-10
 
 
 @formula
 def evaluate_all_guards(A, W, t, K, row):
-    """Guards by what stands in W, that of the group last, to a row; then its terms."""
+    """Evaluate all guards from the values in W into a row, the group's guard last, followed by its terms."""
     S, out, last = A[S_], K.g[row], K.way.shape[0] - 1
     remove_rate_residue(S, W, K)
     guards(S, W, t, out)
@@ -203,7 +203,7 @@ def evaluate_all_guards(A, W, t, K, row):
 
 @formula
 def remove_guard_residue(S, W, K, out):
-    """Take from guards that what holds keeps at zero what it leaves of them."""
+    """Remove from guards that active constraints keep at zero the residue that these leave."""
     fastest = -1.0
     for i in range(K.tied.shape[0]):
         if K.tied[i] > 0.0:
@@ -216,7 +216,7 @@ def remove_guard_residue(S, W, K, out):
 
 @formula
 def remove_rate_residue(S, W, K):
-    """Take from rates that laws of events name and that what holds keeps at zero what it leaves of them."""
+    """Remove the residue from rates that event expressions use and active constraints keep at zero."""
     fastest, nm = -1.0, count_measured(S)
     for m in range(nm):
         if K.still[m] > 0.0:
@@ -228,13 +228,13 @@ def remove_rate_residue(S, W, K):
 
 @formula
 def renew_group(A):
-    """Bring what is in balance by itself up to the state last evaluated."""
+    """Update the null vectors of the group to the state last evaluated."""
     update_null_vectors(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[OUTPUT], A[GROUP])
 
 
 @formula
 def evaluate_with_guards(t, y, A, K, row):
-    """Evaluate the equations at a state, and the guards there."""
+    """Evaluate the equations at a state, and the guards there. Returns a status."""
     own = A[OWN]
     set_state(own, t, y)
     status = call_engine(A, MOTION)
@@ -246,7 +246,7 @@ def evaluate_with_guards(t, y, A, K, row):
 
 @formula
 def store_guard_inputs(A, K, row):
-    """Keep what guards depend on at the state last evaluated, and the guards there."""
+    """Store the quantities that guards depend on at the state last evaluated, and the guards there."""
     S, W = A[S_], A[W_]
     nr = S.rows.law.shape[0]
     end = 0 if row == START_VALUES else 1
@@ -272,7 +272,7 @@ def store_guard_inputs(A, K, row):
 
 @formula
 def interpolated_guards(t, h, x, A, K, row):
-    """Guards expected at a part x of the step that begins at t."""
+    """Evaluate guards from interpolated quantities at fraction x of the step that begins at t."""
     predict_sensed(K, x, h)
     evaluate_all_guards(A, A[INTERPOLATED], t + x * h, K, row)
 
@@ -292,7 +292,10 @@ def event_loop_kernel(
     clock: StepState,
     out: Float2,
 ) -> int:
-    """Go on with a watched integration; ``method``: see `kernels.call_bound`; ``address``: the engine's."""
+    """Continue an integration with event detection.
+
+    ``method``: see `formulas.call_bound`; ``address``: the engine's.
+    """
     A = (address, S, W, R, engine_clock, output, group, expected)
     callbacks = (
         call_step_method,
@@ -309,7 +312,7 @@ def event_loop_kernel(
 
 @formula
 def integrate_between_samples(X, rows):
-    """The loop in which nothing is watched."""
+    """Integration loop without event detection."""
     callbacks, A, K, R, c = X
     return advance(callbacks, A, K, R, c, rows)
 
@@ -329,9 +332,9 @@ def sampled_steps_kernel(
     part: Float2,
     out: Float2,
 ) -> int:
-    """Go on with an integration in which nothing is watched, from instant to instant of what is sampled.
+    """Continue an integration without event detection, from one sampling instant to the next.
 
-    ``part``: rows of output between two of them.
+    ``part``: rows of output between two instants.
     """
     A = (address, S, W, R, engine_clock, output)
     X = ((call_step_method, method, engine_report, no_segment_start, finish_step), A, detection, R, clock)
@@ -339,12 +342,12 @@ def sampled_steps_kernel(
 
 
 class StepMethod(Protocol):
-    """Steps of a method behind a door."""
+    """Steps of a method that is called by address."""
 
     R: Tableau
-    c: np.ndarray  # where in a step guards may be seen, as stages of a method
-    stages: int  # how many of these there are
-    failed: Exception | None  # why it does not go on, where that is the method's own reason
+    c: np.ndarray  # stages of a method at which guards may be evaluated, as fractions of the step
+    stages: int  # number of these stages
+    failed: Exception | None  # the method's own reason for stopping, if there is one
 
     def bind(
         self,
@@ -354,13 +357,17 @@ class StepMethod(Protocol):
         run_state: StructBuffer,
         doors: np.ndarray,
     ) -> BoundKernel:
-        """The door bound to a System, a Work, an `EngineArguments` and a `RunState`; ``doors``: of `EngineArguments`, its second to be set."""
+        """The kernel bound to a System, a Work, an `EngineArguments` and a `RunState`.
+
+        ``doors``: field of `EngineArguments`; the method sets its second entry.
+        """
 
 
 def guard_classes(S: System) -> np.ndarray:
-    """1 for guards that are above zero as long as modes are right, 2 for those of distances and rates, (ng,).
+    """Class of each guard, (ng,): 1 if positive while modes are right, 2 if it is also a distance or rate, else 0.
 
-    A slip in the plane is one of them: what begins at rest goes its way. One in space turns where it likes.
+    Guards of slip in the plane are among them: sliding from rest keeps its direction. In space the direction turns
+    freely.
     """
     kinds, of = S.guards.kind, S.guards.of
     slips = np.flatnonzero(kinds == G_TURNS)
@@ -370,7 +377,7 @@ def guard_classes(S: System) -> np.ndarray:
 
 
 def _event_workspace(S: System, expected: Work, c: np.ndarray, stages: int) -> GuardState:
-    """What a loop keeps that watches."""
+    """Workspace of a loop with event detection."""
     nm = len(S.row_start) - 1 - len(S.rows.law)
     rows = np.unique(S.switches.row[S.switches.row >= 0])
     columns = np.arange(2 * nm, expected.sensed.shape[1])
@@ -383,33 +390,33 @@ def _event_workspace(S: System, expected: Work, c: np.ndarray, stages: int) -> G
 
 @lru_cache(maxsize=16)
 def idle_event_workspace(c: bytes, stages: int) -> StructBuffer:
-    """What a loop keeps where there is nothing to watch, for all of them."""
+    """Empty guard workspace, shared by all loops without guards."""
     none, empty = np.zeros(0, np.int64), (np.zeros((RETURNED + 1, 0)), np.zeros(0))
     return StructBuffer(allocate_guard_state(none, none, np.frombuffer(c).copy(), stages, 0, none, none, empty))
 
 
 @lru_cache(maxsize=1)
 def idle_tableau() -> StructBuffer:
-    """A tableau that the engine does not look at."""
+    """Placeholder tableau for an engine that does not use it."""
     return StructBuffer(tableau("rk45"))
 
 
 class GuardedLoop:
-    """A motion by steps of a method that is watched, or sampled: the compiled loop and what it keeps.
+    """Integration loop with event detection or sampling, and its arrays.
 
     Parameters
     ----------
-    steps : Steps
-    clock : Clock
+    steps : StepMethod
+    clock : StepState
         Of the integration.
     s : Structure
     S : System
     scratch : PooledBuffer
         The Work.
     width : int
-        Of a row of output, and of what the method has the engine write.
-    group : Sharing
-        What holds together.
+        Length of a row of output, and of what the method has the engine write.
+    group : ForceDistribution
+        Active constraints with indeterminate forces.
     """
 
     def __init__(
@@ -430,7 +437,7 @@ class GuardedLoop:
                 sensed=W.sensed.copy(), rows=W.rows._replace(multiplier=W.rows.multiplier.copy())
             )
             self.desk = _event_workspace(S, self.expected, steps.c, steps.stages)
-        else:  # nobody looks at it, or writes to it
+        else:  # neither read nor written
             self.expected = W
             idle = idle_event_workspace(steps.c.tobytes(), steps.stages)
             self.desk = idle.fields
@@ -449,9 +456,9 @@ class GuardedLoop:
         self._own = [self._known[0], StructBuffer(own), StructBuffer(sheet)]
 
     def go_on(self, S: System, out: np.ndarray, sampling: SampledControllers | None = None) -> int:
-        """Go on until an event, the end, or what else `time_loop.advance` returns for. Returns rows written.
+        """Continue until an event, the end, or another reason of `time_loop.advance`.
 
-        Where nothing is watched, what ``sampling`` says is sampled on the way.
+        Returns the number of rows written. Without event detection, controllers in ``sampling`` are sampled on the way.
         """
         x = self.own
         if self._bound is None or S is not self.S:
@@ -471,15 +478,15 @@ class GuardedLoop:
 
     @property
     def fired(self) -> tuple[int, ...]:
-        """The guards that the last step ended on."""
+        """Guards whose events ended the last step."""
         return tuple(np.flatnonzero(self.desk.fired).tolist())
 
 
-MAX_LOOP_LAYOUTS = 4  # layouts of a structure that are known
+MAX_LOOP_LAYOUTS = 4  # layouts that are cached for each structure
 
 
 class LoopOutput(NamedTuple):
-    """The method (`BoundKernel.words`), and where rows of output go."""
+    """Method (`BoundKernel.words`) and rows of output."""
 
     asked: Int1
     rows: Float2
@@ -487,7 +494,7 @@ class LoopOutput(NamedTuple):
 
 @formula
 def integrate_smooth(S, W, engine_arguments, run_state, out):
-    """Go on with an integration. Returns rows written."""
+    """Continue an integration. Returns the number of rows written."""
     A = (engine_arguments.doors[0], S, W, engine_arguments.R, engine_arguments.clock, engine_arguments.output)
     callbacks = (call_step_method, out.asked, engine_report, no_segment_start, finish_step)
     return advance(callbacks, A, run_state.watch, engine_arguments.R, run_state.clock, out.rows)
@@ -497,18 +504,21 @@ def integrate_smooth(S, W, engine_arguments, run_state, out):
 def smooth_loop_kernel(
     S: System, W: Work, engine_arguments: EngineArguments, run_state: RunState, out: LoopOutput, task: int
 ) -> int:
-    """`finish_step_with_events` behind an address."""
+    """`integrate_smooth` as a kernel."""
     return integrate_smooth(S, W, engine_arguments, run_state, out)
 
 
 @lru_cache(maxsize=1)
 def _no_group() -> StructBuffer:
-    """Nothing holds together."""
+    """Empty group."""
     return StructBuffer(empty_distribution(0, 0))
 
 
 def _engine_arguments(ny: int, width: int, inspected: np.ndarray) -> EngineArguments:
-    """What goes to the engine's door besides: of its clock only time, state and what is seen are looked at."""
+    """Arguments of the engine besides tables and workspace.
+
+    Of the integrator state only time, state and inspection data are used.
+    """
     none = np.zeros(0, np.int64)
     clock = StepState(
         StepReals.blank(), StepCounts.blank(), np.zeros(0), np.zeros((3, ny)), np.zeros((1, ny)), none, inspected
@@ -517,19 +527,19 @@ def _engine_arguments(ny: int, width: int, inspected: np.ndarray) -> EngineArgum
 
 
 class SmoothLoop:
-    """A motion by steps of a method: the compiled loop and what it keeps.
+    """Integration loop without events or sampling, and its arrays.
 
     Parameters
     ----------
-    steps : Steps
-    clock : Clock
+    steps : StepMethod
+    clock : StepState
         Of the integration.
     s : Structure
     S : System
     scratch : StructBuffer
         The Work.
     width : int
-        Of a row of output, and of what the method has the engine write.
+        Length of a row of output, and of what the method has the engine write.
     """
 
     fired = ()
@@ -558,7 +568,7 @@ class SmoothLoop:
         self._loop: tuple[np.ndarray, BoundKernel] | None = None
 
     def go_on(self, out: np.ndarray) -> int:
-        """Go on until the end, or what else `time_loop.advance` returns for. Returns rows written."""
+        """Continue until the end, or another reason of `time_loop.advance`. Returns the number of rows written."""
         if self._loop is None or self._loop[0] is not out:
             rows = StructBuffer(LoopOutput(self.bound.words, out))
             self._loop = (

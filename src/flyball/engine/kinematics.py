@@ -1,18 +1,18 @@
 """Kinematics of bodies and frames: poses, velocities and bias accelerations by recursion along tree joints.
 
-The kinematic record of a body or frame is (p, R, w, v, alpha, a) in world components. ``alpha`` and ``a`` are the
-bias accelerations: what is left of the accelerations when every vdot is zero.
+The kinematic record of a body or frame is (p, R, w, v, alpha, a) in world components. ``alpha`` and ``a`` are the bias
+accelerations: the accelerations at vdot = 0.
 
-How a body is connected to its parent is data. Absolute coordinates are a forest in which every body is connected to
-ground by FREE (7 q, 6 v) or PLANAR (3 q, 3 v), a point mass by POINT: it moves along the world's axes (3 q, 3 v; in
-the plane 2) and keeps its reference orientation. The other kinds act between a frame on the parent and one on the
-body: REVOLUTE turns about its z axis, PRISMATIC slides along it, SPHERICAL (quaternion; velocities: angular
-velocity in the moved axes) turns about its origin, WELD does not move.
+The table states how a body is connected to its parent. Absolute coordinates are a forest in which every body is
+connected to ground by FREE (7 q, 6 v) or PLANAR (3 q, 3 v). A point mass is connected by POINT: it moves along the
+world's axes (3 q, 3 v; in the plane 2) and keeps its reference orientation. The other kinds act between a frame on the
+parent and one on the body: REVOLUTE turns about its z axis, PRISMATIC slides along it, SPHERICAL (quaternion;
+velocities: angular velocity in the moved axes) turns about its origin, WELD does not move.
 
-A tree joint must give its ``body_pose`` and ``body_motion``, its world twist columns (``twist_column``), the power
-of a wrench along them (``project_wrench``), the rates of its coordinates (``coordinate_rates``) and a finite step
-along its velocities (``retract``). Kinematics at many states, and the inverse (velocities of tree joints from the
-velocities of bodies), are at the end.
+A tree joint must provide its ``body_pose`` and ``body_motion``, its world twist columns (``twist_column``), the power
+of a wrench along them (``project_wrench``), the rates of its coordinates (``coordinate_rates``) and a finite step along
+its velocities (``retract``). Kinematics at many states, and the inverse (velocities of tree joints from the velocities
+of bodies), are at the end.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def stationary_record(offset, turn, o):
 
 @formula
 def body_pose(S, W, b, q):
-    """Position and rotation of body b, its reference point and what its twist columns need, from its parent's pose."""
+    """Position, rotation, reference point and twist data of body b, from its parent's pose."""
     kind = S.tree.joint[b]
     q0 = S.tree.q[b]
     o = 0.0 * S.bodies.mass[b]
@@ -117,7 +117,7 @@ def body_pose(S, W, b, q):
 
 @formula
 def joint_pose(S, W, b, kind, q, q0):
-    """The other kinds: move the tree joint's frame on the parent, then go over to the body."""
+    """The same for the other kinds: move the tree joint's frame on the parent, then go to the body's centre of mass."""
     parent = S.tree.parent[b]
     p = load3(S.bodies.joint_position, b, 0)
     R = load9(S.bodies.joint_rotation, b, 0)
@@ -184,7 +184,7 @@ def body_motion(S, W, b, v):
 
 @formula
 def joint_motion(S, W, b, kind, v, v0):
-    """The other kinds: the parent's motion at the reference point, then what the joint adds, then to the body."""
+    """The same for the other kinds: parent's motion at the reference point, plus the joint's, then to the body."""
     parent = S.tree.parent[b]
     o = 0.0 * W.BK[b, 0]
     w = (o, o, o)
@@ -239,7 +239,7 @@ def twist_column(S, W, b, k):
 def project_wrench(S, W, b, out, at, sign, force, torque, point):
     """Add ``sign`` times the power of a wrench (force and torque about ``point``) along body b's twist columns.
 
-    The twist columns times the wrench, with the zeros and ones left out.
+    This is the product of twist columns and wrench, without the zeros and ones.
     """
     kind = S.tree.joint[b]
     if kind == PRISMATIC:
@@ -271,7 +271,7 @@ def project_wrench(S, W, b, out, at, sign, force, torque, point):
 
 @formula
 def quaternion_at(S, b):
-    """Where body b's quaternion begins in q, and its angular velocity in v; (-1, -1) if it has none."""
+    """Index in q of body b's quaternion, and in v of its angular velocity; (-1, -1) if it has none."""
     kind = S.tree.joint[b]
     if kind == FREE:
         return S.tree.q[b] + 3, S.tree.v[b] + 3
@@ -282,7 +282,7 @@ def quaternion_at(S, b):
 
 @formula
 def count_plain_coordinates(S, b):
-    """How many of body b's coordinates, its first, are plain: their rates are velocities."""
+    """Number of leading coordinates of body b whose rates are velocities."""
     kind = S.tree.joint[b]
     if kind == POINT:
         return S.tree.nv[b]
@@ -291,7 +291,7 @@ def count_plain_coordinates(S, b):
 
 @formula
 def coordinate_rates(S, q, v, dq):
-    """Qdot of every body from its velocities."""
+    """Compute qdot of every body from its velocities."""
     for b in range(S.tree.parent.shape[0]):
         q0 = S.tree.q[b]
         v0 = S.tree.v[b]
@@ -307,7 +307,7 @@ def coordinate_rates(S, q, v, dq):
 
 @formula
 def velocities_from_rates(S, q, dq, v):
-    """V of every body from its qdot: the reverse of ``rates``."""
+    """Compute v of every body from its qdot: the inverse of ``coordinate_rates``."""
     for b in range(S.tree.parent.shape[0]):
         q0 = S.tree.q[b]
         v0 = S.tree.v[b]
@@ -337,7 +337,7 @@ def retract(S, q, d):
 
 @formula
 def normalise_quaternions(S, q):
-    """Give every quaternion unit length again, in place."""
+    """Normalise every quaternion, in place."""
     for b in range(S.tree.parent.shape[0]):
         k, _ = quaternion_at(S, b)
         if k >= 0:
@@ -369,7 +369,7 @@ def update_motions(S, W, v):
 
 @formula
 def update_frame_motions(S, W):
-    """Those of the frames, from their bodies'."""
+    """Velocities and bias accelerations of the frames, from their bodies'."""
     for k in range(S.sizes.ground_frames, S.sizes.moving_frames):
         _, _, w, u, alpha, a = attached_record(
             load_record(W.BK, S.frame_body[k]), load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0)
@@ -390,7 +390,7 @@ def update_frames(S, W):
 
 @formula
 def store_ground_frames(S, W):
-    """Records of the frames on ground, written once."""
+    """Write the records of the frames on ground, once."""
     for k in range(S.sizes.ground_frames):
         p, R, w, v, alpha, a = stationary_record(
             load3(S.frames.position, k, 0), load9(S.frames.rotation, k, 0), 0.0 * S.frames.position[k, 0]
@@ -400,14 +400,14 @@ def store_ground_frames(S, W):
 
 
 class BodyTables(NamedTuple):
-    """What of `System` it is computed from."""
+    """Tables of `System` that body kinematics is computed from."""
 
     tree: Tree
     bodies: Bodies
 
 
 class BodyKinematics(NamedTuple):
-    """Of the bodies at one state, as in `Work`: records, twist columns, reference points."""
+    """Kinematics of the bodies at one state, as in `Work`: records, twist columns, reference points."""
 
     BK: Float2
     X: Float2
@@ -440,9 +440,9 @@ def kinematics_over_time(S: BodyTables, W: BodyKinematics, q: Float2, v: Float2,
 
 
 def joint_velocities(x: Values, bodies: Mapping[str, BodyState], W: Any) -> np.ndarray:
-    """Velocities (nv,) of the forest for bodies that move so.
+    """Velocities (nv,) of the forest from the motions of its bodies.
 
-    Those of tree joints are the least squares of each body's motion relative to its parent's, at the poses in W.
+    Those of tree joints are the least-squares fit to each body's motion relative to its parent's, at the poses in W.
     """
     s = x.structure
     v = free_velocities(x, bodies)
@@ -454,12 +454,13 @@ def joint_velocities(x: Values, bodies: Mapping[str, BodyState], W: Any) -> np.n
 
 
 def turned_angles(x: Values, W: Any, q: np.ndarray) -> dict[str, Any]:
-    """Turned angle of every body of a planar mechanism, whole turns counted, at the poses in W, which belong to q.
+    """Rotation angle of every body of a planar mechanism with its whole turns, at the poses in W, which belong to q.
 
-    Numbers for q (nq,), arrays over time for (nq, n). Bodies begin at the angles that they are drawn with.
+    Returns numbers for q (nq,), arrays over time for (nq, n). Bodies start at their angles in the reference
+    configuration.
     """
     S = x.system
-    since: list[Any] = []  # what the coordinates along each chain have turned it since it was drawn
+    since: list[Any] = []  # rotation by the coordinates along each chain since the reference configuration
     for b in range(len(S.tree.parent)):
         total = since[S.tree.parent[b]] if S.tree.parent[b] >= 0 else 0.0
         for i in range(S.tree.nv[b]):
@@ -496,7 +497,7 @@ def _set_joint_velocities(x: Values, W: Any, t: TreeJoint, d: BodyState, parent:
 
 
 def least_squares(A: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """X that makes A x - b least; of complex numbers what carries the derivative, which conjugation would not."""
+    """Least-squares solution x of A x = b; complex parts carry derivatives, so nothing is conjugated."""
     if A.shape[1] == 1:
         return (A.T @ b) / (A.T @ A)[0]
     x = np.linalg.lstsq(A.real, b.real, rcond=None)[0]

@@ -1,16 +1,16 @@
 """Forces: wrenches on bodies, efforts along measured quantities, contact friction and joint friction.
 
 A force element gives its wrench on frame M; the reverse acts on frame F's body at the same point. Gravity and
-gyroscopic terms are the inertial wrench of the bias accelerations. Wrenches are gathered on bodies and projected on
-the velocities. The power of each element that needs accounting is returned as well.
+gyroscopic terms are the inertial wrench of the bias accelerations. Wrenches are summed on bodies and projected on the
+velocities. The power of each element that needs energy accounting is returned as well.
 
-A contact point is a STOP (its gap) and a SLIP along each of its tangents (`model/contact_point.py`). A sticking point is
-held by rows; a sliding one is loaded by -mu N d, N being the multiplier of the gap and d the direction of sliding.
+A contact point is a STOP (its gap) and a SLIP along each of its tangents (`model/contact_point.py`). A sticking point
+is held by rows. A sliding one is loaded by -mu N d, N being the multiplier of the gap and d the direction of sliding.
 
-Joint friction depends on the joint's own reaction, which friction changes. For given loads the reactions follow
-from one more solve with the same factor. The consistent loads are found by Newton's method: what a joint's friction
-returns to its own load is a sum of norms of affine functions and so convex, and Newton from below leads to the
-smallest solution, the one that holds. Where the slope reaches one before that there is none: the joint jams.
+Joint friction depends on the joint's own reaction, which friction changes. For given loads the reactions follow from
+one more solve with the same factor. The consistent loads are found by Newton's method: the load that a joint's friction
+returns is a sum of norms of affine functions and so convex, and Newton's method from below leads to the smallest
+solution, which is the physical one. Where the slope reaches one before that there is no solution: the joint jams.
 
 Forces that events or laws name are written to their columns once accelerations and multipliers are known.
 """
@@ -44,18 +44,20 @@ from .element_dispatch import effort, force_kind, inputs, wrench
 from .kinematics import load_record, project_wrench
 from .rows import characteristic_speed, controller_column, count_measured, direction_column, wrench_on_second
 
-SLOW_SLIDING = 1e-10  # lengths of the mechanism, at its own rate: slower sliding in space goes the way of its switch
-ONSET_LENGTH = 2.0  # length of the way of what begins to slide in space: in its first moments it goes that way
-ONSET_SPEED = 3e-5  # of the same: so fast it goes its own way for the most part; so many times as fast, wholly
+SLOW_SLIDING = 1e-10  # relative to the characteristic speed: slower sliding in space takes the direction of its switch
+# squared length of the stored direction at the onset of sliding in space; that direction then dominates at first
+ONSET_LENGTH = 2.0
+ONSET_SPEED = 3e-5  # likewise: at this speed the direction mostly follows the velocity; at a multiple of it, wholly
 ONSET_END = 8.0
-REVERSAL_SPEED = 1e-11  # of the same: so fast it goes back when it is told; at first its acceleration is rounding
-TURN_COSINE = 0.5  # cosine of the angle by which a direction of sliding turns before its way is told anew
+# likewise: backward speed that counts as reversal; at the onset the acceleration is only rounding
+REVERSAL_SPEED = 1e-11
+TURN_COSINE = 0.5  # cosine of the angle by which a direction of sliding turns before the stored direction is updated
 NO_GUARD = float("nan")
 
 
 @formula
 def is_sliding(S, W, s):
-    """Whether the place of contact whose first slip is switch s is closed and does not stick."""
+    """Whether the contact point whose first slip is switch s is closed and does not stick."""
     return W.modes.mode[s].real == OFF and W.modes.mode[S.switches.other[s]].real != OFF
 
 
@@ -63,7 +65,7 @@ def is_sliding(S, W, s):
 def sliding_direction(S, W, sensed, s):
     """Direction of sliding along the tangents of slip s and of its partner, and the speed.
 
-    In the plane it is the way of the switch, in space `direction_in_space`.
+    In the plane it is the direction of the switch, in space `direction_in_space`.
     """
     way = sensed[VALUE, direction_column(S, W, s)]
     u = sensed[RATE, S.switches.measured[s]]
@@ -77,11 +79,12 @@ def sliding_direction(S, W, sensed, s):
 
 @formula
 def direction_in_space(pace, directions, velocity):
-    """Direction of sliding in space, and the speed along it; ``pace`` is the mechanism's own speed.
+    """Direction of sliding in space, and the speed along it; ``pace`` is the characteristic speed.
 
-    It is that of the velocity, reversed where it is more against the way than with it: what comes to rest would slide
-    on smoothly, until the event is found. What has just begun to slide goes its way, and that of its velocity as it
-    gets faster: by itself the velocity turns infinitely fast there.
+    It is the direction of the velocity, reversed where that has a negative component along the stored direction:
+    sliding continues smoothly through rest until the event is found. At the onset of sliding the stored direction is
+    used, and gradually that of the velocity as the speed grows: the velocity's own direction turns infinitely fast
+    there.
     """
     (way, side), (u, v) = directions, velocity
     square = u * u + v * v
@@ -96,7 +99,10 @@ def direction_in_space(pace, directions, velocity):
 
 @formula
 def onset_direction(pace, directions, velocity, square):
-    """The same of what has just begun to slide: velocity + c exp(-(speed / c)^2) way, c = FIRST lengths at its rate."""
+    """Direction and speed at the onset of sliding: velocity + c exp(-(speed / c)^2) direction.
+
+    c is `ONSET_SPEED` times the characteristic speed.
+    """
     first = ONSET_SPEED * pace
     c = first * exp(-square / (first * first)) / ONSET_LENGTH
     a, b = velocity[0] + c * directions[0], velocity[1] + c * directions[1]
@@ -106,7 +112,7 @@ def onset_direction(pace, directions, velocity, square):
 
 @formula
 def apply_contact_friction(S, W, k, work, f):
-    """Add the friction of a place of contact to the generalised forces ``f``, and its power to its work."""
+    """Add the friction of a contact point to the generalised forces ``f``, and its power to its work rate."""
     a, b, power = contact_friction(S, W, k)
     work[S.forces.work[k]] = power
     for side in range(2):
@@ -120,14 +126,15 @@ def apply_contact_friction(S, W, k, work, f):
 
 @formula
 def contact_friction(S, W, k):
-    """-mu N d of a place of contact that slides along d, on each tangent, and its power; N is its gap's multiplier."""
+    """-mu N d of a contact point sliding along d, on each tangent, and its power; N is the multiplier of the gap."""
     s = S.forces.switch[k]
     if not is_sliding(S, W, s):
         o = 0.0 * W.sensed[LOAD, S.forces.load[k]]
         return o, o, o
     d, e, speed = sliding_direction(S, W, W.sensed, s)
     pressed, mu = W.sensed[LOAD, S.forces.load[k]], S.switch_numbers.kinetic_friction[s]
-    if pressed.real < 0.0 and mu.real > 1.0:  # past where it opens, to the end of the step: it must not run away
+    # between opening and the end of the step: limited, so that it does not diverge
+    if pressed.real < 0.0 and mu.real > 1.0:
         mu = 1.0 + 0.0 * mu
     push = -mu * pressed
     return push * d, push * e, push * speed
@@ -135,7 +142,7 @@ def contact_friction(S, W, k):
 
 @formula
 def contact_guard(S, W, sensed, lam, kind, s):
-    """Value of a guard of a place: friction that its stick has left; whether it slides its way; whether it is there."""
+    """Guard of a contact point: friction cone of sticking, direction of sliding, or edge of the contact area."""
     if kind == G_EDGE:
         held = W.modes.mode[S.switches.other[s]] != OFF
         return sensed[VALUE, S.switches.measured[s]] if held else NO_GUARD
@@ -160,7 +167,7 @@ def contact_guard(S, W, sensed, lam, kind, s):
     return turned
 
 
-REST_SPEED = 1e-9  # lengths of the mechanism, at its own rate: slower is at rest
+REST_SPEED = 1e-9  # relative to the characteristic speed: slower counts as rest
 
 
 @formula
@@ -244,7 +251,7 @@ def wrench_between_frames(S, W, t, k):
 
 @formula
 def apply_forces(S, W, t, work):
-    """Apply every force between frames to its bodies; the power of accounted ones goes to their work state."""
+    """Apply every force between frames to its bodies; write the power of accounted forces to their work rates."""
     for k in range(S.forces.F.shape[0]):
         if S.forces.family[k] != BETWEEN:
             continue
@@ -268,13 +275,13 @@ def wrench_power(F, M, force, torque):
 
 @formula
 def rest_speed(S):
-    """Sliding no faster than this [m/s] is at rest."""
+    """Speed [m/s] up to which sliding counts as rest."""
     return REST_SPEED * characteristic_speed(S).real
 
 
 @formula
 def sliding_sign(S, W, k, rate):
-    """Which way what force k acts along slides: as its switch says, where there is none by the sign of the rate."""
+    """Direction of sliding of force k: that of its switch, or else the sign of the rate."""
     s = S.forces.switch[k]
     if s < 0:
         return sign(rate)
@@ -286,7 +293,7 @@ def sliding_sign(S, W, k, rate):
 
 @formula
 def effort_along(S, W, t, k):
-    """Force k along a measured quantity, and the rate of that."""
+    """Effort of force k along its measured quantity, and the rate of that quantity."""
     m = S.forces.F[k]
     x = W.sensed[VALUE, m]
     rate = W.sensed[RATE, m]
@@ -298,7 +305,7 @@ def effort_along(S, W, t, k):
 
 @formula
 def apply_efforts(S, W, t, work, f):
-    """Add every force along a measured quantity to the generalised forces ``f``; accounted ones as in ``forces``."""
+    """Add every force along a measured quantity to the generalised forces ``f``; account power as in `apply_forces`."""
     for k in range(S.forces.F.shape[0]):
         if S.forces.family[k] != ALONG:
             if S.forces.family[k] == SLIDING:
@@ -314,7 +321,7 @@ def apply_efforts(S, W, t, work, f):
 
 @formula
 def gather_forces(S, W, f):
-    """Generalised forces: the backward sweep of body wrenches, children to parents."""
+    """Add the body wrenches to the generalised forces: a backward sweep, children to parents."""
     for d in range(f.shape[0]):
         f[d] = 0.0
     for b in range(S.tree.parent.shape[0] - 1, -1, -1):
@@ -327,26 +334,27 @@ def gather_forces(S, W, f):
             apply_wrench(W, S.tree.parent[b], 1.0, force, torque, point)
 
 
-MAX_LOAD_NEWTON = 40  # steps of Newton's method, once the slopes are known
+MAX_LOAD_NEWTON = 40  # Newton iterations, once the slopes are known
 LOAD_TOLERANCE = 1e-12  # relative
-NEGLIGIBLE_LOAD = 0.1  # times the largest force and CONVERGED: changes of loads below this are none
-TRIAL_STEP = 0.05  # part of the way to the returned load that tells the slope
-FLAT_STEP = 1e-6  # a step that changes the gap by less than this part of what was expected teaches nothing
+NEGLIGIBLE_LOAD = 0.1  # relative to the largest force and LOAD_TOLERANCE: smaller changes of loads are neglected
+TRIAL_STEP = 0.05  # fraction of the way to the returned load that is taken to measure a slope
+# a step that changes the gap by less than this fraction of the expected change does not update the slopes
+FLAT_STEP = 1e-6
 SLOPES_UNKNOWN = -1
 LOOSE_LOAD_TOLERANCE = (
-    1e-6  # where redundancy leaves a reaction open, rounding over the regularisation blurs it: good enough
+    1e-6  # accepted where redundancy leaves a reaction undetermined: rounding over the regularisation
 )
 
 
 @formula
 def loads_end(S, W):
-    """Column behind those of the loads in W.sensed."""
+    """Column of W.sensed behind the loads."""
     return 2 * count_measured(S) + W.sensed.shape[0] - INVERSE_JACOBIAN
 
 
 @formula
 def reaction_loads(S, W):
-    """Loads that follow from the reactions now in W, into row RETURNED."""
+    """Write the loads that follow from the reactions now in W to row RETURNED."""
     for k in range(S.forces.F.shape[0]):
         n = S.forces.load[k]
         if n < 0:
@@ -354,7 +362,7 @@ def reaction_loads(S, W):
         if S.forces.family[k] == SLIDING:
             s = S.forces.switch[k]
             W.sensed[RETURNED, n] = W.rows.multiplier[S.switches.row[S.switches.other[s]]]
-            if not is_sliding(S, W, s):  # nothing follows from it
+            if not is_sliding(S, W, s):  # no friction, so no load is needed
                 W.sensed[LOAD, n] = W.sensed[RETURNED, n]
             continue
         o = 0.0 * W.rows.multiplier[0]
@@ -371,19 +379,19 @@ def reaction_loads(S, W):
 
 @formula
 def static_friction_limit(S, W, k, t, arm, load):
-    """The most that friction of force k, with this arm and load, holds along its quantity at rest."""
+    """Largest force that friction k can hold along its quantity at rest, with this arm and load."""
     return load_dependent_friction(S, W, k, (t, W.sensed[VALUE, S.forces.F[k]], 0.0), arm, load, STATIC)
 
 
 @formula
 def dry_friction(S, W, k, t, rate, arm, load):
-    """How much of it there is while it slides, without what is viscous."""
+    """Magnitude of the sliding friction without its viscous part."""
     return load_dependent_friction(S, W, k, (t, W.sensed[VALUE, S.forces.F[k]], rate), arm, load, sign(rate))
 
 
 @formula
 def load_dependent_friction(S, W, k, x, arm, load, direction):
-    """What the arm adds to the effort of force k for the inputs x = (t, value, rate) of its law."""
+    """Part of the effort of force k due to the arm, for the inputs x = (t, value, rate) of its law."""
     par, kind = force_row(S.force_parameters, k), force_kind(S, k)
     laws = (force_law(S, W, k, 0, x), 0.0, direction)
     whole = effort(kind, (arm, *par[1:]), x[1], x[2], laws, load)
@@ -392,7 +400,7 @@ def load_dependent_friction(S, W, k, x, arm, load, direction):
 
 @formula
 def may_be_negative(S, n):
-    """Whether load n may be negative: a place of contact pulls from where it opens to the end of the step."""
+    """Whether load n may be negative: a contact point pulls from its opening to the end of the step."""
     for x in range(S.load_terms.load.shape[0]):
         if S.load_terms.load[x] == n:
             return S.load_terms.term[x] < 0
@@ -401,7 +409,7 @@ def may_be_negative(S, n):
 
 @formula
 def returned_loads(S, W):
-    """Loads that follow from the reactions now in W, into row RETURNED; the largest relative change."""
+    """Write the loads that follow from the reactions now in W to row RETURNED; returns the largest relative change."""
     reaction_loads(S, W)
     worst = 0.0
     small = NEGLIGIBLE_LOAD * force_scale(S, W)
@@ -419,7 +427,7 @@ def returned_loads(S, W):
 
 @formula
 def force_scale(S, W):
-    """The largest force that moves anything, or that would keep a constraint: loads far below it are rounding."""
+    """Largest force that moves a body or would be needed to satisfy a constraint, as a scale of loads."""
     size = 1e-300
     for d in range(W.velocities.solved.shape[0]):
         size = max(size, abs(W.velocities.applied[d]))
@@ -431,7 +439,7 @@ def force_scale(S, W):
 
 @formula
 def max_load_tries(W):
-    """Solves after which loads are sought once more, from none at all: one for the slope of each, then Newton's."""
+    """Number of solves after which the load iteration restarts from zero loads: one for each slope, then Newton's."""
     return W.sensed.shape[0] - INVERSE_JACOBIAN + MAX_LOAD_NEWTON
 
 
@@ -439,7 +447,7 @@ def max_load_tries(W):
 def update_loads(S, W, attempt):
     """Next loads. ``attempt`` counts from 0 within one evaluation.
 
-    Newton's method on load - returned load = 0 with Broyden's inverse Jacobian, which is learnt from a small step of
+    Newton's method on load - returned load = 0 with Broyden's inverse Jacobian. It is initialised by a small step of
     each load by itself and kept from one evaluation to the next.
     """
     first, last = 2 * count_measured(S), loads_end(S, W)
@@ -472,7 +480,7 @@ def update_loads(S, W, attempt):
 
 @formula
 def load_slopes_known(S, W):
-    """Whether the slopes of all loads are known: until then the steps are small and tell nothing of convergence."""
+    """Whether the slopes of all loads are known; before that, steps are small and do not indicate convergence."""
     return W.counts.load_updates >= W.sensed.shape[0] - INVERSE_JACOBIAN
 
 
@@ -503,12 +511,12 @@ def update_inverse_jacobian(W, first, last):
             )
 
 
-FORCE_SIZE, TORQUE_SIZE = 6, 7  # columns of their sizes, after those of their components
+FORCE_SIZE, TORQUE_SIZE = 6, 7  # columns of the magnitudes, after those of the components
 
 
 @formula
 def update_readings(S, W, t):
-    """Fill in the columns, from the solution in W."""
+    """Fill in the columns of forces that events or laws name, from the solution in W."""
     first = loads_end(S, W)
     if first == controller_column(S, W, 0):
         return
@@ -526,7 +534,7 @@ def update_readings(S, W, t):
 
 @formula
 def add_joint_wrench(S, W, at, what):
-    """Add what term ``what`` of a joint's rows does to the joint's wrench, on its second body, about M's origin."""
+    """Add the effect of term ``what`` of a joint's rows to the joint's wrench, on its second body, about M's origin."""
     force, torque = wrench_on_second(S, W, what)
     for i in range(3):
         W.sensed[VALUE, at + i] += force[i]
@@ -538,7 +546,7 @@ def add_joint_wrench(S, W, at, what):
 
 @formula
 def reading_along(S, W, t, what):
-    """What a row, a force along a quantity or a driver that prescribes does along its quantity."""
+    """Effort along its quantity of a row, of a force along a quantity, or of a driver that prescribes a coordinate."""
     nr, nk = S.rows.law.shape[0], S.forces.F.shape[0]
     if what < nr:
         return W.rows.multiplier[what]

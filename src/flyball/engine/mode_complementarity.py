@@ -1,10 +1,9 @@
 """Forces or impulses of stops, friction and other switches at an instant, as a small complementarity problem.
 
-With all of them off, the motion goes on with velocities v and accelerations a; a force along row i changes the
-accelerations by the response Y_i and the multipliers of all other rows by L_i. So u = A x + b, A = D Y, b = D a +
-bias (of impulses: b = D v). How much friction holds follows from its own law, evaluated with the load that these
-multipliers make; loads that depend on x are found together with it, the law being linearised at each try (Newton's
-method).
+With all of them off, the motion continues with velocities v and accelerations a. A force along row i changes the
+accelerations by the response Y_i and the multipliers of all other rows by L_i. So u = A x + b, A = D Y, b = D a + bias
+(of impulses: b = D v). The limit of a friction follows from its own law, evaluated with the load that these multipliers
+give; loads that depend on x are found together with it, with the law linearised at each iteration (Newton's method).
 """
 
 from __future__ import annotations
@@ -26,27 +25,28 @@ from .calls import MOTION, SOLVE, OutputBuffer
 from .element_dispatch import effort, force_kind
 from .loads import force_law, force_row, reaction_loads
 
-IMPULSES, TRIES = range(2)  # entries of Bench.asks: what x is; how often it was solved
+IMPULSES, TRIES = range(2)  # entries of ModeProblem.asks: meaning of x; number of solves
 FORCES, SUDDEN_IMPULSES, STEP_IMPULSES = range(
     3
-)  # what x is: forces, impulses in no time, or those of a short step of time
-MAX_NEWTON = 20  # steps of Newton's method at a time
-FIRST_RELAXED, MAX_RELAXED = 10, 1000  # relaxed steps where these fail: at first, and at most; each time twice as many
-IMPULSE_TOLERANCE = 1e-13  # of the largest impulse, or of that which would stop what moves
-RELAXATION = 0.2  # of the way
-IMPULSE_STEP = 1e-6  # part of an impulse that tells how loads follow it
-TERM_ROUNDING = 1e-13  # of the terms of a quantity's acceleration: their rounding
-UNBOUNDED_REACH = 1e30  # more than anything carries
-LARGE_LOAD = 1e8  # times a load, beside which what friction has besides it is nothing
+)  # meaning of x: forces, instantaneous impulses, or impulses over a short time step
+MAX_NEWTON = 20  # Newton iterations in a row
+# relaxed iterations where Newton's method fails: first number, and largest; doubled each time
+FIRST_RELAXED, MAX_RELAXED = 10, 1000
+IMPULSE_TOLERANCE = 1e-13  # relative to the largest impulse, or to the one that would stop the motion
+RELAXATION = 0.2  # fraction of a full step
+IMPULSE_STEP = 1e-6  # relative step of an impulse for the derivative of the loads
+TERM_ROUNDING = 1e-13  # rounding of a quantity's acceleration, relative to its terms
+UNBOUNDED_REACH = 1e30  # larger than any impulse
+LARGE_LOAD = 1e8  # factor on a load, beside which the load-independent part of friction is negligible
 
 
 FREE_MOTION, SOLVE_MODES, RESUME_SOLVE, STORE_RATES = range(4)  # tasks of `mode_kernel`
-RATE_ROUNDING = 1e-11  # of the terms of a rate: their rounding
-VELOCITY_ROUNDING = 1e-14  # of the fastest velocity: the same, whatever the terms
+RATE_ROUNDING = 1e-11  # rounding of a rate, relative to its terms
+VELOCITY_ROUNDING = 1e-14  # likewise, relative to the fastest velocity, whatever the terms
 
 
 class EngineCall(NamedTuple):
-    """What the engine is asked with."""
+    """Arguments of a call of the engine."""
 
     address: Int1  # (1,): of the engine
     R: Tableau
@@ -55,25 +55,25 @@ class EngineCall(NamedTuple):
 
 
 class ModeProblem(NamedTuple):
-    """Rows of the small problem, by the switches that they are of, and what each does to everything."""
+    """Rows of the small problem, their switches, and the response of the mechanism to each."""
 
     which: Int1  # (n,): switch of each row
-    sign: Float1  # (n,): +1, or -1 where the row is turned round: what pushes against an upper side
-    way: Float1  # (n,): what friction is asked for: STATIC, or the way it slides; 0: its reach stands in the problem
-    rate: Float1  # (n,): at which it slides
-    Y: Float2  # (n, nv): accelerations by a unit force
+    sign: Float1  # (n,): +1, or -1 where the row is reversed, as for a force on an upper bound
+    way: Float1  # (n,): friction mode: STATIC, or the direction of sliding; 0: the limit is fixed in the problem
+    rate: Float1  # (n,): rate at which it slides
+    Y: Float2  # (n, nv): accelerations due to a unit force
     L: Float2  # (n, nr): multipliers
-    E: Float2  # (n, nv): efforts of what drivers prescribe
+    E: Float2  # (n, nv): efforts of prescribed coordinates
     free: Float1  # (nv,): accelerations with everything off
-    loaded: Float1  # (nr,): multipliers with everything off, or of impulses that went before
+    loaded: Float1  # (nr,): multipliers with everything off, or of the impulses before
     asks: Int1  # (2,)
-    step: Float1  # (1,): the step of time
-    seen: Float1  # (n,): impulses of the try before
-    now: Float1  # (n,): what friction holds at them
+    step: Float1  # (1,): the time step
+    seen: Float1  # (n,): impulses of the previous iteration
+    now: Float1  # (n,): friction limits at them
 
 
 def empty_mode_problem(n: int, nv: int, nr: int) -> ModeProblem:
-    """Room for n rows."""
+    """Zeroed problem of n rows."""
     z = np.zeros
     i = np.int64
     return ModeProblem(
@@ -83,7 +83,7 @@ def empty_mode_problem(n: int, nv: int, nr: int) -> ModeProblem:
 
 @formula
 def store_free_motion(address, S, W, R, clock, output, B, P):
-    """The motion with everything off, and what every row does: A, b of the problem. Returns a status."""
+    """Compute the motion with everything off and the response of every row: A, b of the problem. Returns a status."""
     status = call(address, S, W, R, clock, output, MOTION)
     for d in range(W.velocities.solved.shape[0]):
         B.free[d] = W.velocities.solved[d]
@@ -103,7 +103,7 @@ def store_free_motion(address, S, W, R, clock, output, B, P):
         P.grain[i] = TERM_ROUNDING * size
         for j in range(B.which.shape[0]):
             P.A[i, j] = B.sign[i] * gradient_times(S, W, m, B.Y[j])
-    for i in range(B.which.shape[0]):  # it is symmetric but for rounding
+    for i in range(B.which.shape[0]):  # symmetric except for rounding
         for j in range(i):
             P.A[i, j] = P.A[j, i] = 0.5 * (P.A[i, j] + P.A[j, i])
     return 0
@@ -138,7 +138,7 @@ def store_row_response(address, S, W, R, clock, output, B, i):
 
 @formula
 def friction_reach(S, W, t, B, i, load):
-    """What friction of row i holds, or slides with, under a load; of an impulse what it adds to no load."""
+    """Limit of the friction of row i under a load, or its sliding force; for impulses only the part due to the load."""
     k = S.switches.force[B.which[i]]
     x = W.sensed[VALUE, S.forces.F[k]]
     first = force_law(S, W, k, 0, (t, x, B.rate[i]))
@@ -155,7 +155,7 @@ def friction_reach(S, W, t, B, i, load):
 
 @formula
 def friction_load(S, W, i, B):
-    """Load of row i's friction by the multipliers in W; 0 if none."""
+    """Load of row i's friction from the multipliers in W; 0 if none."""
     k = S.switches.force[B.which[i]]
     n = S.forces.load[k]
     return W.sensed[RETURNED, n] if n >= 0 else 0.0
@@ -163,7 +163,7 @@ def friction_load(S, W, i, B):
 
 @formula
 def update_multipliers(S, W, B, P, j, more):
-    """Multipliers of all rows under the impulses of P, that of row j being ``more``."""
+    """Multipliers of all rows under the impulses of P, with ``more`` added to that of row j."""
     for k in range(S.rows.law.shape[0]):
         s = B.loaded[k]
         for i in range(B.which.shape[0]):
@@ -174,7 +174,7 @@ def update_multipliers(S, W, B, P, j, more):
 
 @formula
 def impulse_step(B, P, j):
-    """An impulse of row j that is small beside what they all are."""
+    """Impulse of row j that is small relative to the size of all."""
     size = 0.0
     for i in range(B.which.shape[0]):
         d = root_diagonal(P, i)
@@ -184,13 +184,13 @@ def impulse_step(B, P, j):
 
 @formula
 def root_diagonal(P, i):
-    """Square root of A's diagonal, by which impulses of different units compare; 1 where nothing moves."""
+    """Square root of A's diagonal entry, which scales impulses of different units; 1 where nothing moves."""
     return sqrt(P.A[i, i]) if P.A[i, i] > 0.0 else 1.0
 
 
 @formula
 def update_friction_reaches(S, W, t, B, P):
-    """How much every friction holds at the impulses of P, and how that follows them. Returns whether it does."""
+    """Friction limits at the impulses of P, and their derivatives. Returns whether some limit depends on them."""
     n, follows = B.which.shape[0], False
     update_multipliers(S, W, B, P, -1, 0.0)
     for i in range(n):
@@ -216,16 +216,16 @@ def update_friction_reaches(S, W, t, B, P):
 
 @formula
 def solve_mode_problem(S, W, t, B, P):
-    """The problem solved, with what friction holds by what it carries. How it ended stands in ``P.info``.
+    """Solve the problem together with the friction limits that depend on its loads. The outcome is in ``P.info``.
 
-    Newton's method, which from no loads leads to the smallest of several solutions. Where a step of it has no solution,
-    or it runs in circles, relaxed fixed-point iterations lead on, and it is tried again from there.
+    Newton's method, which from zero loads leads to the smallest of several solutions. Where one of its steps has no
+    solution, or it cycles, relaxed fixed-point iterations follow, and Newton's method is tried again from there.
     """
     n, loads = B.which.shape[0], False
     for i in range(n):
         P.x[i] = 0.0
         loads = loads or (B.way[i] != 0.0 and S.forces.load[S.switches.force[B.which[i]]] >= 0)
-    if loads and B.asks[IMPULSES] != FORCES:  # without impulses loads have no slope: begin with what would hold
+    if loads and B.asks[IMPULSES] != FORCES:  # loads have no slope at zero impulses: start with unbounded friction
         for i in range(n):
             if B.way[i] != 0.0:
                 P.const[i] = UNBOUNDED_REACH
@@ -258,9 +258,9 @@ def solve_mode_problem(S, W, t, B, P):
 
 @formula
 def relax_impulses(S, W, t, B, P):
-    """A part of the way to the impulses that go with the present reaches (Krasnoselskii's iteration, 1955).
+    """Move part of the way to the impulses at the present friction limits (Krasnoselskii's iteration, 1955).
 
-    With given reaches the problem has a solution, whatever the friction.
+    With given limits the problem has a solution, whatever the friction.
     """
     update_multipliers(S, W, B, P, -1, 0.0)
     for i in range(B.which.shape[0]):
@@ -276,7 +276,7 @@ def relax_impulses(S, W, t, B, P):
 
 @formula
 def store_switch_rates(S, W, y, B):
-    """Value, rate, and rounding of the rate, of the quantities of B's switches, into ``now``, ``rate``, ``seen``."""
+    """Store value, rate, and rounding of the rate, of the quantities of B's switches in ``now``, ``rate``, ``seen``."""
     nq, most = S.sizes.coordinates, 0.0
     for d in range(W.velocities.solved.shape[0]):
         most = max(most, magnitude(y[nq + d]))
@@ -294,7 +294,7 @@ def store_switch_rates(S, W, y, B):
 
 @kernel
 def mode_kernel(S: System, W: Work, engine_call: EngineCall, B: ModeProblem, P: DenseProblem, task: int) -> int:
-    """What is done at an instant, by its task: BARE, BALANCE, AGAIN (the problem from the states in it), LOOK."""
+    """Run a task: FREE_MOTION, SOLVE_MODES, RESUME_SOLVE (P from the states in it), STORE_RATES."""
     if task == SOLVE_MODES:
         solve_mode_problem(S, W, engine_call.clock.real.t, B, P)
         return P.info[OUTCOME]

@@ -1,19 +1,18 @@
 """The motion as an ordinary differential equation dy/dt = f(P(y)), y = (q, v, z), and prescribed motion.
 
-z are works, turned angles and places on curves. Index 1: [M G^T; G 0] [vdot; -lam] = [f; gamma]. The constraints g
-= 0 and G v = nu are kept by one smooth projection P, along M^-1 G^T or along dependent coordinates; the integrator
-sees f(P(y)), so its order is kept.
+z are works, turned angles and places on curves. Index 1: [M G^T; G 0] [vdot; -lam] = [f; gamma]. The constraints g = 0
+and G v = nu are maintained by one smooth projection P, along M^-1 G^T or along dependent coordinates. The integrator
+integrates f(P(y)), so its order is preserved.
 
-Sliding motion on the corner of a law (both sides lead towards it): the side of the corner, a number between -1 and
-1, is such that du/dt = 0 (Filippov, *Differential Equations with Discontinuous Righthand Sides*, 1988, section 4).
-Accelerations depend on it by one more solve; it is found by Newton's method with Broyden's slopes, which are kept
-from one evaluation to the next. Where du/dt does not follow from the sides and is zero, d^2u/dt^2 is kept at zero
-(sliding of second order: Levant, *International Journal of Control* 58, 1993): the switch is STEADY.
+Sliding motion on a nonsmooth point of a law (both sides lead towards it): the side, a number between -1 and 1, is such
+that du/dt = 0 (Filippov, *Differential Equations with Discontinuous Righthand Sides*, 1988, section 4). Accelerations
+depend on the side, at the cost of one more solve for each trial. It is found by Newton's method with Broyden's slopes,
+which are kept from one evaluation to the next. Where du/dt does not depend on the sides and is zero, d^2u/dt^2 is kept
+at zero (sliding of second order: Levant, *International Journal of Control* 58, 1993): the switch is STEADY.
 
-Where drivers leave no freedom nothing is integrated, so nothing drifts: positions are predicted by the cubic
-through the last two velocities and accelerations and corrected by Newton's method; where the prediction is far off
-the step is halved, so that no step leads to another branch. Rows are written at all times stepped on, with powers
-in place of works.
+Where drivers leave no freedom nothing is integrated, so nothing drifts. Positions are predicted by the cubic through
+the last two velocities and accelerations and corrected by Newton's method. Where the prediction is far off the step is
+halved, so that no step leads to another branch. Rows are written at all step times, with powers in place of works.
 """
 
 from __future__ import annotations
@@ -64,7 +63,7 @@ from .solve import MAX_REFINEMENTS, exchange_coordinates, factor, reuse_factor, 
 
 ALONG_MOTION = -1  # derivative along the motion
 MAX_CORNER_PASSES = 40
-SETTLED_CHANGE = 1e-13  # change of a side that is none
+SETTLED_CHANGE = 1e-13  # change of a side that counts as none
 FLAT_CHANGE = 1e-9
 
 
@@ -85,7 +84,7 @@ def held_on_any_corner(S, W):
 
 @formula
 def corner_rates(S, W, t):
-    """How fast u of each corner changes, or its rate, with the accelerations at hand, into row DRIFT_OFF."""
+    """Write du/dt of each corner, or for STEADY ones d^2u/dt^2, at the present accelerations to `W.modes.drift`."""
     nr = S.rows.law.shape[0]
     nm = count_measured(S)
     for m in range(nm):
@@ -114,7 +113,7 @@ def corner_rates(S, W, t):
 
 @formula
 def corners_settled(S, W, t, n):
-    """Whether u stays zero on all corners that hold the motion; if not, their sides are moved. n counts the passes."""
+    """Whether u stays zero on all corners that hold the motion; if not, update their sides. n counts the passes."""
     corner_rates(S, W, t)
     ns = S.switches.row.shape[0]
     if n > 0:
@@ -174,9 +173,10 @@ NOT_FINITE, JAMMED, SINGULAR = 3, 4, 5
 
 @formula
 def prescribed_deviation(S, W, t, q, v):
-    """How far prescribed coordinates and velocities are from their laws, relative to the mechanism's size and speed.
+    """Largest relative deviation of prescribed coordinates and velocities from their laws.
 
-    They come from the derivatives of the laws: where these are not the whole truth, a law jumps.
+    It is relative to the mechanism's size and speed. The coordinates come from the laws' derivatives: a deviation shows
+    that a law jumps.
     """
     worst = 0.0
     for b in range(S.tree.parent.shape[0]):
@@ -185,7 +185,7 @@ def prescribed_deviation(S, W, t, q, v):
             f, f1, _ = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
             way = f - S.bodies.offset[b] - q[S.tree.q[b]]
             size = S.scales.length
-            if S.tree.joint[b] == REVOLUTE:  # its whole turns are the law's own
+            if S.tree.joint[b] == REVOLUTE:  # whole turns are those of the law
                 way = atan2(sin(way), cos(way))
                 size = 0.0 * size + 1.0
             rate = magnitude(f1 - v[S.tree.v[b]]) / (size * S.scales.rate + magnitude(f1))
@@ -195,7 +195,10 @@ def prescribed_deviation(S, W, t, q, v):
 
 @formula
 def accelerate(S, W, t, p, dy, factored):
-    """Dy at the settled state p, whose kinematics and rows are in W; vdot and lam are left in W. Returns a status."""
+    """Write the derivative of the projected state p, whose kinematics and rows are in W, to ``dy``.
+
+    vdot and lam are left in W. Returns a status.
+    """
     nq = S.sizes.coordinates
     nv = W.velocities.solved.shape[0]
     v = p[nq : nq + nv]
@@ -205,14 +208,14 @@ def accelerate(S, W, t, p, dy, factored):
         b = W.options.beta * W.options.beta
         for k in range(S.rows.law.shape[0]):
             W.rows.gamma[k] -= a * (row_times(S, W, k, v) - W.rows.nu[k]) + b * W.rows.value[k]
-    if W.options.partitioned > 0.0:  # from here on with the masses
+    if W.options.partitioned > 0.0:  # from here on with all masses
         W.options.partitioned = 0.0
         factored = FACTOR_OLD
     if factored == FACTOR_NEAR:
         if S.sizes.solver == SCHUR:
             reuse_factor(S, W)
         else:
-            factored = FACTOR_OLD  # M is another one here
+            factored = FACTOR_OLD  # M has changed
     for n in range(MAX_CORNER_PASSES):
         status, factored = solve_accelerations(S, W, t, p, work, factored)
         if status != 0:
@@ -225,10 +228,10 @@ def accelerate(S, W, t, p, dy, factored):
 
 @formula
 def solve_accelerations(S, W, t, p, work, factored):
-    """Accelerations and multipliers into W, with the loads of joints that return themselves: (status, factored)."""
+    """Accelerations and multipliers into W, with consistent loads of friction. Returns (status, factored)."""
     x = W.velocities.solved
     change = 1e300
-    # joints with friction need the solution to know their loads: again until these return themselves
+    # friction loads depend on the solution: iterate until they are consistent
     most = 2 * max_load_tries(W)
     for attempt in range(most):
         update_controllers(S, W, t, p[S.sizes.coordinates + W.velocities.solved.shape[0] :], work)
@@ -260,7 +263,7 @@ def solve_accelerations(S, W, t, p, work, factored):
 
 @formula
 def apply_all_forces(S, W, t, p, work):
-    """Generalised forces into `W.velocities.applied`, and what accounted ones do."""
+    """Generalised forces into `W.velocities.applied`, and the powers of accounted forces into ``work``."""
     if W.made[LOADS] != 0:
         call_generated(W.made[LOADS], S, W, t, p, work, p, work)
         return
@@ -272,7 +275,7 @@ def apply_all_forces(S, W, t, p, work):
 
 @formula
 def store_derivative(S, W, t, p, dy):
-    """Dy at the state p from the solution in W. Returns a status."""
+    """Write the derivative of the state p, from the solution in W, to ``dy``. Returns a status."""
     nq = S.sizes.coordinates
     nv = W.velocities.solved.shape[0]
     x = W.velocities.solved
@@ -301,9 +304,9 @@ def store_derivative(S, W, t, p, dy):
 
 @formula
 def solve_response(S, W, f, gamma, x, lam):
-    """Accelerations x and multipliers that other forces and right-hand sides of the rows make at the state in W.
+    """Solve for accelerations x and multipliers due to forces f and right-hand sides gamma at the state in W.
 
-    Prescribed velocities do not change; what that takes is left in `W.velocities.effort`.
+    Prescribed velocities do not change; the efforts needed for that are left in `W.velocities.effort`.
     """
     for d in range(x.shape[0]):
         W.velocities.prescribed[d] = 0.0
@@ -316,7 +319,7 @@ def solve_response(S, W, f, gamma, x, lam):
 
 @formula
 def finite_status(dy):
-    """0, or NOT_FINITE."""
+    """0, or NOT_FINITE if an entry is not finite."""
     s = 0.0
     for i in range(dy.shape[0]):
         s += (dy[i] - dy[i]).real
@@ -325,7 +328,7 @@ def finite_status(dy):
 
 @formula
 def derivative(t, y, dy, S, W):
-    """dy/dt = f(P(y)) with P the projection; ``y`` is left as it is. Returns 0 or a status."""
+    """dy/dt = f(P(y)) with the projection P; ``y`` is not changed. Returns 0 or a status."""
     nq = S.sizes.coordinates
     p = W.y[0]
     for i in range(y.shape[0]):
@@ -359,7 +362,7 @@ def project_and_evaluate(t, y, dy, S, W):
     found = 0.0
     factored = FACTOR_OLD
     fault = W.stack.shape[0] - STACK_RESERVE
-    if W.stack[fault, 0].real > 0.0:  # overcome: the step that met it was taken again, shorter
+    if W.stack[fault, 0].real > 0.0:  # overcome: the step with the fault was repeated with a shorter one
         W.stack[fault, 0] = -W.stack[fault, 0]
     set_prescribed(S, W, t, q, v)
     if W.options.stabilization >= STEPS:
@@ -384,7 +387,7 @@ def project_and_evaluate(t, y, dy, S, W):
 def report_state(t, y, out, S, W):
     """Write t, the state (projected first), vdot and lam to a row of the output.
 
-    Where accelerations are deferred vdot and lam stay open.
+    Where accelerations are deferred, vdot and lam are not written.
     """
     W.options.placed = W.options.deferred
     status, _ = project_and_evaluate(t, y, W.y[1], S, W)
@@ -395,7 +398,7 @@ def report_state(t, y, out, S, W):
 
 @formula
 def write_row(t, y, out, S, W):
-    """Write t, the state y that W was last evaluated at, vdot, lam and the efforts of prescribed coordinates."""
+    """Write t, the state y at which W was last evaluated, vdot, lam and the efforts of prescribed coordinates."""
     nq = S.sizes.coordinates
     nv = W.velocities.solved.shape[0]
     ny = y.shape[0]
@@ -420,23 +423,24 @@ def write_row(t, y, out, S, W):
 
 
 STEP_REMAINDER = 1.0 - 1e-6
-LAW_TOLERANCE = 1e-6  # part of its change by which the change of a law may differ from that of its derivatives
+LAW_TOLERANCE = 1e-6  # relative deviation of a law's change from the integral of its derivatives that is accepted
 JUMP_WIDTH, JUMP_SLOPE = (
     1e-10,
     10.0,
-)  # a law that leaps changes over this part of the time span by more than this times its slope
+)  # a jump is a change within this fraction of the time span by more than this factor times the slope
 TINY_CHANGE, TINY_RATE = (
     1e-12,
     1e-9,
-)  # changes of laws that are nothing: of the mechanism's size, of that in the time span
-FAR_PREDICTION = 1e-2  # a prediction that misses positions or velocities by this part of them was for too long a step
+)  # negligible changes of laws: relative to the mechanism's size, and to that per time span
+FAR_PREDICTION = 1e-2  # a relative error of the predicted positions or velocities above this: the step was too long
 
 
 @formula
 def follow_drivers(S, W, c, out):
-    """Go on until the end, or until the buffer ``out`` is full or the quota is used. Returns rows written.
+    """Continue the prescribed motion until the end, or until ``out`` is full or the quota is used.
 
-    ``c`` is the clock of the integrators; rows 0 and 1 of ``c.K`` hold derivatives now and at the step before.
+    ``c`` is the integrator state; rows 0 and 1 of ``c.K`` hold the derivatives now and at the step before. Returns the
+    number of rows written.
     """
     used = 0
     c.count.status = RUNNING
@@ -462,7 +466,7 @@ def follow_drivers(S, W, c, out):
         goal = c.times[c.count.next] if c.count.next < c.times.shape[0] else c.real.t_end
         left = goal - c.real.t
         h = c.real.max_growth * min(left, c.real.h_max)
-        lands = h > STEP_REMAINDER * left  # no sliver is left over for the next step
+        lands = h > STEP_REMAINDER * left  # no tiny remainder is left for the next step
         if lands:
             h = left
         if h < 1e-14 * max(abs(c.real.t), c.real.largest):
@@ -488,7 +492,7 @@ def follow_drivers(S, W, c, out):
 
 @formula
 def any_law_jumps(S, W, t, h, span):
-    """Whether a driver's law does more over a step than its derivatives say: it may jump there, or have a kink."""
+    """Whether a driver's law may jump or have a kink within a step: its derivatives do not explain its change."""
     for b in range(S.tree.parent.shape[0]):
         law = S.tree.law[b]
         if law >= 0 and law_jumps(S, W, law, t, h, span, S.tree.joint[b] == REVOLUTE):
@@ -502,9 +506,10 @@ def any_law_jumps(S, W, t, h, span):
 
 @formula
 def law_jumps(S, W, law, t, h, span, turns):
-    """Whether value and rate of a law change over a step by something else than what their derivatives add up to.
+    """Whether value and rate of a law change over a step by something else than the integral of their derivatives.
 
-    By Hermite's and Simpson's rule, to EVEN; over a step that cannot be much shorter, by more than they can add up to.
+    By Hermite's and Simpson's rules, to `LAW_TOLERANCE`. Over a step that cannot be much shorter: by more than the
+    largest derivatives allow.
     """
     if is_entire(S.code, law):
         return False
@@ -526,7 +531,7 @@ def law_jumps(S, W, law, t, h, span, turns):
 
 @formula
 def predict_state(S, c, h):
-    """State after h into c.y[1]: velocities by the cubic that fits the last two, positions by its integral."""
+    """Predict the state after h in c.y[1]: velocities by the cubic through the last two, positions by its integral."""
     nq = S.sizes.coordinates
     y, new, now, before = c.y[0], c.y[1], c.K[0], c.K[1]
     last = c.real.h
@@ -563,7 +568,7 @@ def predict_state(S, c, h):
 
 @formula
 def write_prescribed_row(c, out, S, W):
-    """A row of the output at the present state, with powers for works."""
+    """Write a row of the output at the present state, with powers in place of works."""
     write_row(c.real.t, c.y[0], out, S, W)
     for k in range(c.integrals.shape[0]):
         out[1 + c.integrals[k]] = c.K[0, c.integrals[k]]
@@ -571,7 +576,7 @@ def write_prescribed_row(c, out, S, W):
 
 @formula
 def accept_prescribed_step(c, t, h):
-    """Make the state in the making the present one."""
+    """Replace the present state by the trial state."""
     for i in range(c.y.shape[1]):
         c.K[1, i] = c.K[0, i]
         c.K[3, i] = c.y[0, i]

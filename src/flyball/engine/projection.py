@@ -1,7 +1,7 @@
 """Projection on the constraints: positions on g = 0, velocities on G v = nu, errors on the tangent space.
 
-Coordinates of tree joints that drivers prescribe are set from their laws first. What is projected, and when, is the
-choice of stabilisation (none, Baumgarte, at steps or stages, positions or velocities only, coordinate
+Coordinates of tree joints that drivers prescribe are set from their laws first. The choice of stabilisation determines
+what is projected, and when (none, Baumgarte, at steps or stages, positions or velocities only, coordinate
 partitioning).
 """
 
@@ -27,7 +27,7 @@ from .solve import MAX_REFINEMENTS, factor, reuse_factor, solve
 
 @formula
 def set_prescribed(S, W, t, q, v):
-    """Unit quaternions; prescribed coordinates, velocities and accelerations as their laws say."""
+    """Normalise quaternions; set prescribed coordinates, velocities and accelerations from their laws."""
     if W.made[PREPARE] != 0:
         call_generated(W.made[PREPARE], S, W, t, q, v, q, v)
         return
@@ -45,18 +45,21 @@ NONE, BAUMGARTE, STEPS, STAGES, POSITIONS, VELOCITIES, PARTITIONING = range(7)
 NOT_CLOSED = 2  # a status
 FACTOR_OLD, FACTOR_NEAR, FACTOR_CURRENT = range(3)
 MAX_PASSES = 16
-TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
-METRE = 1.0  # [m] or, if less, the mechanism's length: at its own rate what slower rows are measured by
-CLOSED_POSITIONS = 1e-9  # a projection that comes to rest above this has failed, if rounding is less
-LAST_DIGIT = 1e-15  # times the distance from the origin: what rounding leaves of a violation
-SLOW_CONVERGENCE = 0.1  # a Newton step that gains less than this wants a new factor
-STALE_RESIDUAL = 10.0  # times the tolerance of the solve: a residual above this after refinement wants a new factor
-HOPELESS_VIOLATION = 1e3  # a state this far off is given up at once
+TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are not corrected
+# [m] or, if less, the mechanism's length: times the characteristic rate, it scales violations of slow velocities
+METRE = 1.0
+CLOSED_POSITIONS = 1e-9  # a projection that stalls above this has failed, unless rounding is larger
+LAST_DIGIT = 1e-15  # times the distance from the origin: rounding of a violation
+# a Newton step that reduces the violation to no less than this fraction is followed by a new factorisation
+SLOW_CONVERGENCE = 0.1
+# times the tolerance of the solve: a residual above this after refinement requires a new factorisation
+STALE_RESIDUAL = 10.0
+HOPELESS_VIOLATION = 1e3  # a state with a larger violation is given up at once
 
 
 @formula
 def update_positions(S, W, t, q, z):
-    """Poses, and the constraint rows as far as they follow from them: g, G, nu. ``z`` tells angles their turns."""
+    """Update poses and the position-dependent part of the rows: g, G, nu. ``z`` holds the turns of angles."""
     W.counts.evaluations += 1
     if W.made[PLACE] != 0:
         call_generated(W.made[PLACE], S, W, t, q, z, q, z)
@@ -67,7 +70,7 @@ def update_positions(S, W, t, q, z):
 
 @formula
 def update_velocities(S, W, t, v, z):
-    """Velocities and bias accelerations at the poses in W, and what follows from them: gamma, measured rates."""
+    """Update velocities and bias accelerations at the poses in W, and what follows from them: gamma, measured rates."""
     if W.made[MOVE] != 0:
         call_generated(W.made[MOVE], S, W, t, v, z, v, z)
     else:
@@ -77,7 +80,7 @@ def update_velocities(S, W, t, v, z):
 
 @formula
 def position_violation(W, out):
-    """Largest |g| (its row goes to `W.counts.guilty_row`) and -g into ``out``."""
+    """Largest |g|; its row goes to `W.counts.guilty_row`, and -g to ``out``."""
     worst = 0.0
     for k in range(out.shape[0]):
         g = W.rows.value[k]
@@ -91,14 +94,14 @@ def position_violation(W, out):
 
 @formula
 def update_shown_frames(S, W, q):
-    """Poses of frames as far as others look at them, where code made for the mechanism has not needed them."""
+    """Update the poses of frames that only results need, where the generated code has left them out."""
     if W.made[SHOW] != 0:
         call_generated(W.made[SHOW], S, W, 0.0, q, q, q, q)
 
 
 @formula
 def position_rounding(S, W, q):
-    """What rounding leaves of the largest violation: the last digit of the frames' distances from the origin."""
+    """Rounding of the largest violation: the last digit of the frames' distances from the origin."""
     update_shown_frames(S, W, q)
     far = 0.0
     for f in range(W.FK.shape[0]):
@@ -109,7 +112,7 @@ def position_rounding(S, W, q):
 
 @formula
 def velocity_violation(S, W, v, out):
-    """Largest |G v - nu|, the size of its largest term, and nu - G v into ``out``."""
+    """Largest |G v - nu| and the size of its largest term; nu - G v goes to ``out``."""
     if W.made[DRIFT] != 0:
         worst = call_generated(W.made[DRIFT], S, W, 0.0, v, out, v, out)
         return worst, W.flat[TERMS]
@@ -128,17 +131,17 @@ def velocity_violation(S, W, v, out):
 
 @formula
 def project_state(S, W, t, q, v, z, tol_g, tol_v):
-    """Put q on g = 0 and v on G v = nu, in place, and leave kinematics and rows there.
+    """Project q on g = 0 and v on G v = nu, in place, and leave kinematics and rows there.
 
-    Along M^-1 G^T, or along dependent coordinates alone. Accepted states are taken down to rounding: near a singular
-    position a violation e, left standing at a distance s, is a mechanism with other lengths, whose motion leaves the
-    true one with the acceleration 2 e v^2 / s^3. One factor serves as long as it does.
+    The projection is along M^-1 G^T, or along dependent coordinates alone. Accepted states are projected to rounding:
+    near a singular position, a violation e left at a distance s amounts to a mechanism with other lengths, whose motion
+    leaves the true one with the acceleration 2 e v^2 / s^3. A factor is reused as long as it is accurate enough.
 
-    Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, what the factor in W is:
-    OLD, of poses NEARby or of those HERE).
+    Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, the state of the factor in
+    W: FACTOR_OLD, FACTOR_NEAR (of poses near by) or FACTOR_CURRENT).
     """
     W.options.partitioned = 1.0 if W.options.stabilization == PARTITIONING else 0.0
-    still = W.options.placed > 0.0  # nobody asks for accelerations there
+    still = W.options.placed > 0.0  # accelerations are not needed
     if S.rows.law.shape[0] == 0 and still and S.angles.F.shape[0] == 0:
         return 0, 0.0, FACTOR_OLD
     update_positions(S, W, t, q, z)
@@ -158,7 +161,7 @@ def project_state(S, W, t, q, v, z, tol_g, tol_v):
         status, lost, factored = project_velocities(S, W, v, tol_v, factored)
         if status != 0:
             return status, found, FACTOR_OLD
-    else:  # positions follow the violated velocities and are put back: that is no error of the step
+    else:  # positions follow the violated velocities and are corrected: that is not an error of the step
         found = 0.0
     if not still:
         update_velocities(S, W, t, v, z)
@@ -167,9 +170,9 @@ def project_state(S, W, t, q, v, z, tol_g, tol_v):
 
 @formula
 def project_positions(S, W, t, q, z, tol_g):
-    """Put q on g = 0 by Newton, until |g| passes, or until it is as small as rounding lets it be.
+    """Project q on g = 0 by Newton's method, until |g| passes or is as small as rounding allows.
 
-    Kinematics and rows are those of q, before and after. Returns (status, the violation found, what the factor is).
+    Kinematics and rows are those of q before and after. Returns (status, the violation found, the state of the factor).
     """
     none = W.velocities.applied
     step = W.velocities.scratch_3
@@ -193,7 +196,7 @@ def project_positions(S, W, t, q, z, tol_g):
             reuse_factor(S, W)
         last = worst
         left = solve(S, W, none, r, step, W.rows.residual, False, MAX_REFINEMENTS)
-        if factored == FACTOR_NEAR and left > SLOW_CONVERGENCE:  # too far from where it was made to serve
+        if factored == FACTOR_NEAR and left > SLOW_CONVERGENCE:  # too far from the poses of the factor
             if factor(S, W) != 0:
                 return NOT_CLOSED, found, FACTOR_OLD
             solve(S, W, none, r, step, W.rows.residual, False, MAX_REFINEMENTS)
@@ -209,7 +212,10 @@ def project_positions(S, W, t, q, z, tol_g):
 
 @formula
 def project_velocities(S, W, v, tol_v, factored):
-    """Put v on G v = nu. Returns (status, the violation found relative to size and speed, what the factor is)."""
+    """Project v on G v = nu.
+
+    Returns (status, the violation found relative to size and speed, the state of the factor).
+    """
     none = W.velocities.applied
     step = W.velocities.scratch_3
     r = W.rows.scratch_2
@@ -233,9 +239,10 @@ def project_velocities(S, W, v, tol_v, factored):
 
 @formula
 def project_error(y, e, S, W):
-    """Take from an error e of the state y, where W was last evaluated, what its projection takes: what leads off.
+    """Remove the part of an error e that the projection of the state y removes; W was last evaluated at y.
 
-    Near a singular position rounding is large along what the constraints forbid, and small along what they allow.
+    Near a singular position rounding is large along the directions that the constraints forbid, and small along those
+    that they allow.
     """
     choice = W.options.stabilization
     if S.rows.law.shape[0] == 0 or choice < STEPS or choice == PARTITIONING:
@@ -252,7 +259,7 @@ def project_error(y, e, S, W):
 
 @formula
 def project_tangent(S, W, v):
-    """Take from v what changes the constraints, with the factor in W."""
+    """Remove from v the part that changes the constraints, with the factor in W."""
     r = W.rows.scratch_2
     for b in range(S.tree.parent.shape[0]):
         if S.tree.law[b] >= 0:

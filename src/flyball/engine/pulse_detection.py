@@ -1,10 +1,10 @@
-"""Inspection of laws within a step: a pulse, a thin wall, a table's corner that no stage of the step has met.
+"""Inspection of laws within a step, to find pulses, thin walls or corners of tables between the stages of the step.
 
-Each law that can act briefly is sampled along the step, its inputs along the cubics through their values and rates
-at the ends. Where it departs from the polynomial through eight of its values, the place is reported; the integrator
-decides whether that matters. Samples are dense relative to the whole time span, so that their number is bounded:
-what is shorter than a `SAMPLES`-th of the span may fall between them. A force whose formula breaks somewhere (a
-rotation vector at half a turn) has to be on one branch of it at both ends of the step.
+Each law that can act briefly is sampled along the step; its inputs follow the cubics through their values and rates at
+the ends. Where it departs from the polynomial through eight of its values, the place is reported, and the integrator
+decides whether that matters. The number of samples is relative to the whole time span and so bounded: what is shorter
+than a `SAMPLES`-th of the span may fall between them. A force whose formula is discontinuous somewhere (a rotation
+vector at half a turn) must be on the same branch at both ends of the step.
 """
 
 from __future__ import annotations
@@ -31,39 +31,39 @@ from .kinematics import load_record
 from .loads import force_row
 from .rows import BY_TIME, count_measured
 
-SAMPLES = 20000  # of a law over the whole time span, in steps that are wide
-MIN_SAMPLES = 8  # in any step
-NODES = 8  # values of a law that tell what to expect of it: at Chebyshev's points, ends included
-LAWS = 3  # of a force
-BRANCH_NUMBERS = 5  # numbers that say on which branch of its formula a force is, and how fast it turns
-MAX_TURN = 2.0  # turning within a step [rad] up to which the ends tell that
-UNBOUNDED = np.inf  # how long a place of no formula lasts: no width of step is right
-DEPARTURE = 1e-3  # part of a law's change over the step by which it may differ from what is expected
-LAW_ROUNDING = 1e-9  # part of its size that is nothing
-# rows of Clock.seen: sensors within the step; (sensors and inputs of forces, and rates, at its start and end;) nodes
-# (1 for each law that is looked at)
+SAMPLES = 20000  # samples of a law over the whole time span, in long steps
+MIN_SAMPLES = 8  # samples in any step
+NODES = 8  # values of a law that the expected polynomial is fitted to, at Chebyshev points with the ends included
+LAWS = 3  # laws of each force
+BRANCH_NUMBERS = 5  # numbers that describe the branch of a force's formula, and how fast it turns
+MAX_TURN = 2.0  # rotation within a step [rad] up to which the ends identify the branch
+UNBOUNDED = np.inf  # duration reported at a change of branch: no step is short enough
+DEPARTURE = 1e-3  # accepted deviation from the polynomial, relative to the law's change over the step
+LAW_ROUNDING = 1e-9  # likewise, relative to the law's size: rounding
+# rows of StepState.seen: sensors within the step; sensors and inputs of forces and their rates, at its start and at its
+# end; values at the nodes; 1 for each law that is inspected
 INPUTS_WITHIN, NODE_VALUES, LAW_SELECTED, INSPECTION_ROWS = 0, 5, 6, 7
 
 
 def law_starts(S) -> np.ndarray:
-    """Where each law begins in the code, by its number (see `law_at`); -1 where there is none."""
+    """Start of each law in the code, by its number (see `law_at`); -1 where there is none."""
     return np.r_[S.forces.laws.ravel(), S.rows.law, S.tree.law]
 
 
 def count_law_inputs(S) -> int:
-    """How many numbers `store_law_inputs` keeps of each end."""
+    """Number of values that `store_law_inputs` stores for each end."""
     return count_measured(S) + (1 + BRANCH_NUMBERS) * len(S.forces.F)
 
 
 def any_formula_breaks(S) -> bool:
-    """Whether the formula of some force breaks somewhere."""
+    """Whether the formula of some force is discontinuous somewhere."""
     return any(breaks(force_kind(S, k)) for k in range(len(S.forces.F)))
 
 
 def inspection_buffer(S, sampled: Collection[int] | None = None) -> np.ndarray:
-    """What `inspect_step` writes on: no columns, and nothing is inspected, where no law can act briefly.
+    """Buffer of `inspect_step`; without columns, and without inspection, where no law can act briefly.
 
-    ``sampled`` are the starts of the laws that are to be looked at; without it all that can act briefly are.
+    ``sampled``: starts of the laws to be inspected; by default all laws that can act briefly.
     """
     laws = law_starts(S)
     look = [at >= 0 and may_be_brief(S.code, at) and (sampled is None or at in sampled) for at in laws]
@@ -78,12 +78,12 @@ def inspection_buffer(S, sampled: Collection[int] | None = None) -> np.ndarray:
 
 @formula
 def inspect_step(t, h, span, first, buffer, S, W):
-    """The next place within a step at which a law does something unexpected: (where to go on from, place, how long).
+    """Next place within a step where a law acts unexpectedly: (where to continue, place, duration).
 
-    Place and how long are parts of the step; the first is 0 where there is none. Where a formula breaks it lasts
-    without end (`UNBOUNDED`): every step is too wide. Each such law has two places: where it departs most from its
-    polynomial, and where most from its mean, as a node may have met the pulse itself. With AT_START and AT_END the
-    inputs of the laws, at the state in W, are kept.
+    Place and duration are fractions of the step; the first value is 0 if there is no such place. At a change of branch
+    of a formula the duration is `UNBOUNDED`: every step is too long. Each such law gives two places: where it departs
+    most from its polynomial, and where it departs most from its mean, as a node may lie in the pulse itself. With
+    AT_START and AT_END only the inputs of the laws, at the state in W, are stored.
     """
     if buffer.shape[1] == 0:
         return 0, 0.0, 0.0
@@ -95,7 +95,7 @@ def inspect_step(t, h, span, first, buffer, S, W):
         return 0, 0.0, 0.0
     if first == 0 and branch_changes(S, buffer, h):
         return 1, 0.5, UNBOUNDED
-    again = first % 2 == 1  # the law that was named last has another place to look at
+    again = first % 2 == 1  # the law reported last has a second place
     for k in range(first // 2, LAWS * S.forces.F.shape[0] + S.rows.law.shape[0] + S.tree.parent.shape[0]):
         law = law_at(S, k)
         if buffer[LAW_SELECTED, k] > 0.0:
@@ -112,7 +112,7 @@ def inspect_step(t, h, span, first, buffer, S, W):
 
 @formula
 def law_at(S, k):
-    """Law number k, of forces, of rows, of prescribed coordinates; -1 if it has none."""
+    """Start of law number k, in the order forces, rows, prescribed coordinates; -1 if it has none."""
     if k < LAWS * S.forces.F.shape[0]:
         return S.forces.laws[k // LAWS, k % LAWS]
     k -= LAWS * S.forces.F.shape[0]
@@ -123,9 +123,9 @@ def law_at(S, k):
 
 @formula
 def store_law_inputs(S, W, buffer, row):
-    """Keep what laws depend on, and its rates, at the state in W."""
+    """Store the inputs of laws and their rates at the state in W."""
     nm = count_measured(S)
-    for m in range(2 * nm, W.sensed.shape[1]):  # sides of corners do not change within a step
+    for m in range(2 * nm, W.sensed.shape[1]):  # sides of nonsmooth points do not change within a step
         buffer[INPUTS_WITHIN, m] = W.sensed[VALUE, m]
     for m in range(nm):
         buffer[row, m] = W.sensed[VALUE, m]
@@ -149,7 +149,7 @@ def store_law_inputs(S, W, buffer, row):
 
 @formula
 def branch_changes(S, buffer, h):
-    """Whether some force is on another branch of its formula at the end of the step than at its begin, or may be."""
+    """Whether some force may be on another branch of its formula at the end of the step than at its start."""
     nf = S.forces.F.shape[0]
     for f in range(nf):
         if S.forces.family[f] == BETWEEN and breaks(force_kind(S, f)):
@@ -167,9 +167,9 @@ def branch_changes(S, buffer, h):
 
 @formula
 def largest_departure(S, W, k, law, t, h, n, buffer):
-    """Where in the step, and for how long, a law is not what its values at the nodes let expect: parts of the step.
+    """Place and duration, as fractions of the step, of a law's largest departure from the polynomial through its nodes.
 
-    How long is 0 where it is as expected.
+    The duration is 0 where the law is as expected.
     """
     least = most = sample_law(S, W, k, law, t, h, 0.0, buffer)
     size = 0.0
@@ -195,7 +195,7 @@ def largest_departure(S, W, k, law, t, h, n, buffer):
 
 @formula
 def farthest_from_mean(S, W, k, law, t, h, n, buffer):
-    """Where in the step a law is farthest from its mean, and for how long: parts of the step."""
+    """Place and duration, as fractions of the step, of a law's largest departure from its mean."""
     mean = 0.0
     for i in range(n):
         mean += sample_law(S, W, k, law, t, h, (i + 0.5) / n, buffer) / n
@@ -213,7 +213,7 @@ def farthest_from_mean(S, W, k, law, t, h, n, buffer):
 
 @formula
 def chebyshev_node(j):
-    """Place of a node in the step."""
+    """Node j as a fraction of the step."""
     return 0.5 - 0.5 * cos(3.141592653589793 * j / (NODES - 1))
 
 
@@ -235,7 +235,7 @@ def law_polynomial(buffer, x):
 
 @formula
 def sample_law(S, W, k, law, t, h, x, buffer):
-    """Value of a law at a place in the step; of drivers' the second derivative, which is what asks for force."""
+    """Value of a law at fraction x of the step; for a driver's law the second derivative, which requires force."""
     nm = count_measured(S)
     s = t + x * h
     for m in range(nm):
@@ -272,7 +272,7 @@ def sample_law(S, W, k, law, t, h, x, buffer):
 
 @formula
 def input_within(buffer, m, x, h):
-    """Value and rate of column m at a place in the step: the cubic through value and rate at its ends."""
+    """Value and rate of column m at fraction x of the step: the cubic through value and rate at its ends."""
     f, g, u, v = (
         buffer[INSPECTED_START, m],
         buffer[INSPECTED_END, m],

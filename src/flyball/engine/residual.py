@@ -2,17 +2,17 @@
 
     r = M vdot - f - G^T lam,  g,  G v - nu,  G vdot - gamma
 
-This is what is differentiated by complex steps: a solve, a projection or a Newton loop is no place for them (the
-regularised solve amplifies an inconsistent perturbation). M vdot comes from the inertial wrenches of the actual
-accelerations (recursive Newton-Euler: Luh, Walker and Paul 1980; Featherstone 2008, section 5.3), so no matrix is
-needed.
+The residual is what is differentiated by complex steps. Solves, projections and Newton iterations are unsuitable for
+that: the regularised solve amplifies an inconsistent perturbation. M vdot comes from the inertial wrenches of the
+actual accelerations (recursive Newton-Euler: Luh, Walker and Paul 1980; Featherstone 2008, section 5.3), so no matrix
+is needed.
 
-Jacobians are assembled from the terms of r: velocities that no term depends on together are stepped together
+Jacobians are assembled from the terms of r: velocities that do not occur together in any term are stepped together
 (Curtis, Powell and Reid 1974), so that a Jacobian takes as many evaluations as the widest term has velocities.
 
-Slopes of forces (stiffness and damping, by differences) serve methods that take forces implicitly and need them
-only roughly. A force between frames has up to six directions: along the line through both origins where it acts
-along that, otherwise translations and rotations of M along F's axes.
+Slopes of forces (stiffness and damping, by differences) serve methods that treat forces implicitly and need them only
+roughly. A force between frames has up to six directions: the line through both origins where the force acts along that
+line, otherwise translations and rotations of M along F's axes.
 """
 
 from __future__ import annotations
@@ -71,7 +71,10 @@ from .rows import count_measured, row_times, update_controllers
 
 @formula
 def inertial_terms(S, W, out):
-    """Inertial wrench and weight of every body along the velocities of all that it hangs on. Returns how many terms."""
+    """Write inertial wrench and weight of every body, projected on its own and its ancestors' velocities.
+
+    Returns the number of terms.
+    """
     for i in range(out.shape[0]):
         out[i] = 0.0
     inertial_wrenches(S, W)
@@ -83,9 +86,10 @@ def inertial_terms(S, W, out):
 
 @formula
 def residual_terms(S, W, t, lam, out):
-    """The terms of r, in the order of `simulation/implicit/jacobian_pattern.py`; kinematics, rows and loads being known.
+    """Write the terms of r; kinematics, rows and loads are known. Returns their number.
 
-    Bodies; of each force between frames the side of M, then that of F; rows; forces along what is measured.
+    The order is that of `simulation/implicit/jacobian_pattern.py`: bodies; of each force between frames the side of M,
+    then that of F; rows; forces along measured quantities.
     """
     at = inertial_terms(S, W, out)
     for k in range(S.forces.F.shape[0]):
@@ -110,7 +114,7 @@ def residual_terms(S, W, t, lam, out):
 
 @formula
 def wrench_terms(S, W, b, out, at, sign, force, torque, point):
-    """A wrench on body b along its velocities, then along those of what it hangs on. Returns the next place."""
+    """Project a wrench on body b on its velocities, then on those of its ancestors. Returns the next free place."""
     while b >= 0:
         project_wrench(S, W, b, out, at, sign, force, torque, point)
         at += S.tree.nv[b]
@@ -120,22 +124,22 @@ def wrench_terms(S, W, b, out, at, sign, force, torque, point):
 
 @formula
 def row_terms(S, W, r, s, out, at):
-    """The force s along row r. Returns the next place."""
+    """Project the force s along row r on the velocities. Returns the next free place."""
     for e in range(S.row_start[r], S.row_start[r + 1]):
         out[at] = s * W.G[e]
         at += 1
     return at
 
 
-# columns of a sheet of slopes: stiffness, damping and the force itself along up to six directions; how many there are
-# of a force between frames, which the caller says
+# columns of the slopes: stiffness, damping and the force itself along up to six directions; the number of directions of
+# a force between frames, which the caller sets
 STIFFNESS, DAMPING, FORCE_ALONG, DIRECTIONS, SLOPE_WIDTH = 0, 6, 12, 18, 19
-DIFFERENCE_STEP = 1e-6  # of the mechanism's length, or of a radian; rates also of themselves
+DIFFERENCE_STEP = 1e-6  # relative to the mechanism's length, or a radian; for rates also relative to themselves
 
 
 @formula
 def force_slopes(S, W, t, out):
-    """Stiffness and damping (out[k], see above) of every force at the state in W."""
+    """Stiffness and damping (columns of ``out[k]``, see above) of every force at the state in W."""
     for k in range(S.forces.F.shape[0]):
         for i in range(DIRECTIONS):
             out[k, i] = 0.0
@@ -147,7 +151,7 @@ def force_slopes(S, W, t, out):
 
 @formula
 def effort_slopes(S, W, t, k, out):
-    """Of a force along a measured quantity."""
+    """Stiffness and damping of force k along a measured quantity."""
     m = S.forces.F[k]
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
     d = DIFFERENCE_STEP * min(1.0, S.scales.length)
@@ -166,7 +170,7 @@ def effort_slopes(S, W, t, k, out):
 
 @formula
 def wrench_slopes(S, W, t, k, out):
-    """Of a force between frames, one of the two states of M after the other."""
+    """Stiffness and damping of force k between frames, by central differences of the pose and motion of M."""
     kind = force_kind(S, k)
     par = force_row(S.force_parameters, k)
     F = load_record(W.FK, S.forces.F[k])
@@ -196,7 +200,7 @@ def wrench_slopes(S, W, t, k, out):
 
 @formula
 def probe_direction(F, p, n, i):
-    """Direction i of n that a force between frames changes along; p is where M is."""
+    """Direction i of n for the slopes of a force between frames; p is the origin of M."""
     if n == 1:
         line = sub(p, F[0])
         size = norm(line)
@@ -206,7 +210,7 @@ def probe_direction(F, p, n, i):
 
 @formula
 def tilted_rotation(R, a):
-    """R turned by a small vector."""
+    """R rotated by a small rotation vector."""
     x, y, z = col(R, 0), col(R, 1), col(R, 2)
     x, y, z = add(x, cross(a, x)), add(y, cross(a, y)), add(z, cross(a, z))
     return (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
@@ -214,12 +218,13 @@ def tilted_rotation(R, a):
 
 @formula
 def residuals(S, W, bench, task):
-    """The residual at several states, each a finite step from the given one; see `ResidualBatch`.
+    """Residuals at several states, each a finite step from the given one; see `ResidualBatch`.
 
     ``bench.out`` is filled with r, g, G v - nu, G vdot - gamma; then value, rate and acceleration of every measured
-    quantity. With STEPS steps are taken as they are. With ALONG what drivers prescribe of tree joints is as their laws
-    say, whatever the steps are; with GAPS also, and only g and G v - nu are found. With PARTS the terms of r stand
-    behind all others in place of r (`residual_terms`), with PUSHES those of the bodies alone.
+    quantity. With RESIDUAL_STEPS the steps are taken as given. With RESIDUAL_DRIVEN the coordinates of tree joints that
+    drivers prescribe follow their laws, whatever the steps are. CONSTRAINT_GAPS does the same, and computes g and G v -
+    nu only. With RESIDUAL_TERMS the terms of r (`residual_terms`) are stored behind all others in place of r, with
+    INERTIAL_TERMS those of the bodies only.
     """
     nq = S.sizes.coordinates
     nv = W.velocities.solved.shape[0]
@@ -267,7 +272,7 @@ def residuals(S, W, bench, task):
 
 @formula
 def residual(S, W, t, p, vdot, lam, out):
-    """The residual at one state, by the engine's own loops: no more of its code."""
+    """Residual at one state, using the loops that the engine already contains, so that less code is compiled."""
     nq = S.sizes.coordinates
     v = p[nq : nq + W.velocities.solved.shape[0]]
     z = p[nq + W.velocities.solved.shape[0] :]
@@ -276,13 +281,13 @@ def residual(S, W, t, p, vdot, lam, out):
     for b in range(S.tree.parent.shape[0]):
         accelerated_motion(S, W, b, v, vdot)
     update_frame_motions(S, W)
-    row_biases(S, W, t, v, z)  # the bias at true accelerations is the acceleration itself
+    row_biases(S, W, t, v, z)  # the bias at the true accelerations is the acceleration itself
     store_residual(S, W, t, p, lam, out)
 
 
 @formula
 def update_accelerated_kinematics(S, W, t, p, vdot, whole):
-    """The same kinematics and rows in one pass; without accelerations of what is measured unless ``whole``."""
+    """The same kinematics and rows in one pass; accelerations of measured quantities only if ``whole``."""
     nq = S.sizes.coordinates
     v = p[nq : nq + W.velocities.solved.shape[0]]
     for b in range(S.tree.parent.shape[0]):
@@ -294,7 +299,7 @@ def update_accelerated_kinematics(S, W, t, p, vdot, whole):
 
 @formula
 def store_residual(S, W, t, p, lam, out):
-    """What the equations miss with these multipliers, kinematics and rows being known."""
+    """Store the residual of the equations with these multipliers; kinematics and rows are known."""
     nq = S.sizes.coordinates
     nv = W.velocities.solved.shape[0]
     nr = S.rows.law.shape[0]
@@ -323,7 +328,7 @@ def store_residual(S, W, t, p, lam, out):
 
 @formula
 def store_residual_terms(S, W, t, p, lam, out, first):
-    """G v - nu, and from ``first`` on the terms of r."""
+    """Store G v - nu, and from ``first`` on the terms of r."""
     nv, nr = W.velocities.solved.shape[0], S.rows.law.shape[0]
     v = p[S.sizes.coordinates : S.sizes.coordinates + nv]
     for k in range(nr):
@@ -334,7 +339,7 @@ def store_residual_terms(S, W, t, p, lam, out, first):
 
 @formula
 def apply_multipliers(S, W, t, p, lam):
-    """What forces are told besides motions: multipliers, loads of joints, states of controllers."""
+    """Set the inputs of forces besides motions: multipliers, loads of joints, states of controllers."""
     for k in range(S.rows.law.shape[0]):
         W.rows.multiplier[k] = lam[k]
     reaction_loads(S, W)
@@ -345,7 +350,7 @@ def apply_multipliers(S, W, t, p, lam):
 
 @formula
 def accelerated_motion(S, W, b, v, vdot):
-    """Velocity and true acceleration of body b at its pose in W, its parent's being known."""
+    """Velocity and true acceleration of body b at its pose in W, from its parent's."""
     body_motion(S, W, b, v)
     kind = S.tree.joint[b]
     v0 = S.tree.v[b]
@@ -372,14 +377,14 @@ def accelerated_motion(S, W, b, v, vdot):
 def residuals_kernel(
     S: ComplexSystem, W: ComplexWork, bench: ResidualBatch, _: ResidualBatch, __: ResidualBatch, task: int
 ) -> int:
-    """`residuals` behind an address; compiled for complex numbers, when first needed."""
+    """`residuals` as a kernel; compiled for complex numbers, when first needed."""
     return residuals(S, W, bench, task)
 
 
 def evaluate_residuals(
     S: Any, W: Any, t: complex, state: np.ndarray, vdot: np.ndarray, lam: np.ndarray, steps: np.ndarray, out: np.ndarray
 ) -> None:
-    """The equations at states near one state, see ``residuals``; nan where they cannot be evaluated."""
+    """Residuals at states near one state, see ``residuals``; nan where they cannot be evaluated."""
     bench = ResidualBatch(np.array([t]), state, vdot, lam, steps, out)
     out[:] = np.nan
     b = StructBuffer(bench)

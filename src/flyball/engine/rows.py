@@ -3,13 +3,13 @@
     g = sum c_k value_k - f(t),  G v = nu = f',  G vdot = gamma = f'' - sum c_k bias_k
 
 A row is a sum of unit wrenches on frames less a law of time; G[row, d] is the power of the row's wrench along twist
-column d, whatever the coordinates. A measured quantity is the same without a law: value, gradient, rate, bias.
-Where a driver's law names sensors s, g = sum c_k value_k - f(t, s), and the sensors' gradients times df/ds are
-subtracted from the row.
+column d, whatever the coordinates. A measured quantity is the same without a law: value, gradient, rate, bias. Where a
+driver's law reads sensors s, g = sum c_k value_k - f(t, s), and the sensors' gradients times df/ds are subtracted from
+the row.
 
-Also here: the characteristic rates that measured rates are compared with, and the states of controllers among the
-measured quantities, z' = f(t, z, measured), with the laws in which all signals of controllers are substituted.
-Measured quantities are known once rows are, so these rates need no accelerations.
+Also here: the characteristic rates that measured rates are compared with, and the states of controllers, which laws
+read like measured quantities. Their rates are z' = f(t, z, measured), where all signals of controllers are substituted
+in the laws. Measured quantities are known once rows are, so these rates need no accelerations.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..tables.table_definitions import BIAS, OFF, RATE, STEADY, VALUE
 from .kinematics import load_record, project_wrench
 
 COEFFICIENT = 7
-ALONG_MOTION, BY_TIME = -1, -2  # what evaluate_jet differentiates by, if not by a sensor
+ALONG_MOTION, BY_TIME = -1, -2  # derivatives of evaluate_jet, if not with respect to a sensor
 
 
 @formula
@@ -40,18 +40,18 @@ def count_measured(S):
 
 @formula
 def term_wrench(S, W, k):
-    """What the multiplier of term k's row does through it: (force, torque) on its second body, about M's origin."""
+    """Wrench (force, torque) of the multiplier of term k's row on its second body, about M's origin."""
     c = W.rows.multiplier[S.terms.row[k]] * S.term_parameters[k, COEFFICIENT]
     return scale(c, load3(W.T, k, 0)), scale(c, load3(W.T, k, 3))
 
 
 @formula
 def wrench_on_second(S, W, what):
-    """The same on the second body of the term's joint, about its point there; see `tables.terms.on_second`."""
+    """Wrench on the second body of the term's joint, about its point there; see `term_from_side_M` for ``what``."""
     nt = S.terms.row.shape[0]
     k = what if what < nt else what - nt
     force, torque = term_wrench(S, W, k)
-    if what >= nt:  # told of the other body, at the other frame: the reverse of both, about this one
+    if what >= nt:  # seen from the other body, at the other frame: both reversed, about that frame's origin
         arm = sub(load3(W.FK, S.terms.M[k], 0), load3(W.FK, S.terms.F[k], 0))
         return neg(force), neg(add(torque, cross(arm, force)))
     return force, torque
@@ -59,7 +59,7 @@ def wrench_on_second(S, W, what):
 
 @formula
 def begin(S, W):
-    """Start every row and measured quantity from nothing."""
+    """Set every row and measured quantity to zero."""
     for k in range(W.rows.value.shape[0]):
         W.rows.value[k] = 0.0
     for m in range(count_measured(S)):
@@ -70,14 +70,14 @@ def begin(S, W):
 
 @formula
 def hint_of(S, z, k, o):
-    """The state that term k leans on to tell whole turns, or its place on a curve; zero if it needs none."""
+    """State that term k uses to find whole turns, or its place on a curve; zero if it needs none."""
     h = S.terms.hint[k]
     return z[h] if h >= 0 else o
 
 
 @formula
 def add_value(S, W, k, g, force, torque_M, torque_F, from_F, from_M):
-    """Add term k, of which F and M are at the given points, to its row or measured quantity."""
+    """Add term k, with frames F and M at the given points, to its row or measured quantity."""
     c = S.term_parameters[k, COEFFICIENT]
     r = S.terms.row[k]
     nr = S.rows.law.shape[0]
@@ -97,7 +97,7 @@ def add_value(S, W, k, g, force, torque_M, torque_F, from_F, from_M):
 
 @formula
 def add_bias(S, W, k, bias):
-    """Take term k's acceleration bias from its row's gamma, or add it to its measured quantity."""
+    """Subtract term k's acceleration bias from its row's gamma, or add it to its measured quantity."""
     r = S.terms.row[k]
     nr = S.rows.law.shape[0]
     if r < nr:
@@ -119,7 +119,7 @@ def each_value(S, W, z, kind, row):
 
 @formula
 def each_bias(S, W, z, kind, row):
-    """Take every term's acceleration bias of one kind from its row's gamma; add it to its measured quantity."""
+    """Subtract the acceleration bias of every term of one kind from its row's gamma; add it for measured quantities."""
     for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
         F = load_record(W.FK, S.terms.F[k])
         M = load_record(W.FK, S.terms.M[k])
@@ -130,7 +130,7 @@ def each_bias(S, W, z, kind, row):
 
 @formula
 def each_row(S, W, z, whole, kind, row):
-    """``each_value`` and ``each_bias`` in one; what is measured has no bias unless ``whole``."""
+    """``each_value`` and ``each_bias`` in one; biases of measured quantities only if ``whole``."""
     for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
         F = load_record(W.FK, S.terms.F[k])
         M = load_record(W.FK, S.terms.M[k])
@@ -149,9 +149,9 @@ def row_kind(S, k, kind):
 
 @formula
 def rare_values(S, W, z, first, last, row):
-    """``each_value`` for kinds that share one loop, ``row(kind, par, F, M, hint, data)``: less to compile.
+    """``each_value`` for kinds that share one loop, ``row(kind, par, F, M, hint, data)``, which compiles faster.
 
-    A row of a user's own has the address of its code table for its kind.
+    The kind of a user-defined row is the address of its code table.
     """
     for kind in range(first, last):
         for k in range(S.kind_terms[kind], S.kind_terms[kind + 1]):
@@ -193,7 +193,7 @@ def rare_rows(S, W, z, first, last, row):
 
 @formula
 def begin_rows(S, W):
-    """Start rows and measured quantities, their biases too, from nothing."""
+    """Set rows and measured quantities, with their biases, to zero."""
     begin(S, W)
     for k in range(S.rows.law.shape[0]):
         W.rows.gamma[k] = 0.0
@@ -203,7 +203,7 @@ def begin_rows(S, W):
 
 @formula
 def end_rows(S, W, t, v):
-    """Laws of time, rates of the measured quantities, and gamma of the laws."""
+    """Complete the rows: laws of time, rates of the measured quantities, and gamma of the laws."""
     end(S, W, t)
     update_measured_rates(S, W, v)
     for k in range(S.rows.law.shape[0]):
@@ -213,7 +213,7 @@ def end_rows(S, W, t, v):
 
 @formula
 def end(S, W, t):
-    """Take the laws of time from the rows; angles that follow a law are compared modulo a whole turn."""
+    """Subtract the laws of time from the rows; angles that follow a law are compared modulo a whole turn."""
     for k in range(S.rows.law.shape[0]):
         law = S.rows.law[k]
         if law >= 0:
@@ -235,13 +235,16 @@ def end(S, W, t):
 
 @formula
 def direction_column(S, W, s):
-    """Column of W.sensed in which the way of switch s stands: of sliding, of pushing, the sign of a corner."""
+    """Column of W.sensed with the direction of switch s: of sliding, of pushing, the side of a nonsmooth point."""
     return W.sensed.shape[1] - S.switches.row.shape[0] + s
 
 
 @formula
 def apply_switch_modes(S, W):
-    """Of rows with modes: what is off counts for nothing, what is held is compared with where it is held."""
+    """Apply the modes of switches to their rows.
+
+    Rows that are off are cleared; the values of held rows are measured from their hold.
+    """
     for s in range(S.switches.row.shape[0]):
         k = S.switches.row[s]
         if k < 0:
@@ -258,7 +261,7 @@ def apply_switch_modes(S, W):
 
 @formula
 def clear_inactive_biases(S, W):
-    """What is off has no right-hand side."""
+    """Clear the right-hand side of rows that are off."""
     for s in range(S.switches.row.shape[0]):
         k = S.switches.row[s]
         if k >= 0 and W.modes.mode[s].real == OFF:
@@ -267,7 +270,7 @@ def clear_inactive_biases(S, W):
 
 @formula
 def size_inactive_rows(S, W):
-    """Rows that are off have a size, though nothing of them is left."""
+    """Give rows that are off a nonzero size, as their entries are zero."""
     for s in range(S.switches.row.shape[0]):
         k = S.switches.row[s]
         if k >= 0 and W.modes.mode[s].real == OFF:
@@ -276,7 +279,7 @@ def size_inactive_rows(S, W):
 
 @formula
 def begin_biases(S, W, v):
-    """Rates of the measured quantities; gamma of the laws as far as they follow time."""
+    """Start of the biases: rates of the measured quantities; gamma of the laws as far as they depend on time."""
     update_measured_rates(S, W, v)
     for m in range(count_measured(S)):
         W.sensed[BIAS, m] = 0.0
@@ -299,7 +302,7 @@ def update_measured_rates(S, W, v):
 
 @formula
 def end_biases(S, W, t):
-    """Gamma of laws that follow sensors: f'' along the motion in place of its second derivative by time."""
+    """End of the biases: gamma of laws that read sensors uses f'' along the motion in place of the time derivative."""
     clear_inactive_biases(S, W)
     last = -1
     for x in range(S.sensor_drivers.row.shape[0]):
@@ -321,19 +324,19 @@ def row_times(S, W, k, x):
 
 @formula
 def characteristic_speed(S):
-    """The mechanism's length at its own rate [m/s]."""
+    """Characteristic speed of the mechanism: its length times its characteristic rate [m/s]."""
     return S.scales.length * S.scales.rate
 
 
 @formula
 def characteristic_rate(S, m):
-    """The same for quantity m, whose unit may be a radian."""
+    """Characteristic rate of quantity m, whose unit may be a radian."""
     return S.units[m] * S.scales.rate
 
 
 @formula
 def largest_measured_rate(S, W):
-    """The largest rate that is measured."""
+    """Largest measured rate."""
     fastest = 0.0
     for m in range(count_measured(S)):
         fastest = max(fastest, magnitude(W.sensed[RATE, m]))
@@ -342,13 +345,13 @@ def largest_measured_rate(S, W):
 
 @formula
 def controller_column(S, W, c):
-    """Column of W.sensed in which state c of a controller stands."""
+    """Column of W.sensed that holds state c of a controller."""
     return W.sensed.shape[1] - S.switches.row.shape[0] - S.control_laws.shape[0] + c
 
 
 @formula
 def update_controllers(S, W, t, z, dz):
-    """Show the states z to the laws; their rates into ``dz``, and where laws' derivatives look for them."""
+    """Write the states z where laws read them; their rates go to ``dz`` and to where laws' derivatives read them."""
     for c in range(S.control_laws.shape[0]):
         W.sensed[VALUE, controller_column(S, W, c)] = z[c]
     for c in range(S.control_laws.shape[0]):

@@ -1,14 +1,14 @@
-"""Sampled controllers: at their instants outputs are computed and held until the next, and states are advanced.
+"""Sampled controllers: at sampling instants outputs are computed and held until the next, and states are advanced.
 
     y_k = h(t_k, x_k, measured),  x_(k+1) = f(t_k, x_k, measured, y_k)
 
-Signals first, in an order in which each is known before it is needed, those of other controllers that are sampled
-at the same instant too; then all states at once. Measured quantities are those just before the instant: positions
-and velocities do not jump there. No table changes, so that an instant costs two evaluations of the motion.
+Signals come first, in an order in which each is known before it is needed, including those of other controllers sampled
+at the same instant; then all states at once. Measured quantities are those just before the instant: positions and
+velocities do not jump there. No table changes, so that an instant costs two evaluations of the motion.
 
-Steps end on instants. Where an interval between two is much shorter than a step that the tolerance allows, a method
-of lower order with fewer stages takes it as well: as long as all errors of such steps together stay below the
-tolerance, each no larger than the part of the motion that its step is.
+Steps end at instants. Where an interval between two is much shorter than a step that the tolerance allows, it is
+integrated by a method of lower order with fewer stages. That is done as long as the errors of such steps together stay
+below the tolerance, the share of each being the fraction of the motion that its step covers.
 """
 
 from __future__ import annotations
@@ -28,30 +28,28 @@ from .calls import INTEGRATE, MOTION, OutputBuffer
 from .entry_point import engine
 from .rows import controller_column
 
-PERIOD, OFFSET = range(2)  # columns of Samples.clock
+PERIOD, OFFSET = range(2)  # columns of SamplePlan.clock
 SAMPLE_CLOCK, SAMPLE_STATE, SAMPLE_LAW, IS_LATER = range(
     4
-)  # columns of Samples.row: clock, state, law, whether it waits for all others
-INSTANT_TOLERANCE = 1e-9  # of a period: a time that is an instant
-INSTANT_ROUNDING = (
-    8.0 * 2.0**-52
-)  # of a time: more than an instant is off, by rounding, from the time that it stands for
-OUTPUT_ROWS = 64  # of output that are taken at once
+)  # columns of SamplePlan.row: clock, state, law, whether it comes after all others
+INSTANT_TOLERANCE = 1e-9  # relative to the period: a time this near counts as an instant
+INSTANT_ROUNDING = 8.0 * 2.0**-52  # relative to the time: exceeds the rounding error of an instant
+OUTPUT_ROWS = 64  # rows of output taken at a time
 ENGINE, S_, W_, R_, CLOCK, OUTPUT, PLAN, LOWER = range(8)
-WAIT, AGAIN, TAKEN, REFUSED = range(4)  # entries of Samples.lower
-MAX_WAIT = 1024  # intervals after which the lower order is tried again, at most
+WAIT, AGAIN, TAKEN, REFUSED = range(4)  # entries of SamplePlan.lower
+MAX_WAIT = 1024  # largest number of intervals before the lower order is tried again
 
 
 class SamplePlan(NamedTuple):
-    """When what is sampled."""
+    """What is sampled, and when."""
 
     clock: Float2  # (ns, 2): period and offset [s]
     next: Int1  # (ns,): number of the next instant
     row: Int2  # (nu, 4): clock, state, law, whether all others come first; in order
     value: Float1  # (nu,): scratch
-    end: Float1  # (1,): end of the motion [s], at which nothing is sampled any more
-    # intervals until the lower order is tried, 0: it is taken, -1: never; how many if it fails; steps taken and refused
-    # when this interval began, which may go on in another call
+    end: Float1  # (1,): end of the motion [s], where nothing is sampled
+    # intervals until the lower order is tried (0: it is in use, -1: never); how many if it fails; steps accepted and
+    # rejected when this interval began, which may continue in another call
     lower: Int1  # (4,)
 
 
@@ -63,7 +61,7 @@ def next_instant(P, k):
 
 @formula
 def earliest_instant(P):
-    """The next instant at which something is sampled; none before the end: infinite."""
+    """Next instant at which something is sampled; infinite if there is none before the end."""
     first = np.inf
     for k in range(P.next.shape[0]):
         at = next_instant(P, k)
@@ -74,7 +72,7 @@ def earliest_instant(P):
 
 @formula
 def matching_output_time(P, times, at):
-    """The output time that is an instant but for rounding, if there is one; else that instant."""
+    """Output time that equals an instant except for rounding, if there is one; else that instant."""
     near = np.inf
     for k in range(P.next.shape[0]):
         near = min(near, INSTANT_TOLERANCE * P.clock[k, PERIOD])
@@ -106,7 +104,7 @@ def any_due(P, t):
 
 @formula
 def sample_controllers(A):
-    """Sample what is due at the time and state of the clock. Returns the status of the evaluation there."""
+    """Sample all due controllers at the time and state of ``clock``. Returns the status of the evaluation there."""
     S, W, clock, P = A[S_], A[W_], A[CLOCK], A[PLAN]
     t = clock.real.t
     status = call(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[OUTPUT], MOTION)
@@ -117,7 +115,7 @@ def sample_controllers(A):
         for u in range(P.row.shape[0]):
             if P.row[u, IS_LATER] == late and is_due(P, P.row[u, SAMPLE_CLOCK], t):
                 at = next_instant(P, P.row[u, SAMPLE_CLOCK])
-                at += INSTANT_ROUNDING * abs(at)  # laws of time that jump there are those from then on
+                at += INSTANT_ROUNDING * abs(at)  # laws that jump at the instant have their later value
                 P.value[u] = evaluate(S.code, S.const, P.row[u, SAMPLE_LAW], W.stack, (at, 0.0, 0.0), W.sensed)
                 if late == 0:
                     W.sensed[VALUE, controller_column(S, W, P.row[u, SAMPLE_STATE])] = P.value[u]
@@ -128,7 +126,7 @@ def sample_controllers(A):
         while is_due(P, k, t):
             P.next[k] += 1
     clock.count.started = FORCES_JUMPED
-    clock.real.h = max(clock.real.h, clock.real.wide)  # the last step was cut short
+    clock.real.h = max(clock.real.h, clock.real.wide)  # the last step was shortened to end here
     return 0
 
 
@@ -136,7 +134,7 @@ def sample_controllers(A):
 def sample_kernel(
     address: int, S: System, W: Work, R: Tableau, clock: StepState, output: OutputBuffer, P: SamplePlan
 ) -> int:
-    """Sample what is due."""
+    """Sample all due controllers, as a kernel."""
     return sample_controllers((address, S, W, R, clock, output, P))
 
 
@@ -152,14 +150,14 @@ def sampled_kernel(
     lower: Tableau,
     out: Float2,
 ) -> int:
-    """Integrate from instant to instant, as `engine.INTEGRATE` does between them. Returns rows written."""
+    """Integrate from instant to instant, with the engine's INTEGRATE between them. Returns the number of rows."""
     A = (address, S, W, R, clock, output, P, lower)
     return advance_between_samples(integrate_by_engine, A, A, output.rows, out)
 
 
 @formula
 def integrate_by_engine(A, rows):
-    """The engine's own loop, which writes to its sheet; by the lower order where that is as good."""
+    """Integrate by the engine's own loop into its output buffer, by the lower order where that is accurate enough."""
     clock, lower = A[CLOCK], A[PLAN].lower
     if clock.count.started != 1:
         lower[TAKEN], lower[REFUSED] = clock.count.accepted, clock.count.rejected
@@ -181,9 +179,10 @@ def integrate_by_engine(A, rows):
 
 @formula
 def advance_between_samples(loop, loop_arguments, A, rows, out):
-    """Go on until the end of the stretch, at which nothing is sampled, or for what else the loop between returns.
+    """Continue until ``clock.real.t_end``, where nothing is sampled, or until ``loop`` stops otherwise.
 
-    That is ``loop(own, rows)``: rows written, at most ``rows``.
+    ``loop(loop_arguments, rows)`` returns the number of rows it has written to ``rows``. Returns the number of rows
+    written to ``out``.
     """
     clock, P = A[CLOCK], A[PLAN]
     used = 0
@@ -198,7 +197,7 @@ def advance_between_samples(loop, loop_arguments, A, rows, out):
         n = loop(loop_arguments, rows)
         clock.real.t_end = end
         over = clock.count.status != DONE or at == end
-        if not over and n > 0 and rows[n - 1, 0] == at:  # written when it is known what is held from then on
+        if not over and n > 0 and rows[n - 1, 0] == at:  # written later, when the values held from then on are known
             n -= 1
             clock.count.next -= 1
         for i in range(n):
@@ -215,15 +214,15 @@ def advance_between_samples(loop, loop_arguments, A, rows, out):
 
 
 class SampledControllers:
-    """What is sampled in a motion, and when next.
+    """Sampled controllers of a motion and their next instants.
 
     Parameters
     ----------
-    plan : Samples
+    plan : SamplePlan
     R, lower : Tableau
-        The method; one of lower order for short intervals.
+        The method, and one of lower order for short intervals.
     width, most : int
-        Of a row of output; how many rows there is room for.
+        Length of a row of output; maximum number of rows.
     """
 
     def __init__(self, plan: SamplePlan, R: Tableau, lower: Tableau, width: int, most: int) -> None:
@@ -231,7 +230,7 @@ class SampledControllers:
         self.output = OutputBuffer(np.zeros((max(1, min(OUTPUT_ROWS, most // 2)), max(width, 1))))
 
     def go_on(self, S: System, W: Work, clock: StepState, out: np.ndarray) -> int:
-        """Integrate on, sampling on the way. Returns rows written."""
+        """Continue the integration with sampling. Returns the number of rows written."""
         return int(sampled_kernel(engine.address, S, W, self.R, clock, self.output, self.plan, self.lower, out))
 
     def differs(self, other: SampledControllers) -> bool:
@@ -243,9 +242,9 @@ class SampledControllers:
         return bool(any_due(self.plan, t))
 
     def next(self, times: np.ndarray) -> float:
-        """The next instant; infinite if there is none. ``times`` are those of output."""
+        """Next instant; infinite if there is none. ``times`` are the output times."""
         return float(matching_output_time(self.plan, times, earliest_instant(self.plan)))
 
     def sample(self, S: System, W: Work, clock: StepState) -> int:
-        """Sample what is due now. Returns the status of the evaluation there."""
+        """Sample all controllers due now. Returns the status of the evaluation there."""
         return int(sample_kernel(engine.address, S, W, self.R, clock, self.output, self.plan))

@@ -2,15 +2,15 @@
 
     dq' = dv + N dq,  [M G^T; G 0] [dvdot; -dlam] = -[dr; da];  works change with the powers
 
-dr and da are the changes of the equations of motion and of the constraints along (dq, dv, dp), by a complex step of
-the residual; the solve is with the motion's own factor. Joint friction follows the reactions, so that dr has a part
-F dlam of its own: the columns of F are found by a complex step of each multiplier that loads a joint, and taken
-into account by as many unknowns (Woodbury).
+dr and da are the changes of the equations of motion and of the constraints along (dq, dv, dp), by a complex step of the
+residual; the solve uses the motion's own factor. Joint friction depends on the reactions, so dr has a part F dlam: the
+columns of F are found by a complex step of each multiplier that loads a joint, and taken into account by as many
+additional unknowns (Woodbury).
 
 After every step motion and changes are projected on their constraints. The steps suit both, to the same tolerance.
-(Direct differentiation: Haug and Ehle 1982; Chang and Nikravesh 1985. That the changes may be projected like this,
-see Serban and Freeman 1996.) The state is (q, v, all (dq, dv), z, all dz). This loop holds no right-hand side: it
-calls the kernels of the engine and of the residual by address.
+(Direct differentiation: Haug and Ehle 1982; Chang and Nikravesh 1985. That the changes may be projected like this, see
+Serban and Freeman 1996.) The state is (q, v, all (dq, dv), z, all dz). This loop does not contain the right-hand side:
+it calls the kernels of the engine and of the residual by address.
 """
 
 from __future__ import annotations
@@ -49,41 +49,41 @@ from .calls import (
 )
 from .kinematics import quaternion_at
 
-COMPLEX_STEP = 1e-40  # of the parameter
-# places in the tuple of what the loop works with, behind those of `asking`
+COMPLEX_STEP = 1e-40  # relative to the parameter
+# places in the argument tuple of the loop, behind those of the engine's call
 RESIDUAL, SC_, WC_, BATCH = range(6, 10)
-# entries of Plan.size
+# entries of SensitivityPlan.size
 NQ, NZ, COUNT, POWERS = range(4)
 
 
 class SensitivityPlan(NamedTuple):
-    """Which numbers the parameters change, and what is found on the way."""
+    """Table entries that each parameter changes, and workspace."""
 
-    size: Int1  # (4,) coordinates, states, parameters; whether powers stand for works
+    size: Int1  # (4,) coordinates, states, parameters; whether powers replace works
     first: Int1  # (n + 1,) first entry of each parameter
-    entry: Int1  # (entries,): place in the tables
-    step: Float1  # (entries,): what stands there
-    tables: Float1  # the complex tables, one behind the other, as real and imaginary parts in turn
+    entry: Int1  # (entries,): index in the tables
+    step: Float1  # (entries,): imaginary step of the entry
+    tables: Float1  # the complex tables, concatenated; real and imaginary parts alternate
     found: Float2  # (n, nv + nr + nv): changes of accelerations, multipliers, efforts
     effort: Float1  # (nv,) of the motion itself
-    rate: Float1  # rates of the state, where a row is reported
+    rate: Float1  # rates of the state, for rows of output
     zero: Float1  # (nv,)
-    pressing: Int1  # (m,) rows whose multipliers some friction depends on
-    friction_response: Float2  # (m, nv + nr + nv): what friction under a unit of each makes of all
-    friction_power: Float2  # (m, nz): and of the powers
+    pressing: Int1  # (m,) rows whose multipliers load some friction
+    friction_response: Float2  # (m, nv + nr + nv): response to the change of friction per unit of each multiplier
+    friction_power: Float2  # (m, nz): the same of the powers
     share: Float2  # (m, m + 1): scratch
 
 
 @formula
 def set_parameter_step(P, k, on):
-    """Put the step of parameter k into the complex tables, or take it out."""
+    """Add the step of parameter k to the complex tables, or remove it."""
     for e in range(P.first[k], P.first[k + 1]):
         P.tables[P.entry[e]] = P.step[e] if on else 0.0
 
 
 @formula
 def set_reference_state(A, P, t, state):
-    """Make the state that the engine was last evaluated at the one from which complex steps are taken."""
+    """Use the state at which the engine was last evaluated as the base of complex steps."""
     W, B = A[W_], A[BATCH]
     B.t[0] = complex(t, 0.0)
     for i in range(state.shape[0]):
@@ -97,26 +97,26 @@ def set_reference_state(A, P, t, state):
 
 @formula
 def complex_step_residual(A, dq, dv, task):
-    """The residuals with a complex step of positions and velocities, and of what stands in the tables."""
+    """Residuals with a complex step of positions and velocities, and of the entries in the tables."""
     B = A[BATCH]
     nv = dq.shape[0]
     for d in range(nv):
         B.steps[0, d] = complex(0.0, COMPLEX_STEP * dq[d])
         B.steps[0, nv + d] = complex(0.0, COMPLEX_STEP * dv[d])
     if nv > 0:
-        B.out[0, 0] = complex(np.nan, np.nan)  # what is not found is no number
+        B.out[0, 0] = complex(np.nan, np.nan)  # entries that are not computed are nan
     call(A[RESIDUAL], A[SC_], A[WC_], B, B, B, task)
 
 
 @formula
 def solve_by_engine(A):
-    """Solve with the motion's factor, for what stands in the first two rows of the sheet."""
+    """Solve with the motion's factor; the right-hand sides are in the first two rows of the output buffer."""
     call(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[OUTPUT], SOLVE)
 
 
 @formula
 def project_change(A, P, k, dq, dv):
-    """Put changes of positions and velocities on the linearised constraints, in place."""
+    """Project changes of positions and velocities on the linearised constraints, in place."""
     S, WC, B, rows = A[S_], A[WC_], A[BATCH], A[OUTPUT].rows
     nv, nr, nq = dq.shape[0], S.rows.law.shape[0], P.size[NQ]
     set_parameter_step(P, k, True)
@@ -142,7 +142,7 @@ def project_change(A, P, k, dq, dv):
 
 @formula
 def state_change(A, P, k, dq, dv, rate, powers):
-    """Rates (2 nv,) of changes of positions and velocities with parameter k, and changes (nz,) of powers.
+    """Rates (2 nv,) of the changes of positions and velocities with parameter k, and changes (nz,) of powers.
 
     Changes of accelerations, multipliers and efforts go to ``P.found[k]``.
     """
@@ -177,7 +177,7 @@ def state_change(A, P, k, dq, dv, rate, powers):
 
 @formula
 def solve_change(A, P, found, sign):
-    """Accelerations, multipliers and efforts that take away what the residuals miss along the last complex step."""
+    """Accelerations, multipliers and efforts that cancel the residuals along the last complex step."""
     S, W, B, rows = A[S_], A[W_], A[BATCH], A[OUTPUT].rows
     nv, nr = P.zero.shape[0], S.rows.law.shape[0]
     for d in range(nv):
@@ -194,7 +194,7 @@ def solve_change(A, P, found, sign):
 
 @formula
 def add_rotation_terms(S, state, nq, dq, rate):
-    """Add N dq: changes of rotations have components along axes that turn."""
+    """Add N dq: components of changes of rotation along rotating axes."""
     for b in range(S.tree.parent.shape[0]):
         _, w = quaternion_at(S, b)
         if w >= 0:
@@ -206,14 +206,14 @@ def add_rotation_terms(S, state, nq, dq, rate):
 
 @formula
 def friction_responses(A, P):
-    """What friction under a unit of each multiplier that it depends on makes of everything."""
+    """Response of all unknowns to the change of friction per unit of each multiplier that loads friction."""
     S, W, WC, B = A[S_], A[W_], A[WC_], A[BATCH]
     for j in range(P.pressing.shape[0]):
         r = P.pressing[j]
         B.lam[r] = complex(W.rows.multiplier[r], COMPLEX_STEP)
         complex_step_residual(A, P.zero, P.zero, RESIDUAL_STEPS)
         B.lam[r] = complex(W.rows.multiplier[r], 0.0)
-        for e in range(S.row_start[r], S.row_start[r + 1]):  # less what the reaction itself does
+        for e in range(S.row_start[r], S.row_start[r + 1]):  # without the reaction's own effect
             B.out[0, S.column[e]] += complex(0.0, COMPLEX_STEP * W.G[e])
         solve_change(A, P, P.friction_response[j], 0.0)
         for i in range(P.friction_power.shape[1]):
@@ -226,7 +226,7 @@ def friction_responses(A, P):
 
 @formula
 def add_friction_feedback(P, found, powers, nv):
-    """Add what friction makes of the changes of reactions that it makes itself."""
+    """Add the response to the friction that changes with the reactions."""
     m = P.pressing.shape[0]
     for j in range(m):
         at = nv + P.pressing[j]
@@ -266,7 +266,7 @@ def solve_in_place(A):
 
 @formula
 def copy_motion_part(x, y, P, out):
-    """Take the motion's own part of a state vector (or of its rates) ``y`` to ``x``; or back, if ``out``."""
+    """Copy the motion's part of a state vector (or of its rates) ``y`` to ``x``; back if ``out``."""
     nv = P.zero.shape[0]
     own = P.size[NQ] + nv
     more = 2 * nv * P.size[COUNT]
@@ -280,7 +280,7 @@ def copy_motion_part(x, y, P, out):
 
 @formula
 def change_rates(y, dy, A, P):
-    """Rates of all changes at the state on the bench."""
+    """Rates of all changes at the base state of the residual batch."""
     nv, nz, n = P.zero.shape[0], P.size[NZ], P.size[COUNT]
     at = P.size[NQ] + nv
     works = at + 2 * nv * n + nz
@@ -293,7 +293,7 @@ def change_rates(y, dy, A, P):
 
 @formula
 def augmented_derivative(t, y, dy, A, P):
-    """Rates of the motion, at the state put on its constraints, and of its changes."""
+    """Rates of the motion at its projected state, and of its changes."""
     own = A[OWN]
     own.real.t = t
     copy_motion_part(own.y[0], y, P, False)
@@ -307,7 +307,7 @@ def augmented_derivative(t, y, dy, A, P):
 
 @formula
 def project_changes(t, y, dy, A, P):
-    """Put all changes on their constraints, at the state that the engine has put on its own, and find their rates."""
+    """Project all changes on their constraints, at the state that the engine has projected, and compute their rates."""
     S = A[S_]
     nv = P.zero.shape[0]
     set_reference_state(A, P, t, A[OWN].y[0])
@@ -323,7 +323,10 @@ def project_changes(t, y, dy, A, P):
 
 @formula
 def project_augmented_state(t, y, dy, A, P):
-    """Put motion and changes on their constraints, in place, and evaluate there; how far the motion moved."""
+    """Project motion and changes on their constraints, in place, and evaluate there.
+
+    Returns (status, distance that the motion moved).
+    """
     own, rows = A[OWN], A[OUTPUT].rows
     own.real.t = t
     copy_motion_part(own.y[0], y, P, False)
@@ -338,7 +341,7 @@ def project_augmented_state(t, y, dy, A, P):
 
 @formula
 def project_augmented_error(y, e, A, P):
-    """Take from an error what the projection of the motion takes."""
+    """Remove from an error what the projection of the motion removes."""
     own = A[OWN]
     copy_motion_part(own.y[0], y, P, False)
     copy_motion_part(own.K[0], e, P, False)
@@ -348,8 +351,9 @@ def project_augmented_error(y, e, A, P):
 
 @formula
 def report_augmented_state(t, y, out, A, P):
-    """Write a row of output: the motion's own; then of each parameter changes of positions, velocities, accelerations,
-    multipliers, efforts and works (or powers).
+    """Write a row of output: the motion's own, then the changes with each parameter.
+
+    The changes are those of positions, velocities, accelerations, multipliers, efforts and works (or powers).
     """
     own, rows = A[OWN], A[OUTPUT].rows
     nv, nz, n = P.zero.shape[0], P.size[NZ], P.size[COUNT]
@@ -398,25 +402,25 @@ def variation_kernel(
     states: Float2,
     out: Float2,
 ) -> int:
-    """Integrate motion and changes together, or report them at given states; see ``analysis.linear.variation``.
+    """Integrate motion and changes together, or report them at given states.
 
     Parameters
     ----------
     address, residual : int
-        Of the doors of the engine and of the residuals.
+        Addresses of the kernels of the engine and of the residuals.
     S, W : System, Work
         Of the motion.
     R : Tableau
-    engine_clock, output : Clock, Sheet
+    engine_clock, output : StepState, OutputBuffer
         The engine's.
     SC, WC : System, Work
         In complex numbers.
-    bench : Bench
-    plan : Plan
-    clock : Clock
+    bench : ResidualBatch
+    plan : SensitivityPlan
+    clock : StepState
         Of motion and changes.
     states : (n, width of the state)
-        What to report, at the times of the clock; if there are none, all is integrated.
+        States to report, at the times of ``clock``; if there are none, the motion is integrated.
     out : (n, width)
         Rows of output.
 

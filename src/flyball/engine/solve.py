@@ -1,17 +1,18 @@
 """Solve of [M G^T; G 0] [x; -lam] = [f; gamma] with redundant or singular rows; coordinate partitioning.
 
-Where M is constant and block diagonal, through the Schur complement S = G M^-1 G^T; otherwise through the
-quasi-definite matrix [M G^T; G -delta]; for a forest without rows by articulated bodies. The first two are
-regularised by a small part of each row's natural size D, and refined until the residual of G x = gamma passes or
-stops falling (a proximal-point iteration: of all multipliers it finds those with least sum of D_k lam_k^2).
+Where M is constant and block diagonal, the Schur complement S = G M^-1 G^T is used; otherwise the quasi-definite matrix
+[M G^T; G -delta]; for a forest without rows, articulated bodies. The first two are regularised by a small part of each
+row's natural size D, and refined until the residual of G x = gamma passes or stops falling (a proximal-point iteration:
+of all multipliers it finds those with the least sum of D_k lam_k^2).
 
-The regularisation is not small beyond need. Near a singular position a row combination with singular value s
-answers a rounding error e with e / s; refinement removes the regularisation from everything that is well determined
-within a few passes, while what is undetermined grows by no more than passes * s / delta.
+The regularisation is not smaller than needed. Near a singular position a row combination with singular value s answers
+a rounding error e with e / s. Refinement removes the regularisation from all well determined components within a few
+passes, while undetermined ones grow by no more than passes * s / delta.
 
-With G = [G_d G_i], dependent and independent columns, dv_d = B dv_i where B = -G_d^-1 G_i (Wehage and Haug 1982,
-*Journal of Mechanical Design* 104, 247-255). Positions and velocities are solved for the dependent coordinates; the
-independent ones stay as integrated, and are exchanged when another set is better conditioned.
+Coordinate partitioning: with G = [G_d G_i], dependent and independent columns, dv_d = B dv_i where B = -G_d^-1 G_i
+(Wehage and Haug 1982, *Journal of Mechanical Design* 104, 247-255). Positions and velocities are solved for the
+dependent coordinates; the independent ones keep their integrated values. They are exchanged when another set is better
+conditioned.
 """
 
 from __future__ import annotations
@@ -36,10 +37,10 @@ from .calls import call_generated
 from .rows import row_times, size_inactive_rows
 
 MAX_REFINEMENTS = 20
-DIAGONAL_ROUNDING = 1e-13  # of a row's own entry: what its slender bodies blur
-RIGID_MASS = 1e30  # times its own mass: what an independent coordinate weighs where only dependent ones may move
-MULTIPLIER_ROUNDING = 1e-15  # of D_k |lam_k|: a residual that no refinement makes smaller
-STALLED = 0.7  # a refinement that leaves more than this of the residual is the last
+DIAGONAL_ROUNDING = 1e-13  # relative to a row's own diagonal entry: rounding due to slender bodies
+RIGID_MASS = 1e30  # factor on the mass of an independent coordinate where only dependent ones may move
+MULTIPLIER_ROUNDING = 1e-15  # of D_k |lam_k|: a residual that refinement cannot reduce
+STALLED = 0.7  # refinement stops after a pass that leaves more than this fraction of the residual
 
 
 @formula
@@ -60,7 +61,7 @@ def apply_inverse_mass(S, b, x, at, out, to):
 
 @formula
 def factor(S, W):
-    """Factor the matrix of the solve at the kinematics and rows now in W. Returns 0 or 1 + a guilty unknown."""
+    """Factor the matrix of the solve at the kinematics and rows now in W. Returns 0, or 1 + a singular unknown."""
     W.counts.factorisations += 1
     if W.made[FACTOR] != 0:
         return int(call_generated(W.made[FACTOR], S, W, 0.0, W.A, W.A, W.A, W.A))
@@ -84,7 +85,7 @@ def rows_by_inverse_mass(S, W):
 
 @formula
 def dependent_rows_by_inverse_mass(S, W, b, at):
-    """A block of H with masses of the dependent coordinates alone: the independent ones do not move."""
+    """Block of M^-1 G^T with the inverse masses of dependent coordinates only: the independent ones do not move."""
     n = S.tree.nv[b]
     for k in range(n):
         per = S.bodies.inverse_mass[b] if k <= n // 3 else S.bodies.inverse_reference_inertia[b]
@@ -93,9 +94,9 @@ def dependent_rows_by_inverse_mass(S, W, b, at):
 
 @formula
 def natural_row_sizes(S, W):
-    """Each row's diagonal entry of G M^-1 G^T as it would be if every body were compact: what "small" is measured by.
+    """Diagonal entries of G M^-1 G^T as they would be if every body were compact: the scale of small values.
 
-    A slender body makes entries a million times larger along its own axis, which say nothing about the others.
+    A slender body makes entries a million times larger along its own axis, which are no measure of the others.
     """
     for k in range(S.rows.law.shape[0]):
         W.rows.diagonal[k] = 0.0
@@ -115,7 +116,7 @@ def natural_row_sizes(S, W):
 
 @formula
 def reuse_factor(S, W):
-    """Keep the last factor for rows that have moved a little: as a preconditioner of the refinement."""
+    """Keep the last factor for rows that have changed little, as a preconditioner of the refinement."""
     if S.sizes.solver == SCHUR:
         if W.made[REUSE] != 0:
             call_generated(W.made[REUSE], S, W, 0.0, W.A, W.A, W.A, W.A)
@@ -125,7 +126,7 @@ def reuse_factor(S, W):
 
 @formula
 def factor_schur(S, W):
-    """S = G M^-1 G^T, block by block."""
+    """Form S = G M^-1 G^T block by block and factor it."""
     rows_by_inverse_mass(S, W)
     for e in range(W.A.shape[0]):
         W.A[e] = 0.0
@@ -144,10 +145,10 @@ def factor_schur(S, W):
 
 @formula
 def factor_coupled(S, W):
-    """[M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M standing for M in delta.
+    """Factor [M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M in place of M in delta.
 
-    To the entries of G a lever is added, 1 or the mechanism's length: the size of a row along which the forest cannot
-    move just now, or never, must not vanish with them.
+    For delta, a lever (1 or the mechanism's length) is added to the entries of G: the size of a row along which the
+    forest cannot move, now or ever, must not vanish with its entries.
     """
     nv = W.velocities.solved.shape[0]
     per = W.velocities.scratch_1
@@ -165,7 +166,7 @@ def factor_coupled(S, W):
         s = 0.0 * W.rows.diagonal[k]
         for e in range(S.row_start[k], S.row_start[k + 1]):
             W.A[S.pairs.place[e]] = W.G[e]
-            if S.pairs.place[e] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
+            if S.pairs.place[e] < S.ldl.Ai.shape[0]:  # prescribed velocities do not count
                 s += (W.G[e] * W.G[e] + lever) * per[S.column[e]]
         s = choose(s, s, s + 1.0)
         W.rows.diagonal[k] = s
@@ -175,10 +176,10 @@ def factor_coupled(S, W):
 
 @formula
 def solve(S, W, f, gamma, x, lam, loaded, refinements):
-    """Solve for x and lam with the factor in W; ``f`` (taken as zero unless ``loaded``) and ``gamma`` are kept.
+    """Solve for x and lam with the factor in W; ``f`` (taken as zero unless ``loaded``) and ``gamma`` are not changed.
 
-    Prescribed velocities have the accelerations in `W.velocities.prescribed` if loaded, else they stay. Where M is
-    semidefinite, M + E is factored in its place and the refinement takes E out again. Returns the residual left,
+    Prescribed velocities have the accelerations in `W.velocities.prescribed` if loaded, else zero. Where M is
+    semidefinite, M + E is factored in its place and the refinement removes E again. Returns the remaining residual,
     relative to the size of its terms.
     """
     W.counts.solves += 1
@@ -199,7 +200,7 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
 
 @formula
 def solve_generated(S, W, f, gamma, x, lam, loaded, refinements):
-    """By code made for the mechanism: passes for what is left, until that passes or stops falling."""
+    """Solve by code generated for the mechanism, with refinement passes until the residual passes or stops falling."""
     worst = call_generated(W.made[(STEP if loaded else STEP_UNLOADED)], S, W, 0.0, f, gamma, x, lam)
     last = last_off = 1e300
     for _ in range(refinements + 1 if W.made[REFINE] != 0 else 0):
@@ -213,17 +214,17 @@ def solve_generated(S, W, f, gamma, x, lam, loaded, refinements):
 
 @formula
 def is_stalled(worst, last, off, last_off, beyond):
-    """Whether another pass is of no use; arguments as `remainder_coupled` returns them, now and after the last pass.
+    """Whether another pass is useless; arguments as `remainder_coupled` returns them, now and after the last pass.
 
-    Where all accelerations are zero but for what is left, as at rest, what is left relative to its terms does not fall
-    however near zero they come: there it is its size that has to fall.
+    Where all accelerations are zero except for residuals, as at rest, the relative residual does not fall however small
+    they become. There the residual itself has to fall.
     """
     return worst > STALLED * last and (not beyond > 0.0 or off > STALLED * last_off)
 
 
 @formula
 def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
-    """Through S = G M^-1 G^T: one pass, then as many for what is left as it takes."""
+    """Solve through S = G M^-1 G^T: one pass, then as many refinement passes as needed."""
     rhs = W.velocities.scratch_2
     semidefinite = S.scales.semidefinite > 0.0 and not W.options.partitioned > 0.0
     for d in range(x.shape[0]):
@@ -249,7 +250,7 @@ def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
 def pass_schur(S, W, rhs, x, lam, loaded):
     """Add to x and lam one solve for the residual in `W.rows.scratch_1` and, if ``loaded``, for rhs, which is cleared.
 
-    The step is left in `W.velocities.scratch_1`.
+    The change of x is left in `W.velocities.scratch_1`.
     """
     dx = W.velocities.scratch_1
     r = W.rows.scratch_1
@@ -274,7 +275,7 @@ def pass_schur(S, W, rhs, x, lam, loaded):
 
 @formula
 def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
-    """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving."""
+    """Solve with [M G^T; G -delta]: refinement passes until both equations are satisfied or stop improving."""
     rhs = W.velocities.scratch_2
     worst = 1.0
     last = last_off = 1e300
@@ -292,7 +293,7 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
 
 @formula
 def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
-    """Add to x and lam one solve for what is left of both lines; returns what `remainder_coupled` does."""
+    """Add to x and lam one solve for the residuals of both equations; returns what `remainder_coupled` does."""
     z = W.D[2]
     nv = x.shape[0]
     for d in range(nv):
@@ -309,7 +310,7 @@ def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
 
 @formula
 def remainder_schur(S, W, gamma, x, lam, rhs, semidefinite):
-    """What a pass through S leaves of both lines; returns what `remainder_coupled` does."""
+    """Residuals of both equations after a pass through S; returns what `remainder_coupled` does."""
     worst, off, beyond = row_residual(S, W, gamma, x, lam)
     if semidefinite:
         worst = larger(worst, excess_mass_residual(S, W.velocities.scratch_1, rhs, x))
@@ -318,7 +319,7 @@ def remainder_schur(S, W, gamma, x, lam, rhs, semidefinite):
 
 @formula
 def beyond_rounding(W, k, residual, lam):
-    """Size of what is left of row k, less the rounding of what its multiplier does to x = M^-1 (f + G^T lam) along it."""
+    """Residual of row k beyond rounding, which its multiplier causes in x = M^-1 (f + G^T lam)."""
     return magnitude(residual) - MULTIPLIER_ROUNDING * magnitude(W.rows.diagonal[k] * lam[k])
 
 
@@ -326,7 +327,7 @@ def beyond_rounding(W, k, residual, lam):
 def row_residual(S, W, gamma, x, lam):
     """R = gamma - G x into `W.rows.scratch_1`.
 
-    Returns its largest entry relative to its terms, that entry, and what it has beyond rounding.
+    Returns its largest entry relative to its terms, that entry, and its part beyond rounding.
     """
     off = beyond = 0.0
     size = 1e-300
@@ -346,11 +347,10 @@ def row_residual(S, W, gamma, x, lam):
 
 @formula
 def remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded):
-    """Both lines of the coupled equations: gamma - G x into `W.rows.scratch_1`, f - M x + G^T lam into rhs.
+    """Residuals of the coupled equations: gamma - G x into `W.rows.scratch_1`, f - M x + G^T lam into rhs.
 
-    Returns the largest entry of either relative to its terms, that of the first line, and what this has beyond
-    rounding. What is left in the lines of prescribed velocities is what their drivers have to do: it goes to
-    `W.velocities.effort`.
+    Returns the largest entry of either relative to its terms, that of gamma - G x, and its part beyond rounding. The
+    residuals of prescribed velocities are the efforts of their drivers: they go to `W.velocities.effort`.
     """
     size = 1e-300
     for d in range(x.shape[0]):
@@ -393,7 +393,7 @@ def remainder_coupled(S, W, f, gamma, x, lam, rhs, loaded):
 
 @formula
 def excess_mass_residual(S, dx, rhs, x):
-    """Rhs = E dx: what the regularised mass of the last step has to give back. Returns its size relative to M x."""
+    """E dx into ``rhs``: the force of the regularising mass in the last step. Returns its size relative to M x."""
     worst = 0.0
     size = 1e-300
     for b in range(S.tree.parent.shape[0]):
@@ -415,15 +415,16 @@ def excess_mass_residual(S, dx, rhs, x):
     return worst / size
 
 
-EXCHANGE_RATIO = 4.0  # a dependent coordinate that moves by more than this times an independent one takes its place
+# a dependent coordinate that moves by more than this times an independent one is exchanged with it
+EXCHANGE_RATIO = 4.0
 
 
 @formula
 def exchange_coordinates(S, W):
-    """Exchange coordinates as long as an entry of B, in sizes of its coordinates, is above MOST.
+    """Exchange coordinates as long as an entry of B, scaled by its coordinates' sizes, is above `EXCHANGE_RATIO`.
 
-    Each exchange multiplies the volume |det G_d| by that entry, so this comes to an end, and the pivots stay away from
-    zero (the exchange is that of Goreinov, Tyrtyshnikov and Zamarashkin 1997, for submatrices of large volume).
+    Each exchange multiplies the volume |det G_d| by that entry, so this ends, and the pivots stay away from zero (the
+    exchange is that of Goreinov, Tyrtyshnikov and Zamarashkin 1997, for submatrices of large volume).
     """
     way = W.velocities.scratch_3
     r = W.rows.scratch_2
@@ -453,7 +454,7 @@ def exchange_coordinates(S, W):
 
 @formula
 def negative_column(S, W, i, out):
-    """Minus column i of G into ``out``."""
+    """Write minus column i of G to ``out``."""
     for k in range(out.shape[0]):
         out[k] = 0.0
         for e in range(S.row_start[k], S.row_start[k + 1]):

@@ -1,4 +1,4 @@
-"""Force elements: one file each, found by itself. A new force is a new file here, and a line below for editors."""
+"""Force elements: one file each, found automatically. A new force is a new file here, and a line below for editors."""
 
 import importlib
 import pkgutil
@@ -14,15 +14,15 @@ for _module in pkgutil.iter_modules(__path__):
 
 _HERE = [c for c in Force.registry.values() if issubclass(c, Force) and c.__module__.startswith(f"{__name__}.")]
 ALL = [c for c in _HERE if c.category == Force.category]
-"""Every force element that a file of this folder defines; all are public."""
+"""Every force element defined in a file of this folder; all are public."""
 LIMITS = [c for c in _HERE if c.category != Force.category]
-"""Every one-sided element: stops, plays, latches. What is elastic of them acts by a formula as forces do."""
+"""Every one-sided element: stops, play, latches. Elastic ones act by a formula, as forces do."""
 
 globals().update({c.__name__: c for c in _HERE})
 
 
 def formulas(elements: list[type[Force]], name: str) -> dict[int, Callable]:
-    """Kind -> formula of that name; elements of one kind share it.
+    """Return kind -> formula of that name; elements of one kind share it.
 
     Raises
     ------
@@ -38,8 +38,11 @@ def formulas(elements: list[type[Force]], name: str) -> dict[int, Callable]:
 
 INPUTS, WRENCHES, EFFORTS = (formulas(_HERE, name) for name in ("inputs", "wrench", "effort"))
 BRANCHES = formulas(_HERE, "branch")
-"""Kind -> four numbers, of which two states within half a turn that are on one branch of a force's formula have a
-positive product; and the speed [rad/s] at which it turns."""
+"""Kind -> formula for the branch of a force's rotation: four numbers and the speed [rad/s] of rotation.
+
+The four numbers of two states within half a turn of each other have a positive product if both states are on one branch
+of the formula.
+"""
 SIGNATURES = (
     Signature("inputs", "par, F, M", (16, FRAME, FRAME), 2, "two numbers: a quantity and its rate"),
     Signature(

@@ -16,17 +16,17 @@ from .limit import KIND, effort, energy, stop_parameters, stop_switch_numbers
 if TYPE_CHECKING:
     from ..model.model import Model
 
-WEIGHTS = ("1", "m", "m/rad", "rad/m", "1/m")  # units that weights may have
+WEIGHTS = ("1", "m", "m/rad", "rad/m", "1/m")  # permitted units of weights
 
 
 @element
 class Backlash(Unilateral):
     """Coordinates in a linear relation with play: gears that mesh loosely, a dog clutch, a worn key, a slack fork.
 
-    A `Coupler` holds weight_1 q_1 + weight_2 q_2 + ... constant; here the sum may move freely by the ``gap``, and is
-    stopped at either end of it: rigidly, with a restitution, or elastically. It takes the place of the coupling.
-    Gears on parallel axes that point the same way: the radii (or numbers of teeth) are the weights, both positive for
-    external gears, the second negative for a ring with its teeth inside.
+    A `Coupler` keeps weight_1 q_1 + weight_2 q_2 + ... constant; here the sum moves freely within the ``gap``, and is
+    stopped at either end of it: rigidly, with a restitution, or elastically. It replaces the coupling. For gears on
+    parallel axes of equal direction the weights are the radii (or numbers of teeth), both positive for external gears,
+    the second negative for an internal gear.
 
     Parameters
     ----------
@@ -36,21 +36,20 @@ class Backlash(Unilateral):
     weights : list of numbers
         One for each coordinate. Not given: 1 for the first and -1 for the second of two.
     gap : number [rad] or [m]
-        How far the first coordinate can go from one end of the play to the other while the others rest.
+        Travel of the first coordinate from one end of the play to the other while the others rest.
     middle : number [rad] or [m]
-        Sum q_1 + (weight_2 / weight_1) q_2 + ... in the middle of the play; as drawn if not given.
+        Sum q_1 + (weight_2 / weight_1) q_2 + ... in the middle of the play; that of the reference configuration if not
+        given.
     restitution : number [1]
-        Of a rigid one, from 0 (dead, and what stands if it is not given) to 1 (no energy lost).
+        Of a rigid stop, from 0 (no rebound; the default) to 1 (no energy lost).
     stiffness : number [N/m] or [N m/rad]
-        Of the flanks, as seen at the first coordinate: makes it elastic.
+        Stiffness of the flanks at the first coordinate; makes the stop elastic.
     damping : number [N s/m] or [N m s/rad]
         Of elastic flanks.
 
     Notes
-    -----
-    A result tells ``value``: q_1 + (weight_2 / weight_1) q_2 + ... from the middle of the play, its ``rate``, the
-    ``force`` along it, which is what acts on the first coordinate, and ``closed``: 1 at the lower end, -1 at the
-    upper, 0 between.
+    ----- A result contains ``value``: q_1 + (weight_2 / weight_1) q_2 + ... from the middle of the play, its ``rate``,
+    the ``force`` along it (on the first coordinate), and ``closed``: 1 at the lower end, -1 at the upper, 0 between.
     """
 
     coordinates: tuple[str, ...] = field(kw_only=False)
@@ -68,29 +67,29 @@ class Backlash(Unilateral):
     dimensions: ClassVar = Unilateral.dimensions | {"gap": ("m", "rad"), "middle": ("m", "rad")}
 
     def along(self) -> tuple[str, ...]:
-        """The coordinates."""
+        """Return the coordinates."""
         return self.coordinates
 
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
-        """Weights relative to the first."""
+        """Return the weights relative to the first."""
         given = n.weights if n.weights is not None else (1.0, -1.0)[: len(self.coordinates)]
         return tuple(w / given[0] for w in given)
 
     def total(self, n: SimpleNamespace) -> Any:
-        """What the sum is in the middle of the play; as drawn if None."""
+        """Return the sum in the middle of the play; None: that of the reference configuration."""
         return n.middle
 
     def first_weight(self, n: SimpleNamespace) -> float:
-        """Weights are relative to the first."""
+        """Return 1: weights are relative to the first."""
         return 1.0
 
     def examine(self, model: Model) -> None:
-        """Its coordinates are there."""
+        """Require that its coordinates exist."""
         for text in self.coordinates:
             model.coordinate(text, self)
 
     def check(self, n: SimpleNamespace) -> None:
-        """A gap, and a weight for each of different coordinates, none of them zero."""
+        """Require a gap, and a nonzero weight for each of different coordinates."""
         positive(self, n, "gap", why="Without any play it is a Coupler or a GearPair")
         check_restitution(self, n)
         check_elastic(self, n)
@@ -109,14 +108,16 @@ class Backlash(Unilateral):
             raise ModelError(f"{self.title}: a weight is 0, which couples nothing; got {n.weights}")
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         return stop_parameters(n, -0.5 * n.gap, 0.5 * n.gap)
 
     def switches(self) -> tuple[Switch, ...]:
-        """One along the sum, counted from the middle, so its own where it has one coordinate too."""
+        """Return one switch along the sum, which is measured from the middle of the play and thus a quantity of its
+        own.
+        """
         kind = ELASTIC if self.acts() else STOP
         return (Switch(kind, along=self.coordinates, slides=self.acts(), weighted=True),)
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
-        """Half the gap to either side."""
+        """Return the bounds: half the gap on either side."""
         return stop_switch_numbers(n, -0.5 * n.gap, 0.5 * n.gap)

@@ -23,13 +23,13 @@ KIND = 5
 
 @formula
 def scaled_components(par, k, a):
-    """Three neighbouring parameters, each times its component of a."""
+    """Return three neighbouring parameters, each times its component of a."""
     return (par[k] * a[0], par[k + 1] * a[1], par[k + 2] * a[2])
 
 
 @formula
 def relative_rotation(par, F, M):
-    """Rotation from F to M; none where nothing is asked to turn back."""
+    """Return the rotation from F to M; the identity without torsional stiffness."""
     R = mm(transpose(F[1]), M[1])
     k = par[6] + par[7] + par[8]
     l = 0.0 * R[0] + 1.0
@@ -42,15 +42,16 @@ def relative_rotation(par, F, M):
 
 @formula
 def deflection(par, F, M):
-    """Displacement and rotation vector of M seen from F, along F's axes."""
+    """Return the displacement and rotation vector of M relative to F, along F's axes."""
     return mtv(F[1], sub(M[0], F[0])), rotation_vector(relative_rotation(par, F, M))
 
 
 @formula
 def branch(par, F, M):
-    """The rotation's quaternion times four times its first component, which passes zero at half a turn; and its speed.
+    """Return the rotation's quaternion times four times its first component, and the speed of rotation.
 
-    Two of these within half a turn of each other have a positive product, unless half a turn lies between them.
+    The first component passes zero at half a turn. The results of two states within half a turn of each other have a
+    positive product, unless half a turn lies between them.
     """
     R = relative_rotation(par, F, M)
     k = par[6] + par[7] + par[8]
@@ -60,16 +61,16 @@ def branch(par, F, M):
 
 @formula
 def inputs(par, F, M):
-    """It has no laws."""
+    """Return zeros: a bushing has no laws."""
     return 0.0 * M[0][0], 0.0 * M[0][0]
 
 
 @formula
 def wrench(par, F, M, laws, values):
-    """On M, along F's axes: force -K d - C ddot, torque -J^T K_r theta - C_r omega.
+    """Return the wrench on M, along F's axes: force -K d - C ddot, torque -J^T K_r theta - C_r omega.
 
-    With theta the rotation vector, thetadot = J omega: the torque is the exact gradient of theta . K_r theta / 2, so
-    a bushing without damping keeps energy also where it turns far and its stiffnesses differ.
+    With theta the rotation vector, thetadot = J omega: the torque is the exact gradient of theta . K_r theta / 2, so a
+    bushing without damping conserves energy also at large rotations with different stiffnesses.
     """
     d, theta = deflection(par, F, M)
     u = sub(sub(M[3], F[3]), cross(F[2], sub(M[0], F[0])))
@@ -95,11 +96,11 @@ PerAxis = Number | Numbers
 
 @element
 class Bushing(TwoFrameForce):
-    """A rubber mount: ``body_j`` is held to ``body_i`` at a point by springs and dampers, in six components.
+    """A rubber mount: springs and dampers in six components connect ``body_j`` to ``body_i`` at a point.
 
-    It carries nothing as drawn. Components are along axes fixed in ``body_i``. Rotations are measured by the rotation
-    vector, so they have no singular position short of half a turn; there the run stops, unless no torsional stiffness
-    is given.
+    It is unloaded in the reference configuration. Components are along axes fixed in ``body_i``. Rotations are measured
+    by the rotation vector, which is regular up to half a turn; there the run stops, unless no torsional stiffness is
+    given.
 
     Parameters
     ----------
@@ -109,7 +110,7 @@ class Bushing(TwoFrameForce):
     at : point [m]
         The point, in world coordinates of the drawn configuration.
     orientation : quaternion, Bryant angles [rad] or matrix; in the plane one angle
-        Axes of the components, in the world as drawn.
+        Axes of the components, in the world, in the reference configuration.
     stiffness : number, or one for each axis [N/m]
     damping : number, or one for each axis [N s/m]
     torsional_stiffness : number, or one for each axis [N m/rad]
@@ -134,7 +135,7 @@ class Bushing(TwoFrameForce):
     )
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
-        """Both frames at the point."""
+        """Return both frames at the point."""
         self._fit(n, planar)
         if n.at is None:
             return None
@@ -145,7 +146,7 @@ class Bushing(TwoFrameForce):
         return {"F": (p, R), "M": (p, R)}
 
     def _fit(self, n: SimpleNamespace, planar: bool) -> None:
-        """As many numbers as there are axes, and an orientation of the right kind."""
+        """Require as many numbers as there are axes, and a valid orientation."""
         for name in ("stiffness", "damping", "torsional_stiffness", "torsional_damping"):
             wanted = 3 if not planar else 1 if name.startswith("torsional") else 2
             value = getattr(n, name)
@@ -157,14 +158,14 @@ class Bushing(TwoFrameForce):
             raise ModelError(f"{self.title}: in a spatial mechanism give orientation=, not angle=")
 
     def check(self, n: SimpleNamespace) -> None:
-        """Constants are one number, or one for each axis, and not negative."""
+        """Require constants that are one number, or one for each axis, and not negative."""
         for name in ("stiffness", "damping", "torsional_stiffness", "torsional_damping"):
             value = np.atleast_1d(getattr(n, name))
             if len(value) not in (1, 2, 3) or not all(x.real >= 0.0 for x in value):
                 raise ModelError(f"{self.title}: {name} is one number or one for each axis, none negative; got {value}")
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         return (
             *_three_components(n.stiffness),
             *_three_components(n.damping),
@@ -173,12 +174,12 @@ class Bushing(TwoFrameForce):
         )
 
     def conservative(self) -> bool:
-        """Whether its energy is all that it ever takes or gives."""
+        """Return whether it has no damping, so that it only exchanges stored energy."""
         return not np.any(np.array(self.damping) != 0.0) and not np.any(np.array(self.torsional_damping) != 0.0)
 
 
 def _three_components(value: Any, turning: bool = False) -> tuple[float, ...]:
-    """One for each axis; in the plane two along it, or the one about the normal."""
+    """Return one number for each axis; in the plane two for displacements, or one about the normal."""
     if not isinstance(value, tuple):
         return (value, value, value)
     if len(value) == 1 and turning:

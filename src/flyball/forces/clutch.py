@@ -1,4 +1,4 @@
-"""Clutch and brake: friction whose capacity follows a law, between two coordinates or along one."""
+"""Clutch and brake: friction with a capacity given by a law, between two coordinates or along one."""
 
 from __future__ import annotations
 
@@ -24,14 +24,16 @@ KIND = 7
 
 @formula
 def effort(par, x, rate, laws, load):
-    """Along the slip: -capacity against the direction of sliding; ``static`` times that where rest is asked for."""
+    """Effort along the slip: -capacity times the sliding direction; ``static`` times that if static friction is
+    requested.
+    """
     o = 0.0 * x
     capacity = choose(-laws[0], o + math.nan, laws[0])
     return -par[0] * capacity * choose(laws[2] - SLIDING, par[1] + o, laws[2] + o)
 
 
 class CapacityFriction:
-    """What clutches and brakes share: a capacity by law, and how much more than that holds at rest."""
+    """Base class of clutches and brakes: a capacity by law, and the ratio of static to sliding capacity."""
 
     title: str
     capacity: Law
@@ -45,11 +47,11 @@ class CapacityFriction:
     not_negative: ClassVar[tuple[str, ...]] = ("capacity",)
 
     def switches(self) -> tuple[Switch, ...]:
-        """It holds, or slips."""
+        """Return one friction switch."""
         return (Switch(FRICTION, along=self.along(), slides=True),)
 
     def check(self, n: SimpleNamespace) -> None:
-        """What holds at rest is no less than what holds in sliding."""
+        """Require a static ratio of at least 1."""
         if not n.static.real >= 1.0:
             raise ModelError(
                 f"{self.title}: static is {n.static:g}; it must be 1 or greater: what it holds at rest, relative to "
@@ -57,20 +59,20 @@ class CapacityFriction:
             )
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         return (1.0, n.static)
 
     def laws(self) -> tuple[Law | None, ...]:
-        """The capacity."""
+        """Return the capacity."""
         return (self.capacity,)
 
 
 @element
 class Brake(CapacityFriction, CoordinateForce):
-    """A brake along a coordinate: it holds it, or slips where more than its capacity pulls.
+    """A brake along a coordinate: it locks the coordinate, or slips if the load exceeds its capacity.
 
-    What it carries while it slips is its capacity, against the motion; what it holds at rest is ``static`` times that.
-    What it holds does not move at all. Friction that follows from what a joint carries is `JointFriction`.
+    While slipping it acts with its capacity against the motion; at rest it can hold ``static`` times that. A locked
+    coordinate does not move at all. For friction proportional to a joint's load use `JointFriction`.
 
     Parameters
     ----------
@@ -80,7 +82,7 @@ class Brake(CapacityFriction, CoordinateForce):
     capacity : law [N m] or [N]
         An expression of ``t``, ``value``, ``rate``, sensors and parameters; never negative.
     static : number [1]
-        What it holds at rest as a multiple of that; 1 or greater.
+        Ratio of the capacity at rest to that; 1 or greater.
 
     Raises
     ------
@@ -97,7 +99,7 @@ class Brake(CapacityFriction, CoordinateForce):
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "friction": "effort"}
 
     def coordinate_text(self) -> str:
-        """As given."""
+        """Return the coordinate as given."""
         return self.coordinate
 
 
@@ -105,9 +107,9 @@ class Brake(CapacityFriction, CoordinateForce):
 class Clutch(CapacityFriction, CoordinateForce):
     """A clutch between two coordinates, such as the angles of two shafts: it locks them together, slips, or is open.
 
-    Slip is the second coordinate less the first one. While it slips it carries its capacity, against the slip, as a
-    torque on the second and its reverse on the first; once the slip is over it locks, and slips again where more than
-    ``static`` times its capacity pulls. With a capacity of zero it is open. Heat is its ``work``, reversed.
+    Slip is the second coordinate minus the first one. While slipping it transmits its capacity, against the slip, as a
+    torque on the second and its reverse on the first. It locks when the slip ends, and slips again if the load exceeds
+    ``static`` times its capacity. With a capacity of zero it is open. The heat is minus its ``work``.
 
     Parameters
     ----------
@@ -117,7 +119,7 @@ class Clutch(CapacityFriction, CoordinateForce):
     capacity : law [N m] or [N]
         An expression of ``t``, ``slip``, ``rate``, sensors and parameters; never negative.
     static : number [1]
-        What it holds when locked as a multiple of that; 1 or greater.
+        Ratio of the capacity when locked to that; 1 or greater.
 
     Raises
     ------
@@ -135,15 +137,15 @@ class Clutch(CapacityFriction, CoordinateForce):
     outputs: ClassVar[dict[str, str]] = {"slip": "", "rate": "/s", "friction": "effort"}
 
     def along(self) -> tuple[str, ...]:
-        """The coordinates."""
+        """Return the coordinates."""
         return (self.coordinate_i, self.coordinate_j)
 
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[Any, ...]:
-        """Slip is the second less the first."""
+        """Return the weights: slip is the second coordinate minus the first."""
         return (-1.0, 1.0)
 
     def examine(self, model: Model) -> None:
-        """Two different coordinates of one kind."""
+        """Require two different coordinates of one kind."""
         if self.coordinate_i == self.coordinate_j:
             raise ModelError(f"{self.title}: both its coordinates are {self.coordinate_i!r}; name two")
         first, second = (model.unit(x, self) for x in self.along())

@@ -16,7 +16,7 @@ KIND = 1
 
 @formula
 def effort(par, x, rate, laws, load):
-    """Along x: -k (x - x_0) - c rate + law."""
+    """Return the effort along x: -k (x - x_0) - c rate + law."""
     return laws[0] - par[0] * (x - par[2]) - par[1] * rate
 
 
@@ -28,9 +28,9 @@ def energy(par, x):
 
 @element
 class CoordinateSpring(CoordinateForce):
-    """Spring and damper along a coordinate: of a prismatic joint, say, or a point's height.
+    """Spring and damper along a coordinate, for instance of a prismatic joint, or a point's height.
 
-    The force (or torque) -k (x - rest) - c rate acts along the coordinate, whole turns of angles counted.
+    The force (or torque) -k (x - rest) - c rate acts along the coordinate; full turns of angles are counted.
 
     Parameters
     ----------
@@ -41,9 +41,9 @@ class CoordinateSpring(CoordinateForce):
     stiffness : number [N/m] or [N m/rad]
     damping : number [N s/m] or [N m s/rad]
     rest : number [m] or [rad]
-        Value of the coordinate at which the spring carries nothing.
+        Value of the coordinate at which the spring is unloaded.
     force : law [N] or [N m]
-        Added, an expression of ``t``, ``value``, ``rate``, sensors and parameters.
+        Added force, an expression of ``t``, ``value``, ``rate``, sensors and parameters.
     """
 
     coordinate: str = field(kw_only=False)
@@ -58,7 +58,7 @@ class CoordinateSpring(CoordinateForce):
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}
 
     def coordinate_text(self) -> str:
-        """As given."""
+        """Return the coordinate as given."""
         return self.coordinate
 
     def check(self, n: SimpleNamespace) -> None:
@@ -67,20 +67,20 @@ class CoordinateSpring(CoordinateForce):
         refuse_without_stiffness(self, "rest", 0.0)
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         return (n.stiffness, n.damping, n.rest)
 
     def laws(self) -> tuple[Law | None, ...]:
-        """Expressions that the formulas see."""
+        """Return the laws of the formulas."""
         return (self.force,)
 
     def conservative(self) -> bool:
-        """Whether its energy is all that it ever takes or gives."""
+        """Return whether it has no damping and no law, so that it only exchanges stored energy."""
         return self.force is None and self.damping == 0.0
 
 
 def measuring_spring(name: str, coordinate: str) -> CoordinateSpring:
-    """A spring of no stiffness: all that comes of it is that its coordinate is measured."""
+    """Return a spring of zero stiffness, whose only purpose is to measure its coordinate."""
     return CoordinateSpring(name, coordinate)
 
 
@@ -105,21 +105,21 @@ class Actuator(CoordinateForce):
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}
 
     def coordinate_text(self) -> str:
-        """As given."""
+        """Return the coordinate as given."""
         return self.coordinate
 
     def laws(self) -> tuple[Law | None, ...]:
-        """The force."""
+        """Return the force law."""
         return (self.force,)
 
 
 def law_actuator(name: str, coordinate: str, force: str) -> Actuator:
-    """A force along a coordinate by a law."""
+    """Return a force along a coordinate by a law."""
     return Actuator(name, coordinate, force=force)
 
 
 def refuse_without_stiffness(e: Any, name: str, usual: float | None) -> None:
-    """Refuse where a spring carries nothing if it has no stiffness.
+    """Refuse a field that has no effect on a spring without stiffness.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Detent: notches that hold a coordinate until enough force takes it on."""
+"""Detent: notches that hold a coordinate until the force exceeds a limit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ KIND = 9
 
 @formula
 def effort(par, x, rate, laws, load):
-    """Along x: -T sin(2 pi (x - x_0) / p) - c rate."""
+    """Return the effort along x: -T sin(2 pi (x - x_0) / p) - c rate."""
     return -par[0] * sin(par[1] * (x - par[2])) - par[3] * rate
 
 
@@ -33,10 +33,10 @@ def energy(par, x):
 class Detent(CoordinateForce):
     """Notches at a pitch: a click wheel, a stepping motor at rest, a ball that a spring presses into a row of dimples.
 
-    The law is the smooth one of a sine: -holding sin(2 pi (x - notch) / pitch) - damping rate. The coordinate rests in
-    any notch, with the stiffness 2 pi holding / pitch there; a force greater than ``holding`` takes it out; a quarter
-    of a pitch from a notch it is held most, and half way between two notches it may tip to either. From notch to notch
-    stands a barrier of the energy holding pitch / pi. Friction, which notches with edges have too, is `JointFriction`.
+    The law is a sine: -holding sin(2 pi (x - notch) / pitch) - damping rate. The coordinate rests in any notch, with
+    the stiffness 2 pi holding / pitch there; a force greater than ``holding`` moves it out. The restoring force is
+    largest a quarter of a pitch from a notch; half way between two notches is an unstable equilibrium. The energy
+    barrier between notches is holding pitch / pi. For friction add a `JointFriction`.
 
     Parameters
     ----------
@@ -44,15 +44,15 @@ class Detent(CoordinateForce):
     coordinate : str
         ``"joint.coordinate"``, or a world coordinate of a body's or frame's origin.
     pitch : number [rad] or [m]
-        From notch to notch.
+        Distance between notches.
     holding : number [N] or [N m]
-        Greatest force or torque that it holds against; or give ``barrier``.
+        Greatest force or torque that it can resist; or give ``barrier``.
     barrier : number [J]
-        Energy that takes it from one notch to the next.
+        Energy needed to move from one notch to the next.
     notch : number [rad] or [m]
         Value of the coordinate in one of the notches.
     damping : number [N s/m] or [N m s/rad]
-        Against the rate, everywhere.
+        Viscous damping, at every position.
     """
 
     coordinate: str = field(kw_only=False)
@@ -73,21 +73,21 @@ class Detent(CoordinateForce):
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}
 
     def coordinate_text(self) -> str:
-        """As given."""
+        """Return the coordinate as given."""
         return self.coordinate
 
     def check(self, n: SimpleNamespace) -> None:
-        """A pitch, and one of holding and barrier."""
+        """Require a pitch, and either holding or barrier."""
         positive(self, n, "pitch", "holding", "barrier")
         nonnegative(self, n, "damping")
         if (n.holding is None) == (n.barrier is None):
             raise ModelError(f"{self.title}: give holding= or barrier=, one of them")
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         holding = n.holding if n.barrier is None else np.pi * n.barrier / n.pitch
         return (holding, 2.0 * np.pi / n.pitch, n.notch, n.damping)
 
     def conservative(self) -> bool:
-        """Whether its energy is all that it ever takes or gives."""
+        """Return whether it has no damping, so that it only exchanges stored energy."""
         return self.damping == 0.0

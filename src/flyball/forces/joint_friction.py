@@ -1,4 +1,4 @@
-"""Friction in a joint, driven by what the joint actually carries."""
+"""Friction in a joint, proportional to the joint's actual load."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 KIND = 6
 TURN = 6.283185307179586  # rad
-SLIDING = 1.5  # ways of sliding are -1, 0 and 1; `constraints.modes.STATIC` is more, and asks for what holds at rest
-FALLS, CREEPS = 10, 11  # parameters that are 1 where there is a Stribeck speed, a stick speed; else 0
-STICKING = 3.0  # times the stick speed: slower than this counts as sticking (the law is then within 0.5 % of full)
+SLIDING = 1.5  # sliding directions are -1, 0 and 1; `switch_kinds.STATIC` is larger, and selects the static friction
+FALLS, CREEPS = 10, 11  # parameters that are 1 if a Stribeck speed, a stick speed is given; else 0
+STICKING = 3.0  # times the stick speed: slower sliding counts as sticking (the law is then within 0.5 % of full)
 FALL = 0.01  # m/s: Stribeck speed of the regularised law
 THREAD = "thread"
 """Coordinate of friction on a `Screw`: the angle, with the path along the helix as the sliding distance."""
@@ -31,7 +31,7 @@ THREAD = "thread"
 
 @formula
 def load(par, axes, force, torque):
-    """What presses the surfaces together [N], from the joint's reaction on body j; the axis a is that frame's z.
+    """Return the normal load of the surfaces [N] from the joint's reaction on body j; the axis a is that frame's z.
 
     A guide of two points at +-L/2 along the axis carries the radial force R and the moment M by the normal forces
     R/2 + M x a / L and R/2 - M x a / L, whose magnitudes add up. Without a length L it is |R|.
@@ -46,7 +46,7 @@ def load(par, axes, force, torque):
 
 @formula
 def coefficient(par, v, way):
-    """Stribeck's law mu_k + (mu_s - mu_k) exp(-(v / v_s)^2); without v_s it is mu_k; at rest, if asked for, mu_s."""
+    """Stribeck's law mu_k + (mu_s - mu_k) exp(-(v / v_s)^2); mu_k without v_s; mu_s if static friction is requested."""
     s = v / par[3]
     fall = choose(way - SLIDING, 1.0, choose(par[FALLS], exp(-s * s), 0.0))
     return par[2] + (par[1] - par[2]) * fall
@@ -56,7 +56,7 @@ def coefficient(par, v, way):
 def effort(par, x, rate, laws, load):
     """Along the coordinate: -r mu(v) (N + preload) d - c rate, with the sliding speed v = r rate.
 
-    The direction d is that of its switch; with a stick speed v_0 it is tanh(v / v_0).
+    The direction d is the sliding direction of its switch; with a stick speed v_0 it is tanh(v / v_0).
     """
     v = par[0] * rate
     way = choose(laws[2] - SLIDING, 1.0, choose(par[CREEPS], tanh(v / par[4]), laws[2]))
@@ -65,29 +65,30 @@ def effort(par, x, rate, laws, load):
 
 @element
 class JointFriction(CoordinateForce):
-    """Coulomb friction in a joint, proportional to the load that the joint carries: it sticks, or slips.
+    """Coulomb friction in a joint, proportional to the joint's load, with sticking and sliding.
 
     The load N is computed from the joint's actual reaction at every instant: the radial force R, thrust_factor |thrust|
     and, where lengths are given, moments. Over ``bending_length`` L a bending moment M is carried as in a guide of two
-    points, one L/2 before and one L/2 behind the joint's point: these press with |R/2 + M x a / L| and
-    |R/2 - M x a / L| (a: the axis), so that a force F at the distance e from the axis presses with 2 F e / L. What
-    sticks is held by a constraint and does not move at all, until that carries more than static (N + preload); then it
-    slips, against kinetic (N + preload).
+    points, one L/2 before and one L/2 behind the joint's point: these press with |R/2 + M x a / L| and |R/2 - M x a /
+    L| (a: the axis), so that a force F at the distance e from the axis presses with 2 F e / L. A sticking joint is
+    locked by a constraint and does not move at all, until the constraint force exceeds static (N + preload); then it
+    slips against kinetic (N + preload).
 
     On a `Screw` the surface is the thread: friction acts along the helix of the given mean ``radius`` r, and the thrust
-    F presses with F / cos(lead angle), where tan(lead angle) = lead / (2 pi r). So the torque that lifts F is
-    F r tan(lead angle + arctan(mu)). Results tell it as a torque about the angle. A collar is another surface: give it
-    a joint of its own. For the flanks of a trapezoidal thread thrust_factor is 1 / cos(flank angle).
+    F presses with F / cos(lead angle), where tan(lead angle) = lead / (2 pi r). So the torque that lifts F is F r
+    tan(lead angle + arctan(mu)). Results contain it as a torque about the angle. A collar is another surface: model it
+    as a joint of its own. For a trapezoidal thread thrust_factor is 1 / cos(flank angle).
 
-    A surface has one friction force, against its whole slip. Where a joint's coordinates are slips of one surface
-    (`Cylindrical`, `Planar`, `PointInPlane`), friction along a second one is refused; that along one knows only the
-    slip along it: it is right where nothing slips along the others, and ``result.health.warnings`` says where it does
-    (a shaft that spins fast creeps axially under any thrust, and here it sticks).
+    A surface has one friction force, opposite to its total slip. If a joint's coordinates are slips of one surface
+    (`Cylindrical`, `Planar`, `PointInPlane`), friction along a second one is refused. Friction along one coordinate
+    only depends on the slip along it: this is correct if there is no slip along the others, and
+    ``result.health.warnings`` reports such slip (a fast spinning shaft would creep axially under any thrust, but sticks
+    in this model).
 
-    With a ``stick_speed`` the law is regularised instead: friction is tanh(v / stick_speed) of the full one, and what
-    would stick creeps at ``stick_speed`` times artanh(part of the full friction that holds it);
-    ``result.health.creep`` says how far it crept. (Armstrong-Helouvry, Dupont and Canudas de Wit, *A survey of models
-    for the control of machines with friction*, 1994.)
+    With a ``stick_speed`` the law is regularised instead: friction is tanh(v / stick_speed) times the full value, and a
+    joint that should stick creeps at ``stick_speed`` times artanh(required / full friction); ``result.health.creep``
+    gives the creep distance. (Armstrong-Helouvry, Dupont and Canudas de Wit, *A survey of models for the control of
+    machines with friction*, 1994.)
 
     Parameters
     ----------
@@ -95,29 +96,29 @@ class JointFriction(CoordinateForce):
     joint : str
         Joint with a coordinate ``angle`` or ``displacement``.
     coordinate : str
-        Which one, if it has both; not given: ``angle`` if there is a radius, else ``displacement``; of a `Screw`,
+        Which one, if it has both. If not given: ``angle`` if there is a radius, else ``displacement``; of a `Screw`,
         ``thread``.
     static, kinetic : number
         Coefficients of friction at rest and in motion; the kinetic one equals the static one if not given.
     radius : number [m]
-        Radius of the bearing, or mean radius of the thread, where the friction acts; needed for an angle.
+        Radius of the bearing, or mean radius of the thread, at which the friction acts; required for an angle.
     stribeck_speed : number [m/s]
         Sliding speed over which the coefficient falls from static to kinetic. Not given: it falls as soon as the
         surfaces slide; of the regularised law, 0.01 m/s.
     stick_speed : number [m/s]
-        Not given: friction sticks. Given: the regularised law, in which slower sliding than this counts as rest;
-        smaller is nearer to sticking, and stiffer.
+        If not given, friction sticks. If given, the law is regularised, and slower sliding counts as rest; smaller
+        values are closer to sticking, but stiffer.
     viscous : number [N s/m] or [N m s/rad]
         Viscous friction along the coordinate.
     preload : number [N]
-        Load that is there besides the reaction (seals, clamping).
+        Load in addition to the reaction (seals, clamping).
     thrust_factor : number
         Weight of the force along the axis, for collars.
     bending_length : number [m]
-        Distance of the two points of a guide that carry a bending moment; without it the moment counts nothing.
+        Distance of the two points of a guide that carry a bending moment; without it the moment is ignored.
     twist_length : number [m]
         Distance at which two opposite forces carry the moment about the axis, 2 |twist| / twist_length in all; without
-        it that moment counts nothing.
+        it that moment is ignored.
     """
 
     joint: str = field(kw_only=False)
@@ -140,28 +141,28 @@ class JointFriction(CoordinateForce):
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "friction": "effort"}
 
     def bound(self, model: Model) -> JointFriction:
-        """On a `Screw` it is friction of the thread, whichever of the two coordinates is named."""
+        """Return it as friction of the thread if it is on a `Screw`, whichever of the two coordinates is named."""
         joint = model.find(self.joint)
         if getattr(joint, "thread", False) and self.coordinate in (None, "angle", "displacement"):
             return replace(self, coordinate=THREAD)
         return self
 
     def coordinate_text(self) -> str:
-        """The joint's coordinate; of a thread, which slides along two, none."""
+        """Return the joint's coordinate; empty for a thread, which slides along two."""
         return "" if self.coordinate == THREAD else f"{self.joint}.{self._coordinate()}"
 
     def along(self) -> tuple[str, ...]:
-        """The coordinate; of a thread both, weighted."""
+        """Return the coordinates: for a thread both, weighted."""
         if self.coordinate == THREAD:
             return f"{self.joint}.angle", f"{self.joint}.displacement"
         return super().along()
 
     def needs(self) -> str:
-        """Friction of a thread depends on its lead."""
+        """Return the joint whose numbers it needs: friction of a thread depends on the lead."""
         return self.joint if self.coordinate == THREAD else ""
 
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
-        """Of a thread: cos^2 and sin cos / r of the lead angle.
+        """Return the weights of a thread's coordinates: cos^2 and sin cos / r of the lead angle.
 
         The sum is the angle, since displacement = r tan angle; a force along it acts along the helix.
         """
@@ -175,11 +176,11 @@ class JointFriction(CoordinateForce):
         return ("displacement" if self.radius is None else "angle") if self.coordinate is None else self.coordinate
 
     def switches(self) -> tuple[Switch, ...]:
-        """It sticks, or slides; the regularised law knows no difference."""
+        """Return one friction switch; none for the regularised law."""
         return () if self.stick_speed is not None else (Switch(FRICTION, along=self.along(), slides=True),)
 
     def examine(self, model: Model) -> None:
-        """It needs a joint that carries something, the radius of a bearing that turns, and a surface of its own."""
+        """Require a joint with a load, a radius for an angle, and no second friction on the same surface."""
         found = model.find(self.joint)
         if isinstance(found, Joint) and self.radius is None:
             has = found.measured(model.planar)
@@ -198,7 +199,7 @@ class JointFriction(CoordinateForce):
             self._refuse_second(model, joint)
 
     def _examine_thread(self, model: Model) -> None:
-        """Only a screw has a thread, whose torque is counted by its normal force."""
+        """Require a screw, and a load that counts the thread's normal force."""
         joint = model.joint(self.joint, self, "angle")
         if not getattr(joint, "thread", False):
             raise ModelError(f"{self.title}: {joint.title} has no thread; coordinate='thread' is for a Screw")
@@ -209,7 +210,7 @@ class JointFriction(CoordinateForce):
             )
 
     def _refuse_second(self, model: Model, joint: Joint) -> None:
-        """Refuse friction along two coordinates of one surface: it would hold within a box, not within a circle."""
+        """Refuse friction along two coordinates of one surface: its limit would be a rectangle, not a circle."""
         for other in model.forces:
             if (
                 isinstance(other, JointFriction)
@@ -226,7 +227,7 @@ class JointFriction(CoordinateForce):
                 )
 
     def check(self, n: SimpleNamespace) -> None:
-        """Coefficients and lengths make sense."""
+        """Require valid coefficients and lengths."""
         nonnegative(self, n, "static", "kinetic", "viscous", "preload", "thrust_factor")
         positive(self, n, "radius", "stribeck_speed", "bending_length", "twist_length")
         positive(self, n, "stick_speed", why="Leave it out, and it sticks")
@@ -239,17 +240,17 @@ class JointFriction(CoordinateForce):
             raise ModelError(f"{self.title}: friction about an angle needs the radius of the bearing; give radius=")
 
     def loading_components(self, components: Iterable[str]) -> tuple[str, ...]:
-        """Those of a reaction's components (``"force x"``, ``"torque y"``, ...) that the load counts."""
+        """Return the reaction components (``"force x"``, ``"torque y"``, ...) that the load depends on."""
         moments = self.bending_length is not None or self.twist_length is not None
         return tuple(k for k in components if moments or k.startswith("force"))
 
     @staticmethod
     def sticking(par: tuple[float, ...]) -> tuple[float, float]:
-        """Arm of the surfaces about the coordinate, and the sliding speed [m/s] below which they should stick."""
+        """Return the lever arm about the coordinate, and the sliding speed [m/s] below which surfaces should stick."""
         return par[0], STICKING * par[4]
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         kinetic = n.static if n.kinetic is None else n.kinetic
         arm, thrust = (n.radius if self._coordinate().startswith("angle") else 1.0), n.thrust_factor
         if self.coordinate == THREAD:

@@ -21,10 +21,11 @@ KIND = 8
 
 @formula
 def effort(par, x, rate, laws, load):
-    """Along x: max(0, k (lower - x) - c rate) below the lower stop, -max(0, k (x - upper) + c rate) above the upper.
+    """Effort along x: max(0, k (lower - x) - c rate) below the lower stop, -max(0, k (x - upper) + c rate) above the
+    upper.
 
-    A side without a stop has k = c = 0. Where the side is frozen (`constraints.modes.FROZEN`) the formula of that side
-    goes on beyond its corner.
+    A side without a stop has k = c = 0. While a side is fixed (`switch_kinds.FROZEN`), its formula is continued
+    smoothly beyond the corner.
     """
     o = 0.0 * x
     below, above = par[4] - x, x - par[5]
@@ -36,14 +37,14 @@ def effort(par, x, rate, laws, load):
 
 @formula
 def energy(par, x):
-    """Potential energy k d^2 / 2 [J] of how far it is past either stop."""
+    """Return the potential energy k d^2 / 2 [J], where d is the overrun of either stop."""
     o = 0.0 * x
     below, above = maximum(par[4] - x, o), maximum(x - par[5], o)
     return 0.5 * (par[0] * below * below + par[2] * above * above)
 
 
 def stop_parameters(n: SimpleNamespace, lower: float | None, upper: float | None) -> tuple[float, ...]:
-    """Numbers that the formulas see: stiffness and damping of either side, and where they begin."""
+    """Return the parameters of the formulas: stiffness and damping of either side, and their positions."""
     out: list[float] = []
     for side in (lower, upper):
         out += (0.0, 0.0) if side is None else (n.stiffness, n.damping)
@@ -51,7 +52,7 @@ def stop_parameters(n: SimpleNamespace, lower: float | None, upper: float | None
 
 
 def stop_switch_numbers(n: SimpleNamespace, lower: float | None, upper: float | None) -> tuple[float, ...]:
-    """Numbers of its switch: least and greatest value, restitution, stiffness, damping."""
+    """Return the numbers of its switch: least and greatest value, restitution, stiffness, damping."""
     bounds = -np.inf if lower is None else lower, np.inf if upper is None else upper
     elastic = (0.0, 0.0) if n.stiffness is None else (n.stiffness, n.damping)
     return (*bounds, 0.0 if n.restitution is None else n.restitution, *elastic)
@@ -61,8 +62,8 @@ def stop_switch_numbers(n: SimpleNamespace, lower: float | None, upper: float | 
 class Limit(Unilateral):
     """Stops of a coordinate: it stays between ``lower`` and ``upper``.
 
-    A rigid stop lets nothing pass: what comes with the speed v leaves with ``restitution`` times v. An elastic one
-    (``stiffness``) pushes back with k d + c ddot while it is d deep in it and that is positive: it never pulls.
+    A rigid stop reflects an impact at the speed v with ``restitution`` times v. An elastic stop (``stiffness``) pushes
+    back with k d + c ddot at the depth d while this is positive: it never pulls.
 
     Parameters
     ----------
@@ -73,16 +74,15 @@ class Limit(Unilateral):
     lower, upper : number [rad] or [m]
         Least and greatest value; no stop on a side that is not given.
     restitution : number [1]
-        Of a rigid one, from 0 (dead, and what stands if it is not given) to 1 (no energy lost).
+        Of a rigid stop, from 0 (no rebound; the default) to 1 (no energy lost).
     stiffness : number [N/m] or [N m/rad]
-        Makes it elastic.
+        Stiffness of the stops; makes them elastic.
     damping : number [N s/m] or [N m s/rad]
-        Of an elastic one.
+        Of elastic stops.
 
     Notes
-    -----
-    A result tells ``value``, ``rate``, the ``force`` along the coordinate, positive where it pushes it up, and
-    ``closed``: 1 at the lower stop, -1 at the upper, 0 between. ``run.events`` lists each hit.
+    ----- A result contains ``value``, ``rate``, the ``force`` along the coordinate (positive towards larger values),
+    and ``closed``: 1 at the lower stop, -1 at the upper, 0 between. ``run.events`` lists each hit.
     """
 
     coordinate: str = field(kw_only=False)
@@ -98,31 +98,31 @@ class Limit(Unilateral):
     dimensions: ClassVar = Unilateral.dimensions | {"lower": ("m", "rad"), "upper": ("m", "rad")}
 
     def coordinate_text(self) -> str:
-        """As given."""
+        """Return the coordinate as given."""
         return self.coordinate
 
     def check(self, n: SimpleNamespace) -> None:
-        """One stop at least, rigid or elastic."""
+        """Require at least one stop, rigid or elastic."""
         check_restitution(self, n)
         check_elastic(self, n)
         if self.lower is None and self.upper is None:
             raise ModelError(f"{self.title}: it stops nothing; give lower=..., upper=... or both")
 
     def check_range(self, n: SimpleNamespace, unit: str) -> None:
-        """The lower one is below the upper."""
+        """Require that the lower stop is below the upper one."""
         if n.lower is not None and n.upper is not None and not n.lower.real < n.upper.real:
             raise ModelError(
                 f"{self.title}: lower is {n.lower:g} {unit}; it must be less than upper, {n.upper:g} {unit}"
             )
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         return stop_parameters(n, n.lower, n.upper)
 
     def switches(self) -> tuple[Switch, ...]:
-        """One along the coordinate."""
+        """Return one switch along the coordinate."""
         return (Switch(ELASTIC if self.acts() else STOP, along=(self.coordinate,), slides=self.acts()),)
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
-        """Where it stops, and how."""
+        """Return the bounds, and the properties of the stops."""
         return stop_switch_numbers(n, n.lower, n.upper)

@@ -29,5 +29,5 @@ class Motor(JointForce):
     outputs: ClassVar[dict[str, str]] = {"angle": "rad", "rate": "rad/s", "torque": "N*m"}
 
     def laws(self) -> tuple[Law | None, ...]:
-        """The torque."""
+        """Return the torque law."""
         return (self.torque,)

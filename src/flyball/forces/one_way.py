@@ -1,4 +1,4 @@
-"""OneWay and Ratchet: what moves one way only."""
+"""OneWay and Ratchet: elements that allow motion in one direction only."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 @element
 class OneWay(Latch):
-    """A freewheel, a sprag or overrunning clutch, a check valve: a coordinate goes one way only.
+    """A freewheel, a sprag or overrunning clutch, a check valve: a coordinate moves in one direction only.
 
-    It overruns freely in its direction and holds without any play against it. The holding force pushes in the
-    direction only; it is told as ``force``. Where something turns it back suddenly it stops dead.
+    It overruns freely in its direction and locks without play against it. The locking force acts in this direction
+    only; results contain it as ``force``. An impact against the direction has no rebound.
 
     Parameters
     ----------
@@ -31,15 +31,14 @@ class OneWay(Latch):
     coordinate : str
         ``"joint.coordinate"``, or a world coordinate of a body's or frame's origin.
     relative_to : str
-        Another coordinate of the same kind: then it is the first less this one that goes one way. A bicycle's
+        Another coordinate of the same kind: the first minus this one then moves in one direction only. A bicycle's
         freewheel: ``OneWay("freewheel", "wheel.angle", relative_to="sprocket.angle")``.
     direction : 1 or -1
-        Whether it may grow or fall.
+        Whether the value may increase or decrease.
 
     Notes
-    -----
-    A result tells ``value`` and ``rate`` of the coordinate (less the other), the ``force`` along it, and ``closed``: 1
-    where it holds, 0 where it overruns.
+    ----- A result contains ``value`` and ``rate`` of the coordinate (minus the other), the ``force`` along it, and
+    ``closed``: 1 while it locks, 0 while it overruns.
     """
 
     coordinate: str = field(kw_only=False)
@@ -47,20 +46,20 @@ class OneWay(Latch):
     direction: Annotated[Number, Unit("1")] = 1.0
 
     def check(self, n: SimpleNamespace) -> None:
-        """A direction."""
+        """Require a valid direction."""
         check_direction(self, n.direction.real)
 
     def switches(self) -> tuple[Switch, ...]:
-        """One along the coordinate or the difference."""
+        """Return one switch along the coordinate or the difference."""
         return (Switch(ONE_WAY, along=self.along(), weighted=True),)
 
 
 @element
 class Ratchet(Latch):
-    """A ratchet and its pawl: a coordinate goes one way freely, and back to the last tooth that was passed.
+    """A ratchet and its pawl: a coordinate moves freely one way, and back to the last tooth passed.
 
-    The teeth stand at ``tooth`` and every ``pitch`` from there. Going back, it has a play of up to one pitch; the pawl
-    stops it at the last tooth in its way, with a restitution. The pawl itself weighs nothing and falls at once.
+    The teeth are at ``tooth`` and at multiples of ``pitch`` from there. In reverse it has a play of up to one pitch;
+    the pawl stops it at the last tooth passed, with a restitution. The pawl is massless and engages immediately.
 
     Parameters
     ----------
@@ -68,22 +67,21 @@ class Ratchet(Latch):
     coordinate : str
         ``"joint.coordinate"``, or a world coordinate of a body's or frame's origin.
     pitch : number [rad] or [m]
-        From tooth to tooth; or give ``teeth``.
+        Distance between teeth; or give ``teeth``.
     teeth : number
-        How many stand around the wheel: the pitch is a whole turn by it.
+        Number of teeth of the wheel: the pitch is a full turn divided by it.
     tooth : number [rad] or [m]
         Value of the coordinate at which one tooth rests on the pawl.
     relative_to : str
-        Another coordinate of the same kind: then it is the first less this one that latches.
+        Another coordinate of the same kind: the difference of the first and this one then latches.
     direction : 1 or -1
-        Whether it goes freely where the value grows or where it falls.
+        Whether increasing or decreasing values are free.
     restitution : number [1]
-        From 0 (dead) to 1 (no energy lost).
+        From 0 (no rebound) to 1 (no energy lost).
 
     Notes
-    -----
-    A result tells ``value`` and ``rate`` of the coordinate (less the other), the ``force`` along it, and ``closed``: 1
-    where the pawl holds, 0 where it does not.
+    ----- A result contains ``value`` and ``rate`` of the coordinate (minus the other), the ``force`` along it, and
+    ``closed``: 1 while the pawl locks, 0 otherwise.
     """
 
     coordinate: str = field(kw_only=False)
@@ -97,13 +95,13 @@ class Ratchet(Latch):
     dimensions: ClassVar = Latch.dimensions | {"pitch": ("m", "rad"), "tooth": ("m", "rad")}
 
     def examine(self, model: Model) -> None:
-        """Teeth are counted around what turns."""
+        """Require an angle if ``teeth`` are given."""
         super().examine(model)
         if self.teeth is not None and model.unit(self.coordinate, self) != "rad":
             raise ModelError(f"{self.title}: {self.coordinate!r} does not turn; give pitch= in place of teeth=")
 
     def check(self, n: SimpleNamespace) -> None:
-        """A direction, and teeth a pitch apart."""
+        """Require a direction and a pitch."""
         check_direction(self, n.direction.real)
         check_restitution(self, n)
         nonnegative(self, n, "restitution")
@@ -114,13 +112,13 @@ class Ratchet(Latch):
             raise ModelError(f"{self.title}: teeth is {n.teeth:g}; a wheel has a whole number of them")
 
     def pitch_of(self, n: SimpleNamespace) -> Any:
-        """From tooth to tooth [rad] or [m]."""
+        """Return the distance between teeth [rad] or [m]."""
         return n.pitch if n.teeth is None else 2.0 * np.pi / n.teeth
 
     def switches(self) -> tuple[Switch, ...]:
-        """One along the coordinate or the difference."""
+        """Return one switch along the coordinate or the difference."""
         return (Switch(RATCHET, along=self.along(), weighted=True),)
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
-        """A tooth, the pitch, the restitution."""
+        """Return the position of a tooth, the pitch and the restitution."""
         return n.direction * n.tooth, self.pitch_of(n), n.restitution

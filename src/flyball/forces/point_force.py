@@ -1,4 +1,4 @@
-"""A force on a body at one of its points, from outside."""
+"""A given external force at a point of a body."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ KIND = 3
 
 @formula
 def inputs(par, F, M):
-    """Nothing is measured."""
+    """Return zeros: nothing is measured."""
     return 0.0 * M[0][0], 0.0 * M[0][0]
 
 
 @formula
 def in_world(par, F, M, laws):
-    """The laws as components along the world's axes, or along the body's where par[0] says so."""
+    """Return the laws as components along the world's axes, or along the body's if par[0] says so."""
     if par[0].real > 0.5:
         return mv(M[1], laws)
     return laws
@@ -31,7 +31,7 @@ def in_world(par, F, M, laws):
 
 @formula
 def wrench(par, F, M, laws, values):
-    """The force at M's origin."""
+    """Return the force at M's origin."""
     o = 0.0 * par[0]
     return in_world(par, F, M, laws), (o, o, o)
 
@@ -51,14 +51,14 @@ class PointForce(BodyForce):
     ----------
     name : str
     body : str
-        Body it acts on, or a frame fixed on it, at whose origin it acts.
+        Body it acts on, or a frame fixed on it; the force then acts at the frame's origin.
     force : two or three laws [N]
         Components, each a number, an expression of ``t``, sensors and parameters, or a Python
         function of these.
     at : point [m]
-        Where it acts, in world coordinates of the drawn configuration; the centre of mass if not given.
+        Point of action, in world coordinates of the drawn configuration; the centre of mass if not given.
     axes : ``"world"`` or ``"body"``
-        Whose axes the components are along; in the body's axes the force turns with the body.
+        Axes of the components; in the body's axes the force turns with the body.
     """
 
     force: Annotated[Laws, LawOf("N")]
@@ -71,18 +71,18 @@ class PointForce(BodyForce):
     drawn: ClassVar[str] = "arrow"
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
-        """Nowhere of its own; refuses a number of components that the mechanism does not have."""
+        """Check the number of components; the force needs no frames of its own."""
         components(self, "force", self.force, planar, "(0, -5)" if planar else "(0, 0, -5)")
         return None
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         return (1.0 if self.axes == "body" else 0.0,)
 
     def laws(self) -> tuple[Law | None, ...]:
-        """The components."""
+        """Return the components."""
         return tuple(self.force)
 
     def on_points(self) -> bool:
-        """In the world's axes."""
+        """Return whether the components are along the world's axes."""
         return self.axes == "world"

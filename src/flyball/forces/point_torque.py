@@ -1,4 +1,4 @@
-"""A torque on a body, from outside."""
+"""A given external torque on a body."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KIND = 4
 
 @formula
 def wrench(par, F, M, laws, values):
-    """The torque."""
+    """Return the torque on M."""
     o = 0.0 * par[0]
     return (o, o, o), in_world(par, F, M, laws)
 
@@ -46,7 +46,7 @@ class PointTorque(BodyForce):
     wrench: ClassVar = staticmethod(wrench)
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
-        """Nowhere of its own; refuses a number of components that the mechanism does not have."""
+        """Check the number of components; the torque needs no frames of its own."""
         given = self.torque if isinstance(self.torque, tuple) else (self.torque,)
         if planar and len(given) != 1:
             raise ModelError(f"{self.title}: torque: in a planar mechanism it is one number or law, got {given}")
@@ -55,10 +55,10 @@ class PointTorque(BodyForce):
         return None
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         return (1.0 if self.axes == "body" else 0.0,)
 
     def laws(self) -> tuple[Law | None, ...]:
-        """The components; a single one is about the normal."""
+        """Return the components; a single one is about the normal."""
         given = tuple(self.torque) if isinstance(self.torque, tuple) else (self.torque,)
         return given if len(given) == 3 else (None, None, *given)

@@ -1,4 +1,4 @@
-"""Rope: a line over two or more points that pulls and never pushes, elastic or of constant length."""
+"""Rope: a line over two or more points that can pull but not push, elastic or inextensible."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ KIND = 2
 
 @formula
 def effort(par, x, rate, laws, load):
-    """Along the rope's length x: -max(0, k (x - x_0) + c rate) where it is longer than x_0, else nothing.
+    """Return the effort along the rope's length x: -max(0, k (x - x_0) + c rate) if longer than x_0, else zero.
 
-    Where it is frozen taut or slack (`constraints.modes.FROZEN`) the formula goes on beyond the corner.
+    While its state is fixed as taut or slack (`switch_kinds.FROZEN`), the formula is continued smoothly beyond the
+    corner.
     """
     o = 0.0 * x
     stretch = x - par[2]
@@ -54,32 +55,31 @@ Points = Annotated[tuple[Numbers, ...], BeforeValidator(_list), Unit("m")]
 
 @element
 class Rope(CoordinateForce):
-    """A rope that runs freely over points of bodies: tension is the same everywhere in it.
+    """A rope that runs without friction over points of bodies: the tension is the same everywhere.
 
-    With a stiffness it is elastic: it pulls with k (l - length) + c ldot while it is longer than its free length and
-    that is positive, and hangs slack otherwise. Without one it does not stretch: it gets no longer than its length, and
-    where it jerks taut at the speed v it goes slack again at ``restitution`` times v. Points between its ends are eyes
-    or small pulleys without friction; the same body may come again.
+    With a stiffness it is elastic: the tension is k (l - length) + c ldot while the rope is longer than its free length
+    and this is positive; otherwise it is slack. Without a stiffness it is inextensible: when it becomes taut at the
+    speed v it rebounds at ``restitution`` times v. Intermediate points are frictionless eyes or small pulleys; a body
+    may occur more than once.
 
     Parameters
     ----------
     name : str
     bodies : list of str
-        Bodies or frames that carry the points, in order: two or more; ``"ground"`` too.
+        Bodies or frames with the points, in order, two or more; ``"ground"`` is the world.
     at : list of points [m]
         The points, in world coordinates of the drawn configuration. Not given: the origins of the frames.
     stiffness : number [N/m]
-        Of the whole rope: E A / length. Not given: it does not stretch.
+        Of the whole rope: E A / length. If not given, the rope is inextensible.
     damping : number [N s/m]
-        Of an elastic one.
+        Of an elastic rope.
     length : number [m]
-        Free length; the drawn length if not given.
+        Free length; that in the reference configuration if not given.
     restitution : number [1]
-        Of one that does not stretch, from 0 (it stays taut, and what stands if it is not given) to 1.
+        Of an inextensible rope, from 0 (it stays taut; the default) to 1.
 
     Notes
-    -----
-    A result tells ``length``, its ``rate``, the ``tension``, and ``taut``: 1 where it pulls, 0 where it hangs slack.
+    ----- A result contains ``length``, its ``rate``, the ``tension``, and ``taut``: 1 if taut, 0 if slack.
     """
 
     bodies: tuple[str, ...] = field(kw_only=False)
@@ -99,11 +99,11 @@ class Rope(CoordinateForce):
     fails: ClassVar[str] = "Two neighbouring points of it coincide, where the rope between them has no direction"
 
     def ends(self) -> dict[str, str]:
-        """One frame for each point."""
+        """Return one frame for each point."""
         return {f"P{k}": name for k, name in enumerate(self.bodies)}
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
-        """The points."""
+        """Return the points in the reference configuration."""
         if n.at is None:
             return None
         points = [vector(p, planar, f"'at' of {self.title}") for p in n.at]
@@ -116,11 +116,11 @@ class Rope(CoordinateForce):
         return {f"P{k}": (p, np.eye(3)) for k, p in enumerate(points)}
 
     def path(self) -> tuple[tuple[str, str, Row], ...]:
-        """The distance from each point to the next."""
+        """Return the terms: the distance from each point to the next."""
         return tuple((f"P{k}", f"P{k + 1}", DISTANCE) for k in range(len(self.bodies) - 1))
 
     def check(self, n: SimpleNamespace) -> None:
-        """Enough points, and a stiffness."""
+        """Require enough points, and valid constants."""
         if len(self.bodies) < 2:
             raise ModelError(f"{self.title}: a rope has two ends at least, got bodies {self.bodies}; name the second")
         if n.at is not None and len(n.at) != len(self.bodies):
@@ -130,7 +130,7 @@ class Rope(CoordinateForce):
         nonnegative(self, n, "length")
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         return (n.stiffness, n.damping, self._free(n, separation))
 
     @staticmethod
@@ -138,17 +138,17 @@ class Rope(CoordinateForce):
         return separation if n.length is None else n.length
 
     def acts(self) -> bool:
-        """Whether it is a force: an elastic one."""
+        """Return whether it acts as a force: it does if it is elastic."""
         return self.stiffness is not None
 
     def switches(self) -> tuple[Switch, ...]:
-        """One along its length."""
+        """Return one switch along its length."""
         return (Switch(ELASTIC if self.acts() else STOP, path=self.path(), slides=self.acts()),)
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
-        """It ends at its length."""
+        """Return the bounds: its length is the upper one."""
         return stop_switch_numbers(n, None, self._free(n, separation))
 
     def conservative(self) -> bool:
-        """Whether its energy is all that it ever takes or gives."""
+        """Return whether it has no damping, so that it only exchanges stored energy."""
         return self.damping == 0.0

@@ -18,7 +18,7 @@ KIND = 0
 
 @formula
 def inputs(par, F, M):
-    """Length and its rate: where both points coincide, that with which the length begins to grow."""
+    """Return the length and its rate; if both points coincide, the rate at which the length begins to grow."""
     d, u = sub(M[0], F[0]), sub(M[3], F[3])
     length = norm(d)
     return length, unless_zero(length, divide(dot(d, u), length), norm(u))
@@ -28,8 +28,8 @@ def inputs(par, F, M):
 def wrench(par, F, M, laws, values):
     """Force on M: -k d - (c rate + s) e with e = d / |d|, and s = F - k times free length.
 
-    Where both points coincide e has no direction: the damper acts against the velocity, along which it is about to
-    grow, and there is no force if s is not zero.
+    If both points coincide, e is undefined: the damper then acts against the relative velocity, and the force is nan if
+    s is not zero.
     """
     length, rate = values
     d, u = sub(M[0], F[0]), sub(M[3], F[3])
@@ -56,19 +56,19 @@ class SpringDamper(TwoPointForce):
     """Spring, damper and actuator between a point of one body and a point of another.
 
     The tension k (l - l0) + c ldot + F pulls the two points together where it is positive. Without a free length
-    (``length=0``) and F, both points may coincide: there the damper acts against the velocity.
+    (``length=0``) and F, both points may coincide: there the damper acts against the relative velocity.
 
     Parameters
     ----------
     name : str
     body_i, body_j : str
-        Bodies or frames whose points it joins, ``"ground"`` too.
+        Bodies or frames with the two points; ``"ground"`` is the world.
     at : pair of points [m]
         The two points, in world coordinates of the drawn configuration. Not given: the origins of the frames.
     stiffness : number [N/m]
     damping : number [N s/m]
     length : number [m]
-        Length at which the spring carries nothing; the drawn length if not given.
+        Unloaded length of the spring; the length in the reference configuration if not given.
     force : law [N]
         Added tension, an expression of ``t``, ``length``, ``rate`` and parameters.
     """
@@ -95,13 +95,13 @@ class SpringDamper(TwoPointForce):
         refuse_without_stiffness(self, "length", None)
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         return (n.stiffness, n.damping, separation if n.length is None else n.length)
 
     def laws(self) -> tuple[Law | None, ...]:
-        """Expressions that the formulas see."""
+        """Return the laws of the formulas."""
         return (self.force,)
 
     def conservative(self) -> bool:
-        """Whether its energy is all that it ever takes or gives."""
+        """Return whether it has no damping and no law, so that it only exchanges stored energy."""
         return self.force is None and self.damping == 0.0

@@ -14,8 +14,8 @@ from .coordinate_spring import KIND, effort, energy, refuse_without_stiffness
 class TorsionalSpringDamper(JointForce):
     """Spring and damper about the axis of a revolute or cylindrical joint.
 
-    The torque -k (angle - angle_0) - c rate + law acts on ``body_j`` of the joint, its reverse on ``body_i``; whole
-    turns count, so a spring may be wound up.
+    The torque -k (angle - angle_0) - c rate + law acts on ``body_j`` of the joint, its reverse on ``body_i``; full
+    turns are counted, so a spring may be wound up.
 
     Parameters
     ----------
@@ -25,9 +25,9 @@ class TorsionalSpringDamper(JointForce):
     stiffness : number [N m/rad]
     damping : number [N m s/rad]
     angle : number [rad]
-        Angle at which the spring carries nothing.
+        Angle at which the spring is unloaded.
     torque : law [N m]
-        Added, for a spring that is not linear: an expression of ``t``, ``angle``, ``rate``, sensors and parameters.
+        Added torque, for a nonlinear spring: an expression of ``t``, ``angle``, ``rate``, sensors and parameters.
     """
 
     stiffness: Annotated[Number, Unit("N*m/rad")] = 0.0
@@ -46,13 +46,13 @@ class TorsionalSpringDamper(JointForce):
         refuse_without_stiffness(self, "angle", 0.0)
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Numbers that the formulas see."""
+        """Return the parameters of the formulas."""
         return (n.stiffness, n.damping, n.angle)
 
     def laws(self) -> tuple[Law | None, ...]:
-        """Expressions that the formulas see."""
+        """Return the laws of the formulas."""
         return (self.torque,)
 
     def conservative(self) -> bool:
-        """Whether its energy is all that it ever takes or gives."""
+        """Return whether it has no damping and no law, so that it only exchanges stored energy."""
         return self.torque is None and self.damping == 0.0

@@ -1,4 +1,15 @@
-"""Joints and couplings: one file each. A new one is a new file here and one line below."""
+"""Joints and couplings: one file each. A new one is a new file here and one line below.
+
+A joint is data: constraint rows (``blocks``, of `constraints.blocks`), relative coordinates (``coordinates``) and,
+where it can be a tree joint, what it leaves free as a ``chain`` of primitive joints, slides first; rows that the chain
+does not fulfil are ``kept``. Nothing is compiled for a new joint. ``world_frames`` places its frames where ``at`` and
+``axis`` are not enough, ``constants`` are numbers that rows compare with, ``drawn`` is its symbol in pictures.
+``replaceable``, ``stand_in`` and ``called`` offer it as a remedy for redundant constraints.
+
+A coupling derives from `Coupling`: ``coupled()`` names coordinates of other joints, ``factors()`` their weights.
+Imports `constraints`, `math` and `model` only. Coordinates are zero in the reference configuration, not where axes of
+bodies are parallel: links with arbitrary body frames would begin at odd angles.
+"""
 
 from .cam import Cam as Cam
 from .coupler import Coupler as Coupler

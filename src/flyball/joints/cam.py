@@ -1,4 +1,4 @@
-"""Cam: a point, or a roller, that follows a smooth curve."""
+"""Cam: a point or a roller that follows a smooth curve."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..model.joint import Joint, WorldFrame
 from ..model.table import Table
 
 END_TOLERANCE = (
-    1e-3  # part of the profile's length within which a motion that cannot go on is taken to have come to its end
+    1e-3  # a motion that stops within this part of the profile's length from an end is taken to have reached the end
 )
 REMEDY = "give it more points, a Limit that stops the follower, beyond='line', or closed=True"
 
@@ -42,10 +42,10 @@ Points = Annotated[tuple[Numbers, ...], BeforeValidator(_list), Unit("m")]
 class Cam(Joint):
     """A point of ``body_j``, or the centre of a roller on it, follows a smooth curve fixed in ``body_i``.
 
-    The curve is the C2 spline through ``points``, run through by their chord length. In space it is the profile of a
-    cylinder along ``axis``: one row, which holds the distance from the profile and nothing along the axis. It pulls
-    as well as pushes; where a follower pulls that is not in a groove, ``health.warnings`` of a motion says so. A point
-    (no ``radius``) on a profile that is not closed is taken for a pin in a slot, which is held on both sides.
+    The curve is the C2 spline through ``points``, parametrised by their chord length. In space it is the profile of a
+    cylinder along ``axis``: one row, which fixes the distance from the profile and leaves the axial direction free. The
+    constraint can pull as well as push; if a follower without a groove pulls, ``health.warnings`` of a motion reports
+    it. A point (no ``radius``) on a profile that is not closed is treated as a pin in a slot, guided on both sides.
 
     Parameters
     ----------
@@ -59,18 +59,18 @@ class Cam(Joint):
     at : point [m]
         The follower's point, or its roller's centre, in world coordinates of the drawn configuration.
     centre : point [m]
-        Where the profile's coordinates are counted from, in world coordinates; the world's origin if not given.
+        Origin of the profile's coordinates, in world coordinates; the world's origin if not given.
     axis : direction
         In space: normal of the profile's plane, in world coordinates.
     closed : bool
         Whether the profile closes on itself.
     beyond : ``"refuse"`` or ``"line"``
-        Beyond the ends of a profile that is not closed: there is none, and a motion that gets there stops; or it goes
-        straight on with the slope of the end.
+        Extension of a profile that is not closed: none, and a motion that gets there stops; or a straight line with the
+        slope of the end.
     radius : number [m]
         Radius of the follower's roller.
     groove : bool
-        Whether the follower runs in a groove, which holds it on both sides.
+        Whether the follower runs in a groove, which guides it on both sides.
     """
 
     points: Points
@@ -87,7 +87,7 @@ class Cam(Joint):
     both_sides: ClassVar[str] = ", or say groove=True if the follower is held on both sides"
 
     def check(self, n: SimpleNamespace) -> None:
-        """Enough points, each with two coordinates, none twice running."""
+        """Require enough points, each with two coordinates, no two consecutive ones equal."""
         nonnegative(self, n, "radius")
         if self.closed and self.beyond != "refuse":
             raise ModelError(
@@ -103,13 +103,15 @@ class Cam(Joint):
                 )
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
-        """F in the profile's origin, M in the follower's point."""
+        """Return F at the profile's origin, M at the follower's point."""
         R = self.orientation(n.axis, planar)
         centre = vector(n.centre[: 2 if planar and not n.centre[2:] else 3], planar, f"centre of {self.title}")
         return (centre, R), (vector(n.at, planar, f"'at' of {self.title}"), R)
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """Side of the curve that the roller is on, parameters of the ends, its radius; places of the splines follow."""
+        """Return the roller's side of the curve, the end parameters and the radius; the engine adds the splines'
+        positions.
+        """
         at, side, gap = self.nearest(n, F, M)
         first, last = self.extent(n)
         if last.real > first.real and self.ended(at.real, first.real, last.real):
@@ -126,22 +128,26 @@ class Cam(Joint):
         return (0.0, 0.0, 0.0, side, first, last, n.radius)
 
     def pushing_sign(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> float | None:
-        """The row counts from the profile towards the roller; nothing tells the side of a point on a closed one."""
+        """Return the sign of a force from the profile towards the roller; it is unknown for a point on a closed
+        profile.
+        """
         if self.groove or (n.radius.real == 0.0 and not self.closed):
             return None
         return 1.0 if n.radius.real > 0.0 else 0.0
 
     def extent(self, n: SimpleNamespace) -> tuple[Any, Any]:
-        """Parameters at the ends of the profile; (0, 0) where it goes on beyond its points."""
+        """Return the parameters at the ends of the profile; (0, 0) if it continues beyond its points."""
         return (0.0, 0.0) if self.closed or self.beyond == "line" else (0.0, _chords(n.points, False)[-1])
 
     @staticmethod
     def ended(at: float, first: float, last: float, near: float = GRACE) -> bool:
-        """Whether a parameter is beyond the ends, or nearer to them than ``-near`` times their distance."""
+        """Return whether a parameter is beyond the ends, or nearer to them than ``-near`` times their distance."""
         return max(first - at, at - last) > near * (last - first)
 
     def end_message(self, n: SimpleNamespace, at: float) -> str:
-        """What to say where the follower has come to an end of the profile, near this parameter; else nothing."""
+        """Return the message for a follower that has reached an end of the profile near this parameter; otherwise
+        nothing.
+        """
         first, last = (x.real for x in self.extent(n))
         if not last > first or not self.ended(at, first, last, -END_TOLERANCE):
             return ""
@@ -152,7 +158,7 @@ class Cam(Joint):
         )
 
     def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[Any, float, Any]:
-        """Parameter of the point of the profile nearest to M, the side that M is on (+1, -1), and its distance."""
+        """Return the parameter of the profile point nearest to M, the side that M is on (+1, -1), and its distance."""
         data = np.concatenate(self.curves(n))
         par = (0.0, 0.0, float(len(self.curves(n)[0])), 1.0, 0.0, 0.0, 0.0, 1.0)
         s = np.linspace(0.0, _chords(n.points, self.closed)[-1].real, 20 * len(n.points) + 1)
@@ -166,7 +172,7 @@ class Cam(Joint):
         return at, -1.0 if delta.real < 0.0 else 1.0, absolute(delta)
 
     def sharpest(self, n: SimpleNamespace, side: float) -> float:
-        """Least curvature [1/m] towards the given side: negative where the profile is hollow there."""
+        """Return the least curvature [1/m] towards the given side: negative where the profile is concave there."""
         data = np.concatenate(self.curves(n)).real
         par = (0.0, 0.0, float(len(self.curves(n)[0])))
         s = np.linspace(0.0, _chords(n.points, self.closed)[-1].real, 20 * len(n.points) + 1)
@@ -174,7 +180,7 @@ class Cam(Joint):
         return float((side * (x1 * y2 - y1 * x2) / (x1 * x1 + y1 * y1) ** 1.5).min())
 
     def curves(self, n: SimpleNamespace) -> tuple[list[float], ...]:
-        """The splines x(s) and y(s)."""
+        """Return the splines x(s) and y(s)."""
         if any(hasattr(x, "called") and not x.known for p in n.points for x in p):
             raise ModelError(
                 f"{self.title}: points of its profile follow parameters, and a curve through symbols is not written "
@@ -193,7 +199,7 @@ def _closing(points: tuple, closed: bool) -> np.ndarray:
 
 
 def _chords(points: tuple, closed: bool) -> np.ndarray:
-    """Length along the polygon up to each point."""
+    """Return the length along the polygon up to each point."""
     steps = np.sqrt((np.diff(_closing(points, closed), axis=0) ** 2).sum(axis=1))
     return np.r_[0.0, np.cumsum(steps)]
 
@@ -201,7 +207,7 @@ def _chords(points: tuple, closed: bool) -> np.ndarray:
 @lru_cache(maxsize=64)
 def _splines(points: tuple, closed: bool) -> tuple[list[float], list[float]]:
     s = tuple(_chords(points, closed).tolist())
-    beyond: Any = "repeat" if closed else "line"  # the row refuses what is beyond; the search may pass there
+    beyond: Any = "repeat" if closed else "line"  # the row refuses positions beyond; the search may pass through them
     if np.iscomplexobj(s):
         real = _splines(tuple(tuple(x.real for x in p) for p in points), closed)
         at, columns = np.array(s), _closing(points, closed).T

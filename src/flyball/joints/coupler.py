@@ -1,4 +1,4 @@
-"""Coupler: any linear relation between coordinates."""
+"""Coupler: a linear relation between coordinates."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ..model.joint import Coupling
 if TYPE_CHECKING:
     from ..model.model import Model
 
-WEIGHTS = ("1", "m", "m/rad", "rad/m", "1/m")  # units that weights may have
+WEIGHTS = ("1", "m", "m/rad", "rad/m", "1/m")  # permitted units of weights
 SUMS = ("1", "m", "rad")
 
 
 @element
 class Coupler(Coupling):
-    """Coordinates of joints or points held in a linear relation: weight_1 q_1 + weight_2 q_2 + ... = constant.
+    """A linear relation between coordinates of joints or points: weight_1 q_1 + weight_2 q_2 + ... = constant.
 
-    For a relation that is not linear use a `Driver` whose law names sensors.
+    For a nonlinear relation use a `Driver` whose law names sensors.
 
     Parameters
     ----------
@@ -30,9 +30,9 @@ class Coupler(Coupling):
     coordinates : list of str
         Two or more: ``"A.angle"``, ``"slide.displacement"``, ``"block.x"``.
     weights : list of numbers
-        One for each coordinate; metres for radians where both kinds are coupled.
+        One for each coordinate; in metres for angles if lengths and angles are coupled.
     value : number
-        What the sum has to be; what it is in the drawn configuration if not given.
+        Value of the sum; that of the drawn configuration if not given.
     """
 
     coordinates: tuple[str, ...] = field(kw_only=False)
@@ -42,23 +42,23 @@ class Coupler(Coupling):
     dimensions: ClassVar = {"weights": WEIGHTS, "value": SUMS}
 
     def coupled(self) -> tuple[str, ...]:
-        """The coordinates."""
+        """Return the coordinates."""
         return self.coordinates
 
     def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
-        """The weights as given."""
+        """Return the weights as given."""
         return n.weights
 
     def first_weight(self, n: SimpleNamespace) -> float:
-        """As given."""
+        """Return the first weight as given."""
         return n.weights[0]
 
     def total(self, n: SimpleNamespace) -> Any:
-        """As given."""
+        """Return the value as given."""
         return n.value
 
     def check(self, n: SimpleNamespace) -> None:
-        """A weight for each of at least two different coordinates, none of them zero."""
+        """Require a nonzero weight for each of at least two different coordinates."""
         if len(self.coordinates) < 2:
             one = "1 coordinate" if self.coordinates else "no coordinates"
             raise ModelError(f"{self.title}: it couples {one}; give two or more")

@@ -41,12 +41,12 @@ class Distance(Joint):
         positive(self, n, "length", why="To hold two points together use Revolute or Spherical")
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
-        """Origins at the two ends; the axes do not matter."""
+        """Return frames with origins at the two ends; the axes do not matter."""
         a, b = (vector(p, planar, f"'at' of {self.title}") for p in n.at)
         return (a, np.eye(3)), (b, np.eye(3))
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """The length: as given, or as drawn."""
+        """Return the length: as given, or the distance in the reference configuration."""
         d = M[0] - F[0]
         length = np.sqrt((d * d).sum()) if n.length is None else n.length
         if not length.real > 0.0:

@@ -11,7 +11,7 @@ from ..model.joint import Joint
 
 @element
 class Fixed(Joint):
-    """Two bodies held together as if welded.
+    """A rigid connection of two bodies.
 
     Parameters
     ----------
@@ -19,7 +19,7 @@ class Fixed(Joint):
     body_i, body_j : str
         Bodies, or frames fixed on bodies; ``"ground"`` is the world.
     at : point [m]
-        Point about which its reaction torque is counted, in world coordinates of the drawn configuration.
+        Reference point of its reaction torque, in world coordinates of the drawn configuration.
     """
 
     blocks: ClassVar = COMMON_POINT + SAME_AXES
@@ -30,5 +30,5 @@ class Fixed(Joint):
 
 
 def weld_to_ground(name: str, body: str, at: Any) -> Fixed:
-    """A joint that holds a body where it is drawn."""
+    """Return a joint that fixes a body in its drawn pose."""
     return Fixed(name, "ground", body, at=at)

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 class GearPair(Coupling):
     """Two gears that mesh; each turns in a joint on the same carrier, which may itself move (planetary trains).
 
-    With numbers of teeth z and angles seen from the carrier about axes that point the same way:
-    z_1 angle_1 + z_2 angle_2 = constant for external gears, z_1 angle_1 - z_2 angle_2 = constant where the second is
-    a ring with its teeth inside. Whole turns count. It acts along the two angles only: what the teeth press loads no
-    bearing; ``run["name.effort_1"]`` and ``run["name.effort_2"]`` are the torques on the gears.
+    With numbers of teeth z and angles seen from the carrier about axes that point the same way: z_1 angle_1 + z_2
+    angle_2 = constant for external gears, z_1 angle_1 - z_2 angle_2 = constant where the second is a ring with its
+    teeth inside. Full turns are counted. It acts along the two angles only: tooth forces do not load the bearings;
+    ``run["name.effort_1"]`` and ``run["name.effort_2"]`` are the torques on the gears.
 
     Parameters
     ----------
@@ -49,11 +49,13 @@ class GearPair(Coupling):
     dimensions: ClassVar = {"teeth": ("1", "m")}
 
     def coupled(self) -> tuple[str, ...]:
-        """The two angles."""
+        """Return the two angles."""
         return f"{self.joint_1}.angle", f"{self.joint_2}.angle"
 
     def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
-        """1 and the ratio, signed for external or internal, for the axes' senses and for what turns on what."""
+        """Return 1 and the ratio, with the signs for external or internal teeth, the axes' senses and the carrier's
+        side.
+        """
         carrier = self._carrier(model)
         s1, s2 = (sense(model, self, j, carrier) for j in (self.joint_1, self.joint_2))
         same = -1.0 if inner_product(axes(self.joint_1), axes(self.joint_2)).real < -1e-9 else 1.0
@@ -64,12 +66,12 @@ class GearPair(Coupling):
         return shared_body(self, model, self.joint_1, self.joint_2, remedy)
 
     def check(self, n: SimpleNamespace) -> None:
-        """Two positive numbers of teeth."""
+        """Require two positive numbers of teeth."""
         if len(n.teeth) != 2 or not all(z.real > 0.0 for z in n.teeth):
             raise ModelError(f"{self.title}: teeth are two numbers greater than 0, got {n.teeth}")
 
     def examine(self, model: Model) -> None:
-        """Both are joints, and share a carrier."""
+        """Require joints that share a carrier."""
         for name in (self.joint_1, self.joint_2):
             model.joint(name, self, "angle")
         self._carrier(model)

@@ -16,12 +16,12 @@ from ..model.element import Angle, Directions, PointPair, element
 from ..model.geometry import triad, vector
 from ..model.joint import Z_TO_X, Coordinate, Joint, WorldFrame
 
-PARALLEL = 1e-3  # axes closer to parallel than this [rad] make no universal joint
+PARALLEL = 1e-3  # axes closer to parallel than this [rad] do not make a universal joint
 
 
 @element
 class GeneralUniversal(Joint):
-    """A massless rigid link hinged to both bodies, its two axes neither square nor meeting (Hahn, appendix A.4).
+    """A massless rigid link hinged to both bodies, its two axes skew and offset (Hahn, appendix A.4).
 
     Parameters
     ----------
@@ -53,7 +53,9 @@ class GeneralUniversal(Joint):
     drawn: ClassVar[str] = "universal"
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
-        """Each at its point, z along its axis, x in the plane of both axes, so that the angles begin at zero."""
+        """Return the frames at their points: z along the axis, x in the plane of both axes, so that angles start at
+        zero.
+        """
         if n.axes is None:
             raise ModelError(f"{self.title}: give its two axes, for instance axes=((1, 0, 0), (0, 1, 0))")
         p, r = (vector(x, planar, f"'at' of {self.title}") for x in n.at)
@@ -61,7 +63,9 @@ class GeneralUniversal(Joint):
         return (p, _with_x(a, b)), (r, _with_x(b, a))
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """The angle between the axes and the way between them, in f, m, f x m, as drawn."""
+        """Return the angle between the axes, and the vector between them along f, m and f x m, in the reference
+        configuration.
+        """
         f, m = F[1][:, 2], M[1][:, 2]
         across = np.cross(f, m)
         if not np.sqrt((across * across).sum()).real > PARALLEL:
@@ -75,7 +79,7 @@ class GeneralUniversal(Joint):
 
 
 def _with_x(z: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Axes with the given z and x towards ``other``."""
+    """Return axes with the given z, and x towards ``other``."""
     x = other - inner_product(other, z) * z
     size = np.sqrt((x * x).sum())
     if not size.real > PARALLEL:

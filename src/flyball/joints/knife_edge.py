@@ -1,4 +1,4 @@
-"""Knife edge: a skate, which glides along its edge and never sideways. Non-holonomic."""
+"""Knife edge: a skate, which glides along its edge but not sideways. Non-holonomic."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..model.joint import Joint, WorldFrame
 class KnifeEdge(Joint):
     """A point of ``body_j`` has no velocity across an edge fixed in ``body_j``, as seen from ``body_i``.
 
-    It restrains velocities only. In space it does not hold the point in a plane: add `PointInPlane` or `Planar`.
+    It constrains velocities only. In space it does not keep the point in a plane: add `PointInPlane` or `Planar`.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class KnifeEdge(Joint):
     axis : direction
         Along the edge, in world coordinates.
     normal : direction
-        In space: the direction in which the skate stands; what is barred is square to both.
+        In space: the upright direction of the skate; the blocked direction is perpendicular to both.
     """
 
     normal: Direction = (0.0, 0.0, 1.0)
@@ -41,7 +41,7 @@ class KnifeEdge(Joint):
     drawn: ClassVar[str] = "knife_edge"
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
-        """Both at the point; z along the edge, y up, x across."""
+        """Return both frames at the point; z along the edge, y up, x sideways."""
         p = vector(n.at, planar, f"'at' of {self.title}")
         if planar:
             R = self.orientation(n.axis, planar)

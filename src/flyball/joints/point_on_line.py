@@ -43,7 +43,7 @@ class PointOnLine(Joint):
 class PinInSlot(PointOnLine):
     """A pin of ``body_j`` in a straight slot of ``body_i``: the planar `PointOnLine`, with the angle of the pin.
 
-    It is what a massless block between a slide and a hinge would do. Takes what `PointOnLine` takes.
+    It is equivalent to a massless block between a slide and a hinge. It takes the arguments of `PointOnLine`, and:
 
     Parameters
     ----------

@@ -38,5 +38,5 @@ class Prismatic(Joint):
 
 
 def slide_from_ground(name: str, body: str, at: Any, planar: bool) -> Prismatic:
-    """A slide along x, from ground to a body."""
+    """Return a slide along x, from ground to a body."""
     return Prismatic(name, "ground", body, at=at, axis=(1, 0) if planar else (1, 0, 0))

@@ -17,10 +17,9 @@ if TYPE_CHECKING:
 
 @element
 class RackAndPinion(Coupling):
-    """A rack that moves by radius times angle of the pinion; whole turns count.
+    """A rack that moves by the radius times the angle of the pinion; full turns are counted.
 
-    It acts along the two coordinates only: what the teeth press loads neither the pinion's bearing nor the rack's
-    guide.
+    It acts along the two coordinates only: tooth forces load neither the pinion's bearing nor the rack's guide.
     ``run["name.effort_1"]`` is the force along the rack, ``run["name.effort_2"]`` the torque on the pinion.
 
     Parameters
@@ -42,14 +41,14 @@ class RackAndPinion(Coupling):
     drawn: ClassVar[str] = "rack"
 
     def coupled(self) -> tuple[str, ...]:
-        """The displacement and the angle."""
+        """Return the displacement and the angle."""
         return f"{self.rack}.displacement", f"{self.pinion}.angle"
 
     def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
-        """Displacement - radius * angle = constant."""
+        """Return the factors of: displacement - radius * angle = constant."""
         return 1.0, -n.radius
 
     def check(self, n: SimpleNamespace) -> None:
-        """A pinion has a radius."""
+        """Require a radius."""
         if n.radius == 0.0:
             raise ModelError(f"{self.title}: its radius is 0 m; give the rolling radius of the pinion")

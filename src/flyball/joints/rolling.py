@@ -14,16 +14,16 @@ from ..model.element import Direction, Length, element, nonnegative, positive
 from ..model.geometry import triad, vector
 from ..model.joint import Joint, WorldFrame
 
-FLAT = 1e-6  # a disk whose axle is this close to the plane's normal lies flat
+FLAT = 1e-6  # a disk whose axle is this close to the plane's normal counts as lying flat
 
 
 @element
 class RollingDisk(Joint):
     """``body_j`` is a wheel that touches a plane fixed in ``body_i`` and rolls on it without slip.
 
-    The plane lies where the wheel touches it as drawn: ``radius + tread`` below the centre of an upright wheel.
-    Two of its three rows restrain velocities only (non-holonomic). It carries pull as well as push; where it pulls,
-    ``health.warnings`` of a motion says so.
+    The plane passes through the contact point in the reference configuration: ``radius + tread`` below the centre of an
+    upright wheel. Two of its three rows constrain velocities only (non-holonomic). The constraint can pull as well as
+    push; if it pulls, ``health.warnings`` of a motion reports it.
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ class RollingDisk(Joint):
     one_sided: ClassVar[bool] = True
 
     def check(self, n: SimpleNamespace) -> None:
-        """Radii must make a wheel."""
+        """Require valid radii."""
         positive(self, n, "radius", why="For a ball use RollingBall")
         nonnegative(self, n, "tread")
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
-        """F where the wheel touches the plane, z along its normal; M in the wheel's centre, z along its axle."""
+        """Return F at the contact point, z along the plane's normal; M in the wheel's centre, z along its axle."""
         centre = vector(n.at, planar, f"'at' of {self.title}")
         up = vector(n.normal, planar, f"normal of {self.title}", direction=True)
         M = self.orientation(n.axis, planar)
@@ -72,7 +72,7 @@ class RollingDisk(Joint):
         return (contact, triad(up)), (centre, M)
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """The radii."""
+        """Return the radii."""
         return (*row.par[:3], n.radius, n.tread, row.par[5], 0.0)
 
 
@@ -102,15 +102,15 @@ class RollingBall(Joint):
     one_sided: ClassVar[bool] = True
 
     def check(self, n: SimpleNamespace) -> None:
-        """A ball has a radius."""
+        """Require a radius."""
         positive(self, n, "radius")
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
-        """F where the ball touches the plane, z along its normal; M in the ball's centre."""
+        """Return F at the contact point, z along the plane's normal; M in the ball's centre."""
         centre = vector(n.at, planar, f"'at' of {self.title}")
         up = vector(n.normal, planar, f"normal of {self.title}", direction=True)
         return (centre - n.radius * up, triad(up)), (centre, np.eye(3))
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """A ball is the tread of a wheel of no radius."""
+        """Return the radii of a wheel of radius 0 whose tread is the ball."""
         return (*row.par[:3], 0.0, n.radius, row.par[5], 0.0)

@@ -1,4 +1,4 @@
-"""Screw joint: turning and sliding along an axis go together."""
+"""Screw joint: rotation and translation along an axis are coupled."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Screw(Joint):
     axis : direction
         Axis in world coordinates.
     lead : number [m]
-        Way along the axis for one turn; negative for a left-handed thread.
+        Displacement along the axis per turn; negative for a left-handed thread.
     angle, displacement : number [rad], [m]
         Values of the coordinates in the drawn configuration.
     """
@@ -51,10 +51,10 @@ class Screw(Joint):
     replaceable: ClassVar[bool] = True
 
     def check(self, n: SimpleNamespace) -> None:
-        """A thread has a lead."""
+        """Require a lead other than zero."""
         if n.lead == 0.0:
             raise ModelError(f"{self.title}: its lead is 0 m; without one it is a Revolute joint")
 
     def weight(self, n: SimpleNamespace, coordinate: str, F: WorldFrame, M: WorldFrame) -> float:
-        """Displacement - lead / (2 pi) angle = 0."""
+        """Return the weight of: displacement - lead / (2 pi) angle = 0."""
         return -n.lead / TURN

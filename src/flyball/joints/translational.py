@@ -12,7 +12,7 @@ from .prismatic import Prismatic
 class Translational(Prismatic):
     """A planar slide: ``body_j`` moves along an axis fixed in ``body_i`` and does not turn relative to it.
 
-    Takes what `Prismatic` takes, with ``at`` and ``axis`` in the plane.
+    It takes the arguments of `Prismatic`, with ``at`` and ``axis`` in the plane.
     """
 
     spatial: ClassVar[bool] = False

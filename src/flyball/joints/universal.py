@@ -51,7 +51,7 @@ class Universal(Joint):
     stand_in: ClassVar[float] = 1.0
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
-        """F has the first axis as z and the second as x; M the other way round."""
+        """Return F with the first axis as z and the second as x, and M with the two exchanged."""
         if n.axes is None:
             raise ModelError(f"{self.title}: give its two axes, for instance axes=((1, 0, 0), (0, 1, 0))")
         p = vector(n.at, planar, f"'at' of {self.title}")

@@ -24,14 +24,14 @@ class WheelOnLine(Joint):
     body_i, body_j : str
         Body that carries the line (``"ground"`` is the world), and the wheel.
     at : point [m]
-        Where the wheel touches the line, in world coordinates of the drawn configuration.
+        Contact point of the wheel and the line, in world coordinates of the drawn configuration.
     axis : direction
         The line, in world coordinates.
     centre : point [m]
-        Centre of the wheel, square to the line from ``at``; its distance is the rolling radius.
+        Centre of the wheel, perpendicular to the line from ``at``; its distance is the rolling radius.
     angle, displacement : number [rad], [m]
-        Values of the coordinates in the drawn configuration: how far the wheel has turned relative to ``body_i``,
-        and how far its centre has come along the line.
+        Values of the coordinates in the drawn configuration: the rotation of the wheel relative to ``body_i``, and the
+        displacement of its centre along the line.
     """
 
     centre: Point
@@ -51,7 +51,7 @@ class WheelOnLine(Joint):
     one_sided: ClassVar[bool] = True
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
-        """F on the line where the wheel touches it, M in the wheel's centre."""
+        """Return F at the contact point on the line, M in the wheel's centre."""
         R = self.orientation(n.axis, planar)
         at = vector(n.at, planar, f"'at' of {self.title}")
         centre = vector(n.centre, planar, f"centre of {self.title}")
@@ -66,15 +66,15 @@ class WheelOnLine(Joint):
         return (at, R), (centre, R)
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """The centre keeps its height over the line."""
+        """Return the height of the centre above the line, which is constant."""
         return (*row.par[:6], 0.0 if row.plus else _height(F, M))
 
     def pushing_sign(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> float | None:
-        """Towards the centre of the wheel."""
+        """Return the sign of a force towards the centre of the wheel."""
         return 1.0 if _height(F, M).real > 0.0 else -1.0
 
     def weight(self, n: SimpleNamespace, coordinate: str, F: WorldFrame, M: WorldFrame) -> float:
-        """Displacement + height * angle = 0, the height counted to the left of the line."""
+        """Return the weight of: displacement + height * angle = 0, with the height counted to the left of the line."""
         return _height(F, M)
 
 

@@ -2,5 +2,6 @@
 
 `driven_motion` follows the drivers, `inverse_dynamics` finds the efforts of drivers and the reactions for a given
 motion, `prepared` evaluates mass matrix, forces, Jacobians and accelerations at any state. Imports assembly,
-mobility and the loop over time of `simulation`.
+mobility and `simulation.prescribed_motion`: positions are predicted by a cubic and corrected by Newton's method, steps
+halved where a prediction misses by a hundredth. Forward motion of such mechanisms is computed in the same way.
 """

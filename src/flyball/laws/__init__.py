@@ -1,1 +1,1 @@
-"""Laws: expressions as bytecode, one instruction set and its readers, and calls of Python functions from it."""
+"""Laws: expressions as bytecode, its evaluation, and calls of Python functions from it."""

@@ -1,8 +1,8 @@
 """Times at which laws have corners, jump, or begin and end a brief pulse, as far as these depend on time alone.
 
-They are found before a motion begins, from the laws' programs, by the interval Newton method and bisection, so
-that none is missed however brief it is (Moore, Kearfott and Cloud, *Introduction to Interval Analysis*, 2009,
-chapter 8). What depends on the state cannot be known beforehand.
+They are found before a motion begins, from the laws' programs, by the interval Newton method and bisection, so that
+none is missed however brief it is (Moore, Kearfott and Cloud, *Introduction to Interval Analysis*, 2009, chapter 8).
+Those that depend on the state cannot be found beforehand.
 """
 
 from __future__ import annotations
@@ -28,31 +28,31 @@ from .interval_evaluation import (
     step_may_be_brief,
 )
 
-MAX_INTERVALS = 60000  # intervals looked at together
-SUBDIVISION = 4  # that an interval is cut into
-THIN_CROSSING = 1e-12  # part of the span: an interval that is not cut
-THIN_TOUCH = 1e-9  # of one in which a level may be touched
-ROUNDOFF_FACTOR = 8.0 * ROUNDING  # part of what is subtracted that a difference may be wrong by
-SLOPE_FACTOR = 100.0  # a range as many times its rounding says more than rounding
-END_MARGIN = 1024.0  # units in the last place from an end of the span at which what is at the end is told
+MAX_INTERVALS = 60000  # intervals processed together
+SUBDIVISION = 4  # parts that an interval is divided into
+THIN_CROSSING = 1e-12  # fraction of the span: an interval that is not divided
+THIN_TOUCH = 1e-9  # likewise, for an interval in which a level may be touched
+ROUNDOFF_FACTOR = 8.0 * ROUNDING  # relative to the operands: rounding error of a difference
+SLOPE_FACTOR = 100.0  # a range is conclusive if it exceeds its rounding error by this factor
+END_MARGIN = 1024.0  # units in the last place from an end of the span at which a level reached at the end is reported
 MAX_NEWTON_STEPS = 200  # steps towards a zero: bisection alone takes sixty
 
 
 class Spans(NamedTuple):
-    """The time in parts, and the signs in each of what decides at inner corners."""
+    """Time divided into spans, and in each the signs that decide at inner corners."""
 
     edges: np.ndarray  # (n + 1,)
     signs: Mapping[int, np.ndarray]  # step -> (n,)
 
     def at(self, part: np.ndarray) -> dict[int, np.ndarray]:
-        """The signs in intervals that lie in these parts."""
+        """Signs in intervals that lie in these spans."""
         return {k: s[part] for k, s in self.signs.items()}
 
 
 def level_crossings(law: IntervalLaw, c: Corner, spans: Spans) -> tuple[np.ndarray, bool]:
     """Times within the spans at which a corner's levels are reached, ascending, and whether these are all.
 
-    Levels that are only touched count where the corner says so.
+    Levels that are only touched count where the corner states it.
     """
     wanted = required_steps(law.steps, [c.of])
     a, b = spans.edges[:-1], spans.edges[1:]
@@ -94,7 +94,7 @@ def level_crossings(law: IntervalLaw, c: Corner, spans: Spans) -> tuple[np.ndarr
 
 
 def _at_ends(law: IntervalLaw, requested: list[int], c: Corner, spans: Spans) -> np.ndarray:
-    """A time beside an end of the span where a level is reached at the end itself, as far as rounding tells."""
+    """Time beside an end of the span where a level is reached at the end itself, within rounding."""
     ends = spans.edges[[0, -1]]
     near = END_MARGIN * np.spacing(np.abs(ends).max())
     v, d = law.points(requested, ends, spans.at(np.array([0, len(spans.edges) - 2])))
@@ -105,7 +105,7 @@ def _at_ends(law: IntervalLaw, requested: list[int], c: Corner, spans: Spans) ->
 
 
 def _nearer(middle: Any, width: np.ndarray, f: Range, slope: Range) -> Range:
-    """The range of a step, by its value in the middle and its slope where that says more."""
+    """Range of a step, intersected with the range from its value in the middle and its slope."""
     way = 0.5 * width * np.maximum(np.abs(slope[0]), np.abs(slope[1]))
     way = np.where(np.isnan(way), np.inf, way) + ROUNDING * np.abs(middle)
     lo, hi = np.fmax(f[0], middle - way), np.fmin(f[1], middle + way)
@@ -113,7 +113,7 @@ def _nearer(middle: Any, width: np.ndarray, f: Range, slope: Range) -> Range:
 
 
 def _roundoff(law: IntervalLaw, c: Corner, found: Mapping[int, Any], n: int) -> np.ndarray:
-    """What a difference may be wrong by, of what is subtracted: a level less deep inside counts as not reached."""
+    """Rounding error of a difference, from its operands: a level less deep inside counts as not reached."""
     s = law.steps[c.of]
     if c.touched or s.operation not in (ADD, SUBTRACT):
         return np.zeros(n)
@@ -125,12 +125,12 @@ def _roundoff(law: IntervalLaw, c: Corner, found: Mapping[int, Any], n: int) -> 
 def _zero_ends(
     law: IntervalLaw, requested: list[int], c: Corner, t: Range, signs: Signs, blur: np.ndarray
 ) -> list[np.ndarray]:
-    """Ends of intervals that are given up for rounding where the difference is zero: what is beyond may have a sign."""
+    """Ends, where the difference is zero, of intervals that rounding leaves undecided: it may have a sign beyond."""
     return [x[np.abs(law.points(requested, x, signs)[0][c.of]) <= blur] for x in t]
 
 
 def _levels(c: Corner, x: Any, before: bool = False) -> np.ndarray:
-    """Number of levels up to x; ``before``: without x itself."""
+    """Number of levels up to x; ``before``: excluding x itself."""
     side: Literal["left", "right"] = "left" if before else "right"
     if c.period == 0.0:
         return np.searchsorted(c.levels, x, side=side)
@@ -155,7 +155,7 @@ def _subdivide(a: np.ndarray, b: np.ndarray, part: np.ndarray) -> tuple[np.ndarr
 
 
 def _zeros(law: IntervalLaw, requested: list[int], c: Corner, t: Range, signs: Signs) -> tuple[np.ndarray, bool]:
-    """The times at which levels are passed in intervals in which a step only rises or falls, and if these are all."""
+    """Times at which levels are crossed in intervals in which a step is monotonic, and whether these are all."""
     if not len(t[0]):
         return t[0], True
     ends = [np.broadcast_to(law.points(requested, x, signs)[0][c.of], x.shape) for x in t]
@@ -177,7 +177,7 @@ def _zeros(law: IntervalLaw, requested: list[int], c: Corner, t: Range, signs: S
 
 
 def _nearest(gap: Callable[[np.ndarray, np.ndarray], Any], a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Zeros of rising functions between a and b: Newton's steps, halves where these leave the interval.
+    """Zeros of rising functions between a and b: Newton's steps, bisection where these leave the interval.
 
     ``gap(x, which)`` gives values and slopes of the functions with these numbers.
     """
@@ -198,7 +198,7 @@ def _nearest(gap: Callable[[np.ndarray, np.ndarray], Any], a: np.ndarray, b: np.
 
 
 def _distinct_times(t: np.ndarray, thin: float, edges: np.ndarray) -> np.ndarray:
-    """Times that are one within rounding only once, and not the edges of the time again."""
+    """Times without duplicates within rounding, and without the edges of the spans."""
     near = max(4.0 * thin, 16.0 * np.spacing(np.abs(edges).max()))
     keep = np.r_[True, np.diff(t) > near][: len(t)]
     t = t[keep]
@@ -210,12 +210,12 @@ def _distinct_times(t: np.ndarray, thin: float, edges: np.ndarray) -> np.ndarray
 
 
 RESOLVED_SHARE = (
-    0.5  # of its range by which a step may change within an interval; less than 1, or a pulse could stay unseen
+    0.5  # of its range by which a step may change within an interval; less than 1, or a pulse could be missed
 )
-SMALL_SHARE = 0.01  # part of its range that a step may change by however steep it is
-THIN_INTERVAL = 1e-13  # part of the span: an interval that is not cut
-ISOLATION_FACTOR = 30.0  # widths of an interval, within which an integrator cannot overlook what it does
-SMALL = 1e-300  # a range that is nothing
+SMALL_SHARE = 0.01  # fraction of its range that a step may change by however steep it is
+THIN_INTERVAL = 1e-13  # fraction of the span: an interval that is not divided
+ISOLATION_FACTOR = 30.0  # in widths of an interval: an integrator cannot miss an action within this distance
+SMALL = 1e-300  # a range that counts as zero
 
 
 def pulse_times(law: IntervalLaw, spans: Spans) -> tuple[np.ndarray, bool]:
@@ -249,7 +249,7 @@ def pulse_times(law: IntervalLaw, spans: Spans) -> tuple[np.ndarray, bool]:
 
 
 def _outermost(steps: Sequence[Step]) -> list[int]:
-    """Steps of time that may do much within a short time, and stand in no other such one."""
+    """Steps of time that may act briefly, and are not arguments of another such step."""
     bent = [s.on == TIME_ONLY and not s.logical and step_may_be_brief(s, steps) and not _transparent(s) for s in steps]
     within = [False] * len(steps)
     for k in range(len(steps) - 1, -1, -1):
@@ -259,7 +259,7 @@ def _outermost(steps: Sequence[Step]) -> list[int]:
 
 
 def _transparent(s: Step) -> bool:
-    """Whether a step gives one of its arguments, or its sign: what it does besides are corners, which are known."""
+    """Whether a step gives one of its arguments, or its sign: apart from its known corners it adds nothing."""
     return s.operation in (MINIMUM, MAXIMUM, WHERE) or (s.operation == CALL and s.operand in (ABS, SIGN))
 
 
@@ -271,7 +271,7 @@ def _target_ranges(
     part: np.ndarray,
     spans: Spans,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of each target in each interval: least and greatest value, and the most by which it may change."""
+    """For each target in each interval: least and greatest value, and the largest possible change."""
     found = law.enclose(requested, t, spans.at(part))
     width = t[1] - t[0]
     middle = law.points(requested, 0.5 * (t[0] + t[1]))[0]
@@ -293,7 +293,7 @@ def _parts(a: np.ndarray, b: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _ends(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Ends of intervals that are narrow, where no others as narrow are near: brief actions begin and end there."""
+    """Ends of narrow intervals without equally narrow ones near: brief actions begin and end there."""
     order = np.argsort(a)
     a, b = a[order], b[order]
     level = np.round(np.log(np.maximum(b - a, SMALL)) / np.log(SUBDIVISION)).astype(int)  # larger: wider
@@ -310,17 +310,18 @@ def _ends(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 NO_TIMES = np.zeros(0)
-MARGIN_FACTOR = 256.0  # units in the last place that breaks are apart
+MARGIN_FACTOR = 256.0  # distance of breaks in units in the last place
 INTERIOR_FRACTION = (
-    0.381966011250105  # part of a span where its sign is read: in the middle, by symmetry, a law may touch zero
+    # fraction of a span where its sign is evaluated: in the middle, by symmetry, a law may touch zero
+    0.381966011250105
 )
 
 
 class Breakpoints(NamedTuple):
-    """Times [s] at which a step of the integration ends, and starts of laws of which not all could be found."""
+    """Times [s] at which a step of the integration must end, and starts of laws whose times could not all be found."""
 
     times: np.ndarray  # ascending
-    sharp: np.ndarray  # whether a law has a corner there, or jumps; otherwise a step only has to end there
+    sharp: np.ndarray  # whether a law has a corner or a jump there; otherwise a step only has to end there
     given_up: tuple[int, ...]
 
 
@@ -328,13 +329,13 @@ NO_BREAKPOINTS = Breakpoints(NO_TIMES, np.zeros(0, bool), ())
 
 
 Timed = tuple[tuple[int, list[Step]], ...]
-"""Laws by where they start in the code, with their steps."""
+"""Laws by their start in the code, with their steps."""
 
 
 def time_dependent_laws(code: Sequence[int], starts: Iterable[int]) -> Timed:
-    """The laws among those that start at ``starts`` that may have corners or act briefly by time alone.
+    """Those of the laws at ``starts`` that may have corners or act briefly by time alone.
 
-    Negative starts are left out. It follows from the programs, whatever their constants are.
+    Negative starts are left out. The result follows from the programs, whatever their constants are.
     """
     every = ((at, read_steps(code, at)) for at in dict.fromkeys(int(a) for a in starts if a >= 0))
     return tuple(
@@ -343,22 +344,22 @@ def time_dependent_laws(code: Sequence[int], starts: Iterable[int]) -> Timed:
 
 
 def find_breakpoints(laws: Timed, const: np.ndarray, t0: float, t1: float) -> Breakpoints:
-    """Where laws have corners or act briefly between two times [s].
+    """Find times between two times [s] at which laws have corners or act briefly.
 
     Parameters
     ----------
     laws : Timed
-        Equal ones are looked at once.
+        Equal ones are analysed once.
     const : ndarray
         Constants of their programs.
     t0, t1 : float
-        The time [s] that is looked at, without its ends.
+        Ends [s] of the time span, excluded.
 
     Returns
     -------
-    Breaks
-        Where a law is sharp it may belong to either side at the time itself: a step ends `rounding_margin` before, and the
-        next begins as much behind.
+    Breakpoints
+        At a sharp time a law may belong to either side: a step ends `rounding_margin` before it, and the next
+        begins as much after it.
     """
     if not laws:
         return NO_BREAKPOINTS
@@ -380,12 +381,12 @@ def find_breakpoints(laws: Timed, const: np.ndarray, t0: float, t1: float) -> Br
 
 
 def rounding_margin(t: float) -> float:
-    """How far [s] from a sharp time t a law is on one side of it for sure, as far as rounding goes."""
+    """Distance [s] from a sharp time t beyond which a law is on one side of it in spite of rounding."""
     return 8.0 * float(np.spacing(abs(t)))
 
 
 def _separated_times(t: np.ndarray, t0: float, t1: float, required: np.ndarray = NO_TIMES) -> np.ndarray:
-    """Times that are apart by more than both their margins, and from the ends; ``required`` stay in any case."""
+    """Times further apart than both their margins, also from the ends; ``required`` times are always kept."""
     near = MARGIN_FACTOR * np.spacing(max(abs(t0), abs(t1)))
     t = t[(t > t0 + near) & (t < t1 - near)]
     if len(required) and len(t):
@@ -400,7 +401,9 @@ def _separated_times(t: np.ndarray, t0: float, t1: float, required: np.ndarray =
 def sign_changes(
     code: Sequence[int], const: np.ndarray, at: int, t0: float, t1: float
 ) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Times [s] at which a law of time alone changes its sign, whether it is positive behind each, and if that is all.
+    """Times [s] at which a law of time alone changes its sign.
+
+    Also returns whether it is positive after each, and whether all are found.
 
     Raises
     ------
@@ -423,19 +426,19 @@ def sign_changes(
 
 
 def interior_times(edges: np.ndarray) -> np.ndarray:
-    """A time [s] within each span between edges where the sign of the span is read."""
+    """A time [s] within each span between edges, where the sign of the span is evaluated."""
     return edges[:-1] + INTERIOR_FRACTION * (edges[1:] - edges[:-1])
 
 
 def dependence(code: Sequence[int], at: int) -> int:
-    """What a law depends on: NOTHING, TIME, STATE."""
+    """Dependence of a law: CONSTANT_IN_TIME, TIME_ONLY, STATE_DEPENDENT."""
     return read_steps(code, at)[-1].on
 
 
 def acts_briefly(code: Sequence[int], at: int) -> bool:
-    """Whether a law can act briefly by more than time alone, so that samples have to guard it.
+    """Whether a law can act briefly by more than time alone, so that it has to be sampled within steps.
 
-    What is left of absolute values in a motion are squares u |u|, whose slope has no jump.
+    The absolute values that remain in a motion are squares u |u|, whose slope does not jump.
     """
     steps = read_steps(code, at)
     bent = [s for s in steps if s.on == STATE_DEPENDENT and not (s.operation == CALL and s.operand == ABS)]
@@ -443,7 +446,7 @@ def acts_briefly(code: Sequence[int], at: int) -> bool:
 
 
 def _law_breakpoints(steps: list[Step], const: np.ndarray, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Its corners, where brief actions of it begin and end, and whether these are all."""
+    """Corners of a law, times at which its brief actions begin and end, and whether these are all."""
     if not t1 > t0:
         return NO_TIMES, NO_TIMES, True
     law, spans, complete = _split_at_corners(steps, const, t0, t1)
@@ -455,7 +458,7 @@ def _law_breakpoints(steps: list[Step], const: np.ndarray, t0: float, t1: float)
 
 
 def _split_at_corners(steps: list[Step], const: np.ndarray, t0: float, t1: float) -> tuple[IntervalLaw, Spans, bool]:
-    """The law, the time cut at its corners, inner ones first, and whether all are found."""
+    """The law, time divided at its corners (inner ones first), and whether all are found."""
     law = IntervalLaw(steps, const)
     spans = Spans(np.array([t0, t1], float), {})
     known: list[Corner] = []
@@ -475,7 +478,7 @@ def _split_at_corners(steps: list[Step], const: np.ndarray, t0: float, t1: float
 
 
 def _law_key(steps: list[Step], const: np.ndarray) -> Any:
-    """What tells laws apart."""
+    """Key of a law: equal keys mean equal laws."""
     return tuple(
         (s.operation, float(const[s.operand].real) if s.operation == CONSTANT else s.operand, s.args)
         if s.on != STATE_DEPENDENT or s.operation == INPUT

@@ -1,15 +1,15 @@
-"""The bytecode of laws: its operations, and its evaluation inside compiled loops.
+"""Bytecode of laws: its operations, and its evaluation inside compiled loops.
 
-A program is ``[count, depth, operation, operand, operation, operand, ...]`` in a shared list of integers,
-evaluated on a stack of numbers. Its constants are entries of one table, parameters first, so that a new value of
-a parameter is a new number in the table and nothing is compiled again. `evaluate` gives the value, `evaluate_jet`
-the value and its first two derivatives by the chain rule; values and derivatives of elementary functions are
-defined once, in `function_value` and `function_slopes`.
+A program is ``[count, depth, operation, operand, operation, operand, ...]`` in a shared list of integers, evaluated on
+a stack of numbers. Its constants are entries of one table, parameters first, so that a new value of a parameter is a
+new number in the table and nothing is compiled again. `evaluate` gives the value, `evaluate_jet` the value and its
+first two derivatives by the chain rule; values and derivatives of elementary functions are defined once, in
+`function_value` and `function_slopes`.
 
-A Python function is machine code that is called by its address, which is in the bytecode: its arguments are in
-the first column of the stack, one a row, and it writes its value into the second column of the first of these
-rows, where nan is before. A failure inside leaves nan, and the record of the fault is at the end of the stack.
-`python_functions` makes the code.
+A Python function is machine code called by its address, which is in the bytecode. Its arguments are in the first column
+of the stack, one for each row. It writes its value into the second column of the first of these rows, which is nan
+before the call. A failure inside leaves nan, and the record of the fault is at the end of the stack. `python_functions`
+makes the code.
 """
 
 from __future__ import annotations
@@ -53,26 +53,26 @@ CONSTANT, INPUT, SENSOR, CALL, WHOLE_POWER, TABLE, FUNCTION, WHERE, FREEZE, BLEN
 ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, ATAN2, MINIMUM, MAXIMUM, LESS, LESS_EQUAL = range(10, 20)
 NEGATE, SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, EXP, LOG, SQRT, ABS, SIGN, CUBIC, QUINTIC, NOT = range(18)
 
-# what the operand of FUNCTION points to, in the code too
+# meaning of the FUNCTION operand, and of the code that it points to
 ADDRESS, INDEX, COUNT = range(3)
-# values of ``seed`` of `evaluate_jet` besides the number of a sensor
+# values of ``seed`` of `evaluate_jet`, if not the number of a sensor
 BY_MOTION, BY_TIME = -1, -2
 
 
 STACK_RESERVE = 3
-"""Last rows of the stack, kept for a fault: (index + 1, arguments given, value), then up to six arguments.
+"""Last rows of the stack, for the record of a fault: (index + 1, number of arguments, value), then up to six arguments.
 
-Of a table that has no value: (start of the law + 1, -1, place of the table in const), then (argument, time).
+Of a table out of range: (start of the law + 1, -1, place of the table in const), then (argument, time).
 """
 
 COMPILED_FUNCTIONS: WeakValueDictionary[int, Any] = WeakValueDictionary()
-"""What stands at an address, as long as it does: the `python_functions.CompiledFunction`."""
+"""The `python_functions.CompiledFunction` at an address, as long as it exists."""
 
 
 def call_address(address, stack, row):
-    """Run the code at an address on the stack from a row on; in plain Python the function itself, errors included.
+    """Run the code at an address on the stack from a row on; in plain Python call the function itself, which may raise.
 
-    Of expressions an expression: what their ``called(function, *args)`` says.
+    With expressions, the result is that of their method ``called(function, *args)``.
     """
     native = COMPILED_FUNCTIONS.get(int(address))
     if native is None:
@@ -87,7 +87,7 @@ def call_address(address, stack, row):
 
 @formula
 def call_function(code, at, stack, row):
-    """Value of the function whose address and number stand at code[at], for the arguments from ``row`` on.
+    """Value of the function whose address and number are at code[at], for the arguments from ``row`` on.
 
     A value that is not finite is recorded, unless an argument is not finite either: then the cause lies elsewhere.
     """
@@ -111,7 +111,7 @@ def call_function(code, at, stack, row):
 
 @formula
 def record_out_of_range(stack, law, table, x, t):
-    """Record that a law asked a table for its value at x, where it has none."""
+    """Record that a law evaluated a table at x, outside its range."""
     last = stack.shape[0] - STACK_RESERVE
     stack[last, 0] = law + 1.0
     stack[last, 1] = -1.0
@@ -122,7 +122,7 @@ def record_out_of_range(stack, law, table, x, t):
 
 @when_compiling
 def _register() -> None:
-    """In compiled code: a jump to the address; complex numbers are not for such code, their value stays nan."""
+    """Register the compiled call by address; complex numbers, which such code does not take, give nan."""
     from llvmlite import ir
     from numba import types
     from numba.extending import intrinsic
@@ -151,8 +151,8 @@ def _register() -> None:
 def evaluate(code, const, at, stack, x, sensed):
     """Value of the law that starts at `at`; `stack` is scratch.
 
-    The inputs x = (t, ...) are all of one type, and `sensed` holds the values of the sensors in its first row. A table
-    without a value that leaves the law without one is noted in the stack.
+    The inputs x = (t, ...) are all of one type, and `sensed` holds the values of the sensors in its first row. If a
+    table evaluated out of range makes the value nan, that is recorded in the stack.
     """
     top = -1
     missed = -1
@@ -199,7 +199,7 @@ def evaluate(code, const, at, stack, x, sensed):
 def evaluate_jet(code, const, at, stack, t, sensed, seed):
     """Value, first and second derivative of a law of time and sensors; `stack` is scratch of 3 columns.
 
-    The rows of `sensed` are the sensors' values and their first two time derivatives. `seed` says by what to derive:
+    The rows of `sensed` are the sensors' values and their first two time derivatives. `seed` selects the variable:
     BY_MOTION, time with the sensors moving along; BY_TIME, time with the sensors held; k >= 0, the value of sensor k
     alone.
     """
@@ -259,11 +259,12 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
 
 @formula
 def blend_branches(way, a, b):
-    """A on the one side of a corner (way 1), b on the other (-1); while sliding along it, what is between.
+    """Value a on one side of a corner (way 1), b on the other (-1); interpolated while sliding along it.
 
-    Beyond them it goes on as between: the motion is to leave there, but the side that would hold it has to be found.
+    Beyond 1 and -1 it is extrapolated: the motion then leaves the corner, but the side that would hold it must be
+    found.
     """
-    if way.real == 1.0:  # b may be no number there
+    if way.real == 1.0:  # b may be nan there
         return a
     if way.real == -1.0:
         return b
@@ -287,7 +288,7 @@ def store_chain(stack, k, f, f1, f2):
 
 @formula
 def slope_product(slope, rate):
-    """Slope times rate; an argument that rests has no effect, though the slope there may be infinite."""
+    """Slope times rate; 0 for zero rate, even if the slope is infinite."""
     if rate == 0.0:
         return rate
     return slope * rate
@@ -295,7 +296,7 @@ def slope_product(slope, rate):
 
 @formula
 def safe_ratio(rate, size):
-    """Rate over size; of arguments that rest 0, though the size may be 0."""
+    """Rate over size; 0 for zero rate, even if the size is 0."""
     if rate == 0.0:
         return rate
     return divide(rate, size)
@@ -384,7 +385,7 @@ def function_slopes(function, x, f):
 
 @formula
 def power_slopes(x, b):
-    """First and second derivative of x ** b by x; a derivative that is zero everywhere is so at x = 0 too."""
+    """First and second derivative of x ** b with respect to x; one that is zero everywhere is 0 at x = 0 too."""
     f1 = 0.0 * x
     f2 = 0.0 * x
     if b != 0.0:
@@ -396,7 +397,7 @@ def power_slopes(x, b):
 
 @formula
 def integer_power_slopes(x, n):
-    """First and second derivative of x ** n by x."""
+    """First and second derivative of x ** n with respect to x."""
     f1 = 0.0 * x
     f2 = 0.0 * x
     if n != 0:
@@ -432,7 +433,7 @@ def combine_values(operation, a, b):
 
 @formula
 def combine_jets(operation, stack, k):
-    """Put the operation's value and derivatives, of rows k and k + 1, in row k."""
+    """Store the operation's value and derivatives, for arguments in rows k and k + 1, in row k."""
     a, a1, a2 = stack[k, 0], stack[k, 1], stack[k, 2]
     b, b1, b2 = stack[k + 1, 0], stack[k + 1, 1], stack[k + 1, 2]
     f = combine_values(operation, a, b)
@@ -460,14 +461,14 @@ def combine_jets(operation, stack, k):
         store_row(stack, k, f, 0.0, 0.0)
 
 
-LOW_DEGREE = 8  # powers up to this are no pulses
+LOW_DEGREE = 8  # powers up to this do not act briefly
 
 
 @formula
 def is_entire(code, at):
-    """Whether a law is made of functions of time alone that have derivatives of every order everywhere.
+    """Whether a law consists of functions of time that have derivatives of every order everywhere.
 
-    Sums, products, quotients by constants, whole powers, sines and the like: it can neither jump nor have a kink.
+    Sums, products, quotients by constants, integer powers, sines and the like: it can neither jump nor have a kink.
     """
     for i in range(at + 2, at + 2 + 2 * code[at], 2):
         operation = code[i]
@@ -489,9 +490,9 @@ def is_entire(code, at):
 
 @formula
 def may_be_brief(code, at):
-    """Whether a law can do much within a short time, or a short way.
+    """Whether a law can change much within a short time or distance.
 
-    Sums, products, low powers, sines and cosines cannot: a change of theirs is one that the error of a step shows.
+    Sums, products, low powers, sines and cosines cannot: a step's error estimate shows their changes.
     """
     for i in range(at + 2, at + 2 + 2 * code[at], 2):
         operation = code[i]
@@ -510,7 +511,7 @@ def may_be_brief(code, at):
     return False
 
 
-ONE_BY_ONE = (TABLE, FUNCTION)  # operations that take nothing but numbers
+ONE_BY_ONE = (TABLE, FUNCTION)  # operations that take single numbers only
 
 
 def takes_arrays(code: np.ndarray, at: int) -> bool:
@@ -521,7 +522,7 @@ def takes_arrays(code: np.ndarray, at: int) -> bool:
 def evaluate_over_time(
     code: np.ndarray, const: np.ndarray, at: int, x: tuple[np.ndarray, ...], sensed: tuple[np.ndarray, np.ndarray]
 ) -> np.ndarray:
-    """Its values, (n,).
+    """Values of a law at many times, (n,).
 
     Parameters
     ----------
@@ -530,10 +531,10 @@ def evaluate_over_time(
     at : int
         Where it starts.
     x : tuple of ndarray (n,)
-        Time and what else it is a law of.
+        Time and the other inputs of the law.
     sensed : pair of ndarray (slots, n)
-        Values of sensors; behind them, the sides of corners that it is on: where it has corners, times that are on the
-        same sides are taken together.
+        Values of sensors; and the sides of corners: where the law has corners, times on the same sides are
+        evaluated together.
     """
     stack, out = np.empty((int(code[at + 1]) + 1, 3), object), np.empty(x[0].shape)
     values, sides = sensed
@@ -551,7 +552,7 @@ def _operations(code: np.ndarray, at: int) -> np.ndarray:
 
 
 def _equal_branches(side_values: np.ndarray, n: int) -> Iterator[np.ndarray]:
-    """Times at which all sides are the same."""
+    """Groups of times at which all sides are the same."""
     _, which = np.unique(side_values, axis=1, return_inverse=True) if len(side_values) else (None, np.zeros(n, int))
     for k in range(int(which.max(initial=-1)) + 1):
         yield np.flatnonzero(which == k)

@@ -1,16 +1,16 @@
 """Compilation of expressions to bytecode, and laws restricted to one side of their nonsmooth points.
 
-Where ``sign(u)`` decides, a law reads a number instead, 1 or -1, which changes only after u has crossed zero; so
-the law continues smoothly beyond the nonsmooth point, and a step may end on it. Between -1 and 1 is the value
-that holds the motion on u = 0 (Filippov, *Differential Equations with Discontinuous Righthand Sides*, 1988).
+Where ``sign(u)`` decides, a law reads a number instead, 1 or -1, which changes only after u has crossed zero. The law
+thus continues smoothly beyond the nonsmooth point, and a step may end on it. A value between -1 and 1 holds the motion
+on u = 0 (Filippov, *Differential Equations with Discontinuous Righthand Sides*, 1988).
 
-Such a law is affine in each of these numbers, also beyond 1 and -1: the number that would hold the motion is
-sought there where none between does, which shows that the motion leaves the surface.
+Such a law is affine in each of these numbers, also beyond 1 and -1. If no number between 1 and -1 would hold the
+motion, the one that would is found outside, which shows that the motion leaves the surface.
 
-A branch is continued beyond its nonsmooth point only within the domain of the functions in it (`DOMAINS`): where
-the law as written is defined, but the argument of the continued branch is not in the domain, the function keeps
-its value at the boundary of the domain, and at a pole the law is as written. So ``max(-x, 0)**1.5`` is 0 on the
-continued side. A law that leaves its domain as written is nan.
+A branch is continued beyond its nonsmooth point only within the domain of the functions in it (`DOMAINS`). Where the
+law as written is defined, but the argument of the continued branch is not in the domain, the function keeps its value
+at the boundary of the domain; at a pole the law is as written. So ``max(-x, 0)**1.5`` is 0 on the continued side. A law
+that leaves its domain as written is nan.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ from .python_functions import CalledFunction, compile_function
 SIDE, BETWEEN_SIDES = "side", "between sides"
 LARGEST_WHOLE_POWER = 64
 CornerLookup = Callable[[SyntaxNode], tuple[int, float]]
-"""Of what decides (a node) the place of the number to be read, and its sign."""
+"""Slot of the number to be read, and its sign, for the node that decides at a corner."""
 _TRUTHS = ("<", "<=", "and", "or", "not")
 _DECISIONS = frozenset(("abs", "sign", "min", "max", "where", "table", *_TRUTHS))
 DOMAINS: dict[str, tuple[tuple[str, float], ...]] = {
@@ -64,24 +64,24 @@ DOMAINS: dict[str, tuple[tuple[str, float], ...]] = {
     "asin": (("<", -1.0), (">", 1.0)),
     "acos": (("<", -1.0), (">", 1.0)),
 }
-"""Functions that are not defined for all numbers, and where not: below or above which arguments."""
+"""Functions that are not defined for all numbers, with the bounds of their arguments."""
 
 
 def on_one_side(
     node: SyntaxNode, moving: Collection[str], corners: CornerLookup, conditions: SyntaxNode | None = None
 ) -> SyntaxNode:
-    """The tree with a side in place of each decision by what moves.
+    """Expression tree in which a side replaces each decision by an input or sensor.
 
     Parameters
     ----------
-    node : Node
+    node : SyntaxNode
         Tree of a law.
     moving : collection of str
         Names of inputs and sensors.
     corners : callable
-        Where the side of each corner is found.
-    conditions : Node, optional
-        Condition under which the law as written takes this part of it; without it, always.
+        Returns the slot of each corner's side.
+    conditions : SyntaxNode, optional
+        Condition under which the law as written takes this part of it; by default always.
     """
     if not _moves(node, moving):
         return node
@@ -121,7 +121,7 @@ def on_one_side(
                 out = _new_node(node, node.kind, out, arg)
         return out
     if node.kind == "table" and _moves(node.args[0], moving):
-        corners(SyntaxNode("table", args, node.value, node.start, node.stop))  # continuous: it only has to be watched
+        corners(SyntaxNode("table", args, node.value, node.start, node.stop))  # continuous: it only needs a guard
     made = _in_domain(SyntaxNode(node.kind, args, node.value, node.start, node.stop), node, moving, conditions)
     return _affine_in_shared(made) if node.kind == "*" else made
 
@@ -129,9 +129,10 @@ def on_one_side(
 def _in_domain(
     node: SyntaxNode, written: SyntaxNode, moving: Collection[str], conditions: SyntaxNode | None
 ) -> SyntaxNode:
-    """A function that keeps its value at the boundary of its domain where only a branch continued has left that.
+    """Function that keeps its value at the boundary of its domain where only a continued branch has left that.
 
-    ``written`` is the function in the law as written. Where that is evaluated, and outside its domain, it is nan.
+    ``written`` is the function in the law as written. Where that is evaluated, and outside its domain, the result is
+    nan.
     """
     bounds = DOMAINS.get(node.kind, ())
     if not bounds or not _moves(node.args[0], moving) or (node.kind == "**" and is_small_integer(node.args[1])):
@@ -151,7 +152,7 @@ def _in_domain(
 
 
 def _without_poles(branch: SyntaxNode, other: SyntaxNode, elsewhere: SyntaxNode, moving: Collection[str]) -> SyntaxNode:
-    """A branch that is the other one where a divisor in it is zero and the law as written takes the other one.
+    """A branch, replaced by the other one where a divisor in it is zero and the law as written takes the other one.
 
     A step may end right on the corner of ``where(x > 0, sin(x)/x, 1)``.
     """
@@ -166,7 +167,7 @@ def _without_poles(branch: SyntaxNode, other: SyntaxNode, elsewhere: SyntaxNode,
 
 
 def is_small_integer(node: SyntaxNode) -> bool:
-    """Whether an exponent is a small whole number, written out."""
+    """Whether an exponent is a literal small integer."""
     return node.kind == "number" and node.value == int(node.value) and abs(node.value) <= LARGEST_WHOLE_POWER
 
 
@@ -188,7 +189,7 @@ def _both(a: SyntaxNode | None, b: SyntaxNode) -> SyntaxNode:
 
 
 def node_difference(a: SyntaxNode, b: SyntaxNode) -> SyntaxNode:
-    """A - b."""
+    """Difference a - b."""
     if b.kind == "number" and b.value == 0:
         return a
     return SyntaxNode("neg", (b,)) if a.kind == "number" and a.value == 0 else SyntaxNode("-", (a, b))
@@ -206,14 +207,14 @@ def _truth(node: SyntaxNode, moving: Collection[str], corners: CornerLookup) -> 
     first, *others = [_truth(arg, moving, corners) for arg in node.args]
     if node.kind == "not":
         return _new_node(node, "neg", first)
-    for other in others:  # not the lesser, or larger, of two: a side beyond 1 is to be seen through the other
+    for other in others:  # not the minimum or maximum of two: a side beyond 1 must have an effect through the other
         known = SyntaxNode("number", value=-1.0 if node.kind == "and" else 1.0)
         first = _between(node, first, *((other, known) if node.kind == "and" else (known, other)))
     return first
 
 
 def _changes_by_signs_only(args: Iterable[SyntaxNode], moving: Collection[str]) -> bool:
-    """Whether these move by sides, and by nothing else, time included."""
+    """Whether these expressions vary with sides only, not with time, inputs or sensors."""
     nodes = [n for arg in args for n in arg.walk()]
     return any(n.kind == SIDE for n in nodes) and not any(
         n.kind == "name" and (n.value == "t" or n.value in moving) for n in nodes
@@ -221,7 +222,10 @@ def _changes_by_signs_only(args: Iterable[SyntaxNode], moving: Collection[str]) 
 
 
 def _between(like: SyntaxNode, way: SyntaxNode, a: SyntaxNode, b: SyntaxNode) -> SyntaxNode:
-    """A where ``way`` is 1, b where it is -1, and what is between: affine in every side, in however many parts."""
+    """Expression a where ``way`` is 1, b where it is -1, interpolated in between.
+
+    The result is affine in every side, also in nested expressions.
+    """
     if way.kind == SIDE or (way.kind == "neg" and way.args[0].kind == SIDE):
         at, value = (way.value, 1.0) if way.kind == SIDE else (way.args[0].value, -1.0)
         return _new_node(like, BETWEEN_SIDES, way, _with_side(a, at, value), _with_side(b, at, -value))
@@ -229,7 +233,7 @@ def _between(like: SyntaxNode, way: SyntaxNode, a: SyntaxNode, b: SyntaxNode) ->
 
 
 def _affine_in_shared(node: SyntaxNode) -> SyntaxNode:
-    """The node, affine in the sides that stand in two or more of its arguments: products of them would be no more."""
+    """The node, made affine in sides that occur in two or more of its arguments: their products would not be affine."""
     sides = [dict.fromkeys(n.value for n in arg.walk() if n.kind == SIDE) for arg in node.args]
     for at in dict.fromkeys(x for k, found in enumerate(sides) for x in found if any(x in y for y in sides[:k])):
         way = SyntaxNode(SIDE, (), at, node.start, node.stop)
@@ -238,7 +242,7 @@ def _affine_in_shared(node: SyntaxNode) -> SyntaxNode:
 
 
 def _affine(node: SyntaxNode) -> SyntaxNode:
-    """What is made of sides alone, between its values for sides of 1 and -1."""
+    """An expression of sides only, as interpolation between its values at the sides 1 and -1."""
     at = next((n.value for n in node.walk() if n.kind == SIDE), None)
     if at is None:
         return node
@@ -254,7 +258,7 @@ def _with_side(node: SyntaxNode, at: int, value: float) -> SyntaxNode:
 
 
 def _side(node: SyntaxNode, u: SyntaxNode, corners: CornerLookup) -> SyntaxNode:
-    """The side of u = 0 that the law is on."""
+    """Side of u = 0 that the law is on."""
     if u.kind == "neg":
         return _new_node(node, "neg", _side(node, u.args[0], corners))
     at, way = corners(u)
@@ -263,10 +267,10 @@ def _side(node: SyntaxNode, u: SyntaxNode, corners: CornerLookup) -> SyntaxNode:
 
 
 def _smooth_factors(node: SyntaxNode) -> list[tuple[Any, ...]]:
-    """Factors of a product that stay as written, by what they mean: together they and their slope do not jump.
+    """Keys of factors of a product that stay as written: together, neither they nor their slope jumps.
 
     These are ``abs(u)`` beside u, and ``sign(u)`` beside a positive power of ``abs(u)`` (the flow through an orifice),
-    where u makes no decision itself.
+    where u itself has no corner.
     """
     factors = _factors(node) if node.kind == "*" else []
     meant = [node_key(x) for x in factors]
@@ -282,7 +286,7 @@ def _smooth_factors(node: SyntaxNode) -> list[tuple[Any, ...]]:
 
 
 def _is_power_of(power: SyntaxNode, size: tuple[Any, ...]) -> bool:
-    """Whether the base of a power is this absolute value, perhaps times what makes no decision."""
+    """Whether the base of a power is this absolute value, possibly times factors without corners."""
     factors = _factors(power.args[0])
     return any(node_key(x) == size for x in factors) and not any(_decides(x) for x in factors if node_key(x) != size)
 
@@ -290,14 +294,14 @@ def _is_power_of(power: SyntaxNode, size: tuple[Any, ...]) -> bool:
 def _with_factors(
     node: SyntaxNode, unchanged: Collection[tuple[Any, ...]], change: Callable[[SyntaxNode], SyntaxNode]
 ) -> SyntaxNode:
-    """A product with all its factors changed but those that are kept."""
+    """A product with ``change`` applied to all factors but the unchanged ones."""
     if node.kind in ("*", "neg"):
         return _new_node(node, node.kind, *(_with_factors(x, unchanged, change) for x in node.args))
     return node if node_key(node) in unchanged else change(node)
 
 
 def _decides(node: SyntaxNode) -> bool:
-    """Whether there is a corner or a jump in it."""
+    """Whether there is a corner or a jump in an expression."""
     return any(n.kind in _DECISIONS for n in node.walk())
 
 
@@ -306,14 +310,14 @@ def _positive(node: SyntaxNode) -> bool:
 
 
 def _factors(node: SyntaxNode) -> list[SyntaxNode]:
-    """What is multiplied, signs left out."""
+    """Factors of a product, without signs."""
     if node.kind == "*":
         return [x for arg in node.args for x in _factors(arg)]
     return _factors(node.args[0]) if node.kind == "neg" else [node]
 
 
 def node_key(node: SyntaxNode) -> tuple[Any, ...]:
-    """A node without its place in the text."""
+    """Key of a node, independent of its position in the text."""
     return (node.kind, node.value, *map(node_key, node.args))
 
 
@@ -331,7 +335,7 @@ _BINARY = {
     **{"+": ADD, "-": SUBTRACT, "*": MULTIPLY, "/": DIVIDE, "**": POWER, "atan2": ATAN2},
     **{"min": MINIMUM, "max": MAXIMUM, "<": LESS, "<=": LESS_EQUAL, "and": MINIMUM, "or": MAXIMUM},
 }
-SEARCHED_CONSTANTS = 64  # constants in which a literal is looked for
+SEARCHED_CONSTANTS = 64  # constants among which a literal is searched
 _NONE: Mapping[str, int] = MappingProxyType({})
 
 
@@ -365,12 +369,13 @@ def compile_law(
     tables
         Names of the tables that laws may call, and where the `data()` of each begins in `const`.
     functions
-        List that a law which is a Python function is appended to. Keep it as long as the code: addresses stand there.
+        List that a law which is a Python function is appended to. Keep it as long as the code, which contains
+        addresses.
     derivatives
         Whether the law is read by `evaluate_jet`.
     corners
-        Given what decides at a corner by inputs or sensors, says where the side is found that the law is on. Without it
-        a law decides by itself.
+        For a corner decided by inputs or sensors, returns the slot of the side that the law is on. Without it a law
+        decides by itself.
 
     Returns
     -------
@@ -413,14 +418,14 @@ def compile_decision(
     sensors: Mapping[str, int],
     tables: Mapping[str, int],
 ) -> tuple[int, int]:
-    """Append the program of what decides at a corner of a law, of time and sensors, as `compile_law` does."""
+    """Append the program of a corner's deciding expression, of time and sensors, as `compile_law` does."""
     writer = _Writer(law, ("t",), parameters, const, sensors, tables)
     writer.write(tree)
     return writer.append(code)
 
 
 def has_corners(law: Expression, inputs: Sequence[str], sensors: Collection[str]) -> bool:
-    """Whether a law has corners, or jumps, where inputs (time apart) or sensors decide."""
+    """Whether a law has corners or jumps where inputs (except time) or sensors decide."""
     if calls_python(law):
         return False
     found: list[SyntaxNode] = []
@@ -434,12 +439,12 @@ def has_corners(law: Expression, inputs: Sequence[str], sensors: Collection[str]
 
 
 def calls_python(law: Expression) -> bool:
-    """Whether a law is, or calls, a Python function: its corners nobody knows."""
+    """Whether a law is, or calls, a Python function, whose corners are unknown."""
     return law.function is not None or any(n.kind == "called" for n in law.tree.walk())
 
 
 def _folded(expression: Expression, tree: SyntaxNode, varying: Collection[str]) -> SyntaxNode:
-    """The law in simpler operations, its constant parts as numbers."""
+    """The law in simpler operations, with its constant parts evaluated."""
     try:
         return fold_constants(_expand(tree, varying), expression.text)
     except ExpressionError as error:
@@ -447,9 +452,9 @@ def _folded(expression: Expression, tree: SyntaxNode, varying: Collection[str]) 
 
 
 def _single_powers(node: SyntaxNode, varying: Collection[str]) -> SyntaxNode:
-    """The tree with one power in place of products of powers of one base, some of them broken: u**2 sqrt(u) is u**2.5.
+    """Merge powers of one base in products if some exponent is not an integer: u**2 sqrt(u) becomes u**2.5.
 
-    Where u is zero its derivatives are those of a power, while those of a factor may be infinite.
+    At u = 0 the result then has the derivatives of the merged power, while those of a factor may be infinite.
     """
     node = replace(node, args=tuple(_single_powers(arg, varying) for arg in node.args)) if node.args else node
     if node.kind != "*" and not (node.kind == "**" and is_small_integer(node.args[1])):
@@ -466,7 +471,7 @@ def _single_powers(node: SyntaxNode, varying: Collection[str]) -> SyntaxNode:
 
 
 def _powers(node: SyntaxNode) -> list[tuple[SyntaxNode, float, bool]]:
-    """What is multiplied: bases, exponents, and whether the base must not be negative."""
+    """Factors of a product: (base, exponent, whether the base must not be negative)."""
     if node.kind == "*":
         return [x for arg in node.args for x in _powers(arg)]
     if node.kind == "sqrt":
@@ -481,7 +486,7 @@ def _powers(node: SyntaxNode) -> list[tuple[SyntaxNode, float, bool]]:
 
 
 def _power(like: SyntaxNode, u: SyntaxNode, exponent: float, broken: bool) -> SyntaxNode:
-    """A power; with ``broken``, of numbers that are not negative only."""
+    """A power; with ``broken``, nan for negative bases."""
     if exponent == 1.0 and not broken:
         return u
     number = replace(like, kind="number", args=(), value=exponent)
@@ -508,7 +513,7 @@ def _refuse_ambiguous_names(
 
 
 def _with_code(tree: SyntaxNode, code: list[int], functions: list[CalledFunction] | None) -> SyntaxNode:
-    """The tree with the places of what calls of functions need in place of the functions."""
+    """The tree with code positions of function calls in place of the functions."""
     args = tuple(_with_code(arg, code, functions) for arg in tree.args)
     if tree.kind != "called":
         return replace(tree, args=args) if args else tree
@@ -516,7 +521,7 @@ def _with_code(tree: SyntaxNode, code: list[int], functions: list[CalledFunction
 
 
 def _function(request: FunctionCall, code: list[int], functions: list[CalledFunction] | None) -> int:
-    """Append what a call of a function needs to the code; where it stands there."""
+    """Append the data of a function call to the code; returns its position."""
     if functions is None:
         raise ValueError("a law that is a Python function needs a list to be kept in")
     made = compile_function(request)
@@ -526,7 +531,7 @@ def _function(request: FunctionCall, code: list[int], functions: list[CalledFunc
 
 
 class _Writer:
-    """Writes the program of one law."""
+    """Writer of the program of one law."""
 
     def __init__(
         self,
@@ -552,7 +557,7 @@ class _Writer:
         self.deepest = max(self.deepest, self.depth)
 
     def write(self, node: SyntaxNode, frozen: bool = False) -> None:
-        """Write a node after its arguments; `frozen` means that a constant part around it is already marked."""
+        """Write a node after its arguments; `frozen`: a constant part around it is already marked."""
         constant = frozen or _constant(node, self.varying)
         if node.kind == "number":
             return self.emit(CONSTANT, self.slot(float(node.value)), 1)
@@ -564,7 +569,7 @@ class _Writer:
             return self.emit(CONSTANT, self.parameters[node.value], 1)
         self.write_operation(node, constant)
         if constant and not frozen:
-            # Parts without an input or a sensor have no derivatives, not even where a function's own slope is infinite.
+            # Parts without an input or a sensor have no derivatives, even where a function's own slope is infinite.
             self.emit(FREEZE, 0, 0)
 
     def write_operation(self, node: SyntaxNode, constant: bool) -> None:
@@ -588,13 +593,13 @@ class _Writer:
                 self.emit(_BINARY[node.kind], 0, -1)
 
     def append(self, code: list[int]) -> tuple[int, int]:
-        """Append the program to the code: where it begins, and the rows of stack it needs."""
+        """Append the program to the code; returns its start, and the rows of stack it needs."""
         at = len(code)
         code += [len(self.program) // 2, self.deepest, *self.program]
         return at, self.deepest
 
     def slot(self, literal: float) -> int:
-        """Place of a literal in the table of constants; a new one if it is not among the last ones."""
+        """Index of a literal in the table of constants; appended if it is not among the last ones."""
         for k in range(max(len(self.parameters), len(self.const) - SEARCHED_CONSTANTS), len(self.const)):
             if self.const[k] == literal and math.copysign(1.0, self.const[k]) == math.copysign(1.0, literal):
                 return k
@@ -606,7 +611,7 @@ _SHAPES = {"step": "cubic", "step5": "quintic"}
 
 
 def _expand(node: SyntaxNode, varying: Collection[str]) -> SyntaxNode:
-    """Write steps and powers with a varying exponent in terms of simpler operations."""
+    """Rewrite steps and powers with a varying exponent in terms of simpler operations."""
 
     def made(kind: str, *args: SyntaxNode) -> SyntaxNode:
         return SyntaxNode(kind, args, None, node.start, node.stop)

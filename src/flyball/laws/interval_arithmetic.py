@@ -32,9 +32,10 @@ from .bytecode import (
 
 Array = np.ndarray
 Range = tuple[Any, Any]
-ROUNDING = 4.5e-16  # part of its size by which an end is moved out
-SEAM_TOLERANCE = 1e-12  # by which part of its size a range may reach beyond a pole or a table's corner, where it ends
-# where a function, and where its slope, is greatest or least, besides the ends of a range
+ROUNDING = 4.5e-16  # relative to its size: by how much an end is moved outwards
+# relative to its size: by how much a range may reach beyond a pole or a table's corner at which it ends
+SEAM_TOLERANCE = 1e-12
+# arguments, besides the ends of a range, at which a function and its slope are extreme
 _TURNS: dict[int, tuple[tuple[float, ...], tuple[float, ...]]] = {
     TANH: ((), (0.0,)), ATAN: ((), (0.0,)), COSH: ((0.0,), ()), ASIN: ((), (0.0,)), ACOS: ((), (0.0,)),
     CUBIC: ((0.0, 1.0), (0.5,)), QUINTIC: ((0.0, 1.0), (0.0, 0.5, 1.0)),
@@ -44,7 +45,7 @@ _DOMAIN = {ASIN: (-1.0, 1.0), ACOS: (-1.0, 1.0), SQRT: (0.0, np.inf), LOG: (0.0,
 
 
 def widened(lo: Any, hi: Any) -> Range:
-    """A range with room for rounding; what is no number is everything."""
+    """Range widened for rounding; nan becomes everything."""
     lo, hi = lo - ROUNDING * np.abs(lo), hi + ROUNDING * np.abs(hi)
     return np.where(np.isnan(lo), -np.inf, lo), np.where(np.isnan(hi), np.inf, hi)
 
@@ -65,11 +66,11 @@ def range_negative(a: Range) -> Range:
 
 
 def range_product(a: Range, b: Range) -> Range:
-    """Range of a product; nothing times everything is nothing."""
+    """Range of a product; zero times everything is zero."""
     p = [np.where(np.isnan(x), 0.0, x) for x in (a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1])]
     lo = np.minimum(np.minimum(p[0], p[1]), np.minimum(p[2], p[3]))
     hi = np.maximum(np.maximum(p[0], p[1]), np.maximum(p[2], p[3]))
-    below = (lo == 0.0) & np.signbit(p).any(axis=0)  # zero may be -0.0, of which atan2 makes something else
+    below = (lo == 0.0) & np.signbit(p).any(axis=0)  # zero may be -0.0, which changes the branch of atan2
     lo, hi = widened(lo, hi)
     return np.where(below, -0.0, lo), hi
 
@@ -82,7 +83,7 @@ def range_reciprocal(a: Range) -> Range:
 
 
 def range_hull(values: list[Any]) -> Range:
-    """The range of numbers; of one that is no number everything."""
+    """Range of numbers; everything if one is nan."""
     lo = hi = values[0]
     for x in values[1:]:
         lo, hi = np.minimum(lo, x), np.maximum(hi, x)
@@ -90,7 +91,7 @@ def range_hull(values: list[Any]) -> Range:
 
 
 def range_with_turns(a: Range, f: Any, turns: tuple[float, ...]) -> Range:
-    """Range of a function that turns at some places only."""
+    """Range of a function with extrema at given places only."""
     return range_hull([f(a[0]), f(a[1]), *(f(np.clip(x + 0.0 * a[0], a[0], a[1])) for x in turns)])
 
 
@@ -130,7 +131,7 @@ def function_ranges(number: int, a: Range) -> tuple[Range, Range]:
 
 
 def _branch(x: Array) -> Array:
-    """Which branch of the tangent an angle is on."""
+    """Branch of the tangent that an angle is on."""
     return np.floor((x - 0.5 * np.pi) / np.pi)
 
 
@@ -163,7 +164,7 @@ def atan2_ranges(y: Range, x: Range) -> tuple[Range, Range, Range]:
 
 
 class TableRanges:
-    """A table of points: ranges of its values and slopes."""
+    """Ranges of a table's values and slopes."""
 
     def __init__(self, const: Array, at: int) -> None:
         count = int(const[at + 1])
@@ -171,7 +172,7 @@ class TableRanges:
         first = at + BREAKS + count
         c = np.asarray(const[first : first + PIECE * (count + 1)], float).reshape(count + 1, PIECE)
         self.period = float(const[at])
-        if self.period > 0.0:  # a range may reach beyond the seam once, or is as long as all
+        if self.period > 0.0:  # a range may reach beyond the period once, or is a whole period long
             c = np.vstack([c[:1], c[1:count], c[1:count], c[-1:]])
             x = np.r_[x, x[1:] + self.period]
         self.x, self.c = x, c
@@ -202,13 +203,13 @@ class TableRanges:
             most = np.where(between, _over(np.maximum, high, first + 1, last), -np.inf)
             lows, highs = (before[k][0], behind[k][0], least), (before[k][1], behind[k][1], most)
             out.append((np.minimum.reduce(lows), np.maximum.reduce(highs)))
-        (least, most), slope = out  # at an end of a piece that is the range's own, slopes are those inside
+        (least, most), slope = out  # at an end of a piece that is also an end of the range, slopes are those inside
         way = near * np.maximum(np.abs(slope[0]), np.abs(slope[1]))
         return (least - way, most + way), slope
 
 
 def _over(ufunc: Any, x: Array, first: Array, stop: Array) -> Array:
-    """The least or greatest of x from first up to, not including, stop, for each pair of these that is not empty."""
+    """Least or greatest of x[first:stop], for each of these pairs that is not empty."""
     pairs = np.column_stack([first.ravel(), np.maximum(stop, first).ravel()]).ravel()
     return ufunc.reduceat(np.r_[x, x[-1], x[-1]], np.minimum(pairs, len(x) + 1))[::2].reshape(first.shape)
 
@@ -231,6 +232,6 @@ def _ranges(c: Array, s0: Array, s1: Array) -> tuple[Range, Range]:
 
 
 def _stationary_points(c: Array, b: Array, a: Array) -> tuple[Array, Array]:
-    """The zeros of c + b s + a s^2; anything where there are none."""
+    """Zeros of c + b s + a s^2; arbitrary where there are none."""
     q = -0.5 * (b + np.where(b < 0.0, -1.0, 1.0) * np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)))
     return q / a, c / q

@@ -1,4 +1,4 @@
-"""A law's program as a list of operations, evaluated over intervals of time: ranges of values and slopes."""
+"""Evaluation of a law's program over intervals of time: ranges of values and slopes."""
 
 from __future__ import annotations
 
@@ -64,11 +64,11 @@ from .interval_arithmetic import (
 )
 
 CONSTANT_IN_TIME, TIME_ONLY, STATE_DEPENDENT = range(3)  # what a step depends on
-SLOPE_JUMP_TOLERANCE = 1e-9  # part of their size by which pieces of a table may differ where they meet
+SLOPE_JUMP_TOLERANCE = 1e-9  # relative to their size: accepted difference of a table's pieces where they meet
 
 
 class Step(NamedTuple):
-    """One operation: on which earlier steps, what it depends on, whether it is true or false rather than a number."""
+    """One operation: the earlier steps it uses, what it depends on, whether it is a truth value."""
 
     operation: int
     operand: int
@@ -78,7 +78,7 @@ class Step(NamedTuple):
 
 
 class Corner(NamedTuple):
-    """Step ``at`` has a corner or jumps where step ``of`` reaches one of ``levels`` (repeated with ``period``).
+    """Corner: step ``at`` has a corner or jumps where step ``of`` reaches one of ``levels`` (repeated with ``period``).
 
     ``touched``: also where the argument only touches the level.
     """
@@ -91,7 +91,7 @@ class Corner(NamedTuple):
 
 
 def read_steps(code: Sequence[int], at: int) -> list[Step]:
-    """The steps of the law that starts at ``at``; comparisons have the difference that decides as a third argument."""
+    """Steps of the law that starts at ``at``; comparisons have the deciding difference as a third argument."""
     out: list[Step] = []
     stack: list[int] = []
     for i in range(at + 2, at + 2 + 2 * int(code[at]), 2):
@@ -119,7 +119,7 @@ def _operand_count(operation: int) -> int:
 
 
 def _on(before: list[Step], operation: int, operand: int, args: tuple[int, ...]) -> list[Step]:
-    """A step, after the difference that decides where it compares."""
+    """A step; before a comparison, a step for the deciding difference is added."""
     on = STATE_DEPENDENT if operation == FUNCTION else max(before[k].on for k in args)
     logical = operation == CALL and operand == NOT
     if operation in (LESS, LESS_EQUAL, MINIMUM, MAXIMUM):
@@ -132,7 +132,7 @@ def _on(before: list[Step], operation: int, operand: int, args: tuple[int, ...])
 
 
 def step_may_be_brief(step: Step, steps: Sequence[Step]) -> bool:
-    """Whether a step can do much within a short time, or a short way: see ``manner.brief``."""
+    """Whether a step can change much within a short time or distance: see `bytecode.may_be_brief`."""
     if step.operation == CALL:
         return step.operand not in (SIN, COS, NEGATE)
     if step.operation == WHOLE_POWER:
@@ -143,7 +143,7 @@ def step_may_be_brief(step: Step, steps: Sequence[Step]) -> bool:
 
 
 def required_steps(steps: Sequence[Step], targets: Sequence[int]) -> list[int]:
-    """The steps that some steps are made from, these included, in order."""
+    """Steps that the targets depend on, including these, in order."""
     found = set(targets)
     for k in range(len(steps) - 1, -1, -1):
         if k in found:
@@ -152,7 +152,7 @@ def required_steps(steps: Sequence[Step], targets: Sequence[int]) -> list[int]:
 
 
 def find_corners(steps: Sequence[Step], const: np.ndarray) -> list[Corner]:
-    """Where steps of time alone may have corners or jump, or an end of their domain; inner ones first."""
+    """Find where steps of time alone may have corners, jumps, or ends of their domain; inner ones first."""
     out = []
     zero = np.zeros(1)
     for k, s in enumerate(steps):
@@ -183,9 +183,9 @@ def table_corners(const: np.ndarray, at: int) -> np.ndarray:
     x = np.asarray(const[at + BREAKS : at + BREAKS + count], float)
     first = at + BREAKS + count
     c = np.asarray(const[first : first + PIECE * (count + 1)], float).reshape(count + 1, PIECE)
-    width = np.r_[0.0, np.diff(x)]  # what the piece before each break counts from its own origin
+    width = np.r_[0.0, np.diff(x)]  # each break relative to the origin of the piece before it
     before, after = c[:-1], c[1:]
-    if const[at] > 0.0:  # the last break is the first again
+    if const[at] > 0.0:  # periodic: the last break equals the first
         before, after, x = np.vstack([c[count - 1], c[1 : count - 1]]), c[1:count], x[:-1]
         width = np.r_[width[-1], width[1:-1]]
     w = np.maximum(width, np.r_[width[1:], width[-1]])
@@ -203,12 +203,12 @@ NO_SIGNS: Signs = MappingProxyType({})
 
 
 class IntervalLaw:
-    """The steps of a law, and the constants and tables that they name."""
+    """Steps of a law, with its constants and tables."""
 
     def __init__(self, steps: Sequence[Step], const: np.ndarray) -> None:
         self.steps, self.const = steps, np.asarray(const, float)
         self.curves = {s.operand: TableRanges(self.const, s.operand) for s in steps if s.operation == TABLE}
-        self.fixed: dict[int, float] = {}  # values of what depends on nothing
+        self.fixed: dict[int, float] = {}  # values of constant steps
         for k, s in enumerate(steps):
             if s.on == CONSTANT_IN_TIME:
                 self.fixed[k] = float(self._point(s, self.fixed, np.zeros(1)))
@@ -275,7 +275,7 @@ class IntervalLaw:
     def enclose(self, requested: Sequence[int], t: Range, signs: Signs) -> dict[int, JetRange]:
         """Ranges of steps and of their slopes over intervals of time.
 
-        ``signs`` are the signs, in each interval, of what decides at a step with a corner.
+        ``signs`` are the signs, in each interval, that decide at a step with a corner.
         """
         out: dict[int, JetRange] = {}
         for k in requested:
@@ -313,7 +313,7 @@ class IntervalLaw:
 
 
 def _on_side(s: Step, a: list[Any], sign: Any) -> Any:
-    """Value of a step with a corner, on the side of it that a sign says; None where that makes no difference."""
+    """Value of a step with a corner, on the side given by a sign; None where that makes no difference."""
     if s.operation == CALL and s.operand in (ABS, SIGN):
         return sign * a[0] if s.operand == ABS else sign
     if s.operation in (LESS, LESS_EQUAL):
@@ -326,7 +326,7 @@ def _on_side(s: Step, a: list[Any], sign: Any) -> Any:
 
 
 def _condition_range(yes: Any, no: Any, a: Range, b: Range) -> Range:
-    """The range a, b, or both."""
+    """Range a, b, or their union."""
     lo, hi = np.minimum(a[0], b[0]), np.maximum(a[1], b[1])
     return np.where(yes, a[0], np.where(no, b[0], lo)), np.where(yes, a[1], np.where(no, b[1], hi))
 
@@ -345,7 +345,7 @@ def _function_on_side(number: int, f: Range, d: Range, sign: Any) -> JetRange:
 
 
 def _extreme(o: int, a: list[JetRange], sign: Any) -> JetRange:
-    """The lesser or greater of two; of truths, whether both or one holds."""
+    """Minimum or maximum of two; of truth values, whether both or one holds."""
     pick = np.minimum if o == MINIMUM else np.maximum
     (f, d), (g, e) = a[0], a[1]
     if len(a) == 2 or sign is None:

@@ -1,8 +1,8 @@
-"""Python functions of users compiled to code that laws can call, and the report of a call that failed.
+"""Users' Python functions compiled to code that laws can call, and the report of a call that failed.
 
-A function of numbers is compiled by Numba where Numba can; otherwise it is called back in Python, and a notice
-says so. The code is kept as long as the function lives. It is made again when something that the function reads
-from outside (a global name, an enclosing function) has changed.
+A function of numbers is compiled by Numba where possible; otherwise it is called back in Python, and a notice reports
+it. The code is kept as long as the function exists. It is compiled again when something that the function reads from
+outside (a global name, an enclosing function) has changed.
 """
 
 from __future__ import annotations
@@ -33,32 +33,32 @@ if TYPE_CHECKING:
 _compiled_functions: WeakKeyDictionary[FunctionType, dict[int, CompiledFunction]] = WeakKeyDictionary()
 _equal_functions: WeakValueDictionary[Any, CompiledFunction] = (
     WeakValueDictionary()
-)  # compiled functions, by all that decides their code
+)  # compiled functions, by everything that determines their code
 _notified: WeakValueDictionary[int, Any] = WeakValueDictionary()
 
 
 class CompiledFunction:
-    """Machine code for a Python function of ``count`` numbers, at ``address`` as long as this object lives.
+    """Machine code for a Python function of ``count`` numbers, at ``address`` as long as this object exists.
 
-    ``python`` is the function itself, ``reason`` says why it is called back instead of compiled ("" if compiled).
+    ``python`` is the function itself, ``reason`` states why it is called back instead of compiled ("" if compiled).
     """
 
     def __init__(self, python: Callable[..., Any], count: int) -> None:
         self.python, self.count = python, count
-        self.original: Callable[[], Any] = lambda: None  # the function that ``python`` is a twin of, if it lives
+        self.original: Callable[[], Any] = lambda: None  # the function that ``python`` is a copy of, if it exists
         self.outside: tuple[Any, ...] = ()
         self.equal: CompiledFunction | None = None
         self._code: Any = None
         key = None
         self.reason = ""
-        self.raised: list[Exception] = []  # the last exception of a call from compiled code, where it can be known
+        self.raised: list[Exception] = []  # the last exception of a call from compiled code, if known
         if isinstance(python, FunctionType):
             self.outside = _outside(python, set())
             key = _decisive(python, count, self.outside)
-            self.equal = _equal_functions.get(key)  # its code serves this one, and lives as long
+            self.equal = _equal_functions.get(key)  # its code is used for this one, and is kept alive
             try:
                 self._code = self.equal._code if self.equal else _compiled(python, count)
-            except Exception as error:  # Numba gives up in many ways
+            except Exception as error:  # Numba raises many kinds of exceptions
                 self.reason = short_reason(error)
         else:
             self.reason = f"it is no plain function but a {type(python).__name__}"
@@ -72,7 +72,7 @@ class CompiledFunction:
 
     @property
     def stale(self) -> bool:
-        """Whether what the function takes from outside, or the function, is no longer what was compiled."""
+        """Whether the function, or something it reads from outside, has changed since it was compiled."""
         plain = self.original()
         return isinstance(plain, FunctionType) and not _same(self.outside, _outside(plain, set()))
 
@@ -84,16 +84,16 @@ class CompiledFunction:
 
 
 def compile_function(request: FunctionCall) -> CompiledFunction:
-    """The code of a Python function that a law calls."""
+    """Compile a Python function that a law calls."""
     count = len(request.names)
-    plain: Any = getattr(request.function, "py_func", request.function)  # the Python under Numba's decorators
+    plain: Any = getattr(request.function, "py_func", request.function)  # the Python function under Numba's decorators
     with LOCK:
         if not isinstance(plain, FunctionType):
             made = CompiledFunction(plain, count)
         else:
             codes = _compiled_functions.setdefault(plain, {})
             if count not in codes or not _same(codes[count].outside, _outside(plain, set())):
-                # the key must not be kept by what it leads to
+                # the value must not keep the key alive
                 codes[count] = CompiledFunction(_twin(plain, plain.__globals__, plain.__closure__), count)
                 codes[count].original = ref(plain)
             made = codes[count]
@@ -103,7 +103,7 @@ def compile_function(request: FunctionCall) -> CompiledFunction:
 
 
 def _compiled(function: FunctionType, count: int) -> Any:
-    """The function compiled by Numba, behind the calling convention of `call`; a failure leaves nan."""
+    """The function compiled by Numba with the calling convention of `call_address`; a failure leaves nan."""
     from numba import carray, cfunc, config, types
     from numba.core.errors import NumbaWarning
 
@@ -123,12 +123,12 @@ def _compiled(function: FunctionType, count: int) -> Any:
             p[1] = np.nan
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NumbaWarning)  # hints for those who write for Numba
+        warnings.simplefilter("ignore", NumbaWarning)  # hints for users of Numba
         return cfunc(types.void(types.CPointer(types.float64)))(law)
 
 
 def _callback(function: Callable[..., Any], count: int, raised: list[Exception]) -> Any:
-    """A way from compiled code back into Python; what the function raises last is kept in a list."""
+    """Callback from compiled code into Python; the function's last exception is kept in a list."""
     places = [3 * k for k in range(count)]
 
     def law(p: Any) -> None:
@@ -136,7 +136,7 @@ def _callback(function: Callable[..., Any], count: int, raised: list[Exception])
             p[1] = function(*[p[k] for k in places])
         except (
             BaseException
-        ) as error:  # nothing may escape into compiled code; `function_fault` runs the function again
+        ) as error:  # no exception may leave into compiled code; `function_fault` runs the function again
             raised[:] = [error] if isinstance(error, Exception) else raised
             p[1] = np.nan
 
@@ -144,7 +144,7 @@ def _callback(function: Callable[..., Any], count: int, raised: list[Exception])
 
 
 def _translatable(function: FunctionType, done: dict[FunctionType, Any]) -> Any:
-    """The function for Numba, plain Python functions that it calls included."""
+    """The function in a form for Numba, including the plain Python functions that it calls."""
     from numba import njit
 
     if function in done:
@@ -154,7 +154,7 @@ def _translatable(function: FunctionType, done: dict[FunctionType, Any]) -> Any:
     made = done[function] = njit(boundscheck=True)(_by_place(_twin(function, scope, closure)))
 
     def known(name: str, value: Any) -> Any:
-        if isinstance(value, list | set | dict):  # Numba would take a copy, for good
+        if isinstance(value, list | set | dict):  # Numba would copy its present value
             raise TypeError(f"'{name}' is a {type(value).__name__}, which may change; an array or a tuple would do")
         if isinstance(value, FunctionType) and str(value.__module__).partition(".")[0] not in ("numpy", "flyball"):
             return _translatable(value, done)
@@ -168,7 +168,7 @@ def _translatable(function: FunctionType, done: dict[FunctionType, Any]) -> Any:
 
 
 def _twin(function: FunctionType, scope: dict[str, Any], closure: tuple | None) -> FunctionType:
-    """The same function as another object."""
+    """Copy of the function with another scope and closure."""
     twin = FunctionType(function.__code__, scope, function.__name__, function.__defaults__, closure or None)
     twin.__kwdefaults__ = function.__kwdefaults__
     twin.__module__, twin.__qualname__ = function.__module__, function.__qualname__
@@ -176,7 +176,7 @@ def _twin(function: FunctionType, scope: dict[str, Any], closure: tuple | None) 
 
 
 def _by_place(function: FunctionType) -> FunctionType:
-    """The function with arguments by keyword only made ordinary ones, as Numba wants them for a call by place."""
+    """The function with keyword-only arguments made positional, as Numba requires for a positional call."""
     code, by_keyword = function.__code__, function.__kwdefaults__ or {}
     count = code.co_kwonlyargcount
     names = code.co_varnames[code.co_argcount : code.co_argcount + count]
@@ -188,19 +188,19 @@ def _by_place(function: FunctionType) -> FunctionType:
 
 
 def _names(code: CodeType) -> set[str]:
-    """Global names and attributes that code uses, functions inside it included."""
+    """Global names and attributes that code uses, including nested functions."""
     return set(code.co_names).union(*(_names(c) for c in code.co_consts if isinstance(c, CodeType)))
 
 
 def _outside(function: FunctionType, done: set[int]) -> tuple[Any, ...]:
-    """What a function takes from outside, in a form that can be compared later."""
+    """Everything a function reads from outside, in a form that can be compared later."""
     if id(function) in done:
         return ()
     done.add(id(function))
     names = _names(function.__code__)
     found = [(k, v) for k, v in function.__globals__.items() if k in names]
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
-        with suppress(ValueError):  # not filled yet
+        with suppress(ValueError):  # an empty cell
             found.append((name, cell.cell_contents))
     out: list[Any] = [function.__code__, function.__defaults__]
     for name, value in found:
@@ -216,7 +216,7 @@ def _outside(function: FunctionType, done: set[int]) -> tuple[Any, ...]:
 
 
 def _decisive(function: FunctionType, count: int, outside: tuple[Any, ...]) -> tuple[Any, ...] | None:
-    """All that decides what a function is compiled to, but not where it stands; None if that has no hash."""
+    """Everything that determines the compiled code of a function, except its location; None if that has no hash."""
     code = function.__code__.replace(co_filename="", co_name="", co_qualname="", co_firstlineno=1, co_linetable=b"")
     by_keyword = function.__kwdefaults__ or {}
     given = (*(function.__defaults__ or ()), *by_keyword.values())
@@ -229,7 +229,10 @@ def _decisive(function: FunctionType, count: int, outside: tuple[Any, ...]) -> t
 
 
 def _frozen(value: Any) -> Any:
-    """A value as it is now: of an array a copy of its numbers, of a number all its bits and, in a tuple, its type."""
+    """Comparable snapshot of a value.
+
+    For an array a copy of its numbers, for a number all its bits and, in a tuple, its type.
+    """
     if isinstance(value, float):
         return value.hex()
     if isinstance(value, tuple):
@@ -240,17 +243,17 @@ def _frozen(value: Any) -> Any:
 def _same(a: Any, b: Any) -> bool:
     try:
         return bool(a == b)
-    except Exception:  # things that do not compare
+    except Exception:  # objects that cannot be compared
         return False
 
 
 def _notify_callback(request: FunctionCall, function: Any, reason: str) -> None:
-    """Say once for each function that it is called back in Python."""
+    """Notify once for each function that it is called back in Python."""
     owner = getattr(function, "__func__", function)
-    owner = getattr(owner, "__code__", owner)  # a function made in a loop is one
+    owner = getattr(owner, "__code__", owner)  # functions made in a loop count as one
     if _notified.get(id(owner)) is owner:
         return
-    with suppress(TypeError):  # of what cannot be referred to weakly it is told again
+    with suppress(TypeError):  # without weak references the notice is repeated
         _notified[id(owner)] = owner
     warn_user(
         f"{request.where + ': ' if request.where else ''}the Python function '{function_name(function)}' cannot "
@@ -262,21 +265,21 @@ def _notify_callback(request: FunctionCall, function: Any, reason: str) -> None:
 
 
 class CalledFunction(NamedTuple):
-    """A Python function as some law calls it."""
+    """A Python function and how a law calls it."""
 
     native: CompiledFunction
     names: tuple[str, ...]  # its arguments; "" where a default is given
     text: str
-    where: str  # what it is the law of
+    where: str  # description of the law
 
     @property
     def title(self) -> str:
-        """What it is, for messages."""
+        """Description for messages."""
         return f"{self.where + ': ' if self.where else ''}the Python function {self.text}"
 
 
 class FunctionFault(NamedTuple):
-    """A call of a Python function that gave no finite number: with which arguments, and what it raised, if it did."""
+    """Call of a Python function that gave no finite number: its arguments, and the exception, if any."""
 
     function: CalledFunction
     arguments: tuple[float, ...]
@@ -285,7 +288,7 @@ class FunctionFault(NamedTuple):
 
     @property
     def message(self) -> str:
-        """What happened, in words."""
+        """Message about the fault."""
         given = zip(self.function.names, self.arguments, strict=True)
         listed = ", ".join(f"{name} = {x:.6g}" for name, x in given if name)
         at = f" for {listed}" if listed else ""
@@ -297,9 +300,9 @@ class FunctionFault(NamedTuple):
 
 
 class TableFault(NamedTuple):
-    """A table that a law asked for a value that it has not."""
+    """Evaluation of a table by a law outside the table's range."""
 
-    where: str  # what it is the law of
+    where: str  # description of the law
     table: Table
     x: float
     t: float
@@ -307,19 +310,19 @@ class TableFault(NamedTuple):
 
     @property
     def message(self) -> str:
-        """What happened, in words."""
+        """Message about the fault."""
         return f"{self.where}: at t = {self.t:.6g} s {self.table.out_of_range_message(self.x)}"
 
 
 def table_fault(stack: np.ndarray, laws: Mapping[int, str], tables: Mapping[int, Table]) -> TableFault | None:
-    """The last law that a table left without a value, or None.
+    """The last law without a value due to a table, or None.
 
     Parameters
     ----------
     stack : array
         Scratch of the laws after a run; its last `STACK_RESERVE` rows hold the record.
     laws, tables : mapping
-        What each law is the law of, by its start in the code; tables by their place among the constants.
+        Description of each law by its start in the code; tables by their place among the constants.
     """
     record = np.real(stack[-STACK_RESERVE:])
     if not (record[0, 0] > 0.0 and record[0, 1] < 0.0):
@@ -332,17 +335,17 @@ def function_fault(
 ) -> FunctionFault | None:
     """The last call of a Python function that gave no finite number, or None.
 
-    The Python function is run again with the same arguments, for the exception that compiled code does not tell. A
-    function with a memory may not raise it again; then it is the one that it raised last, if that is known.
+    The Python function is run again with the same arguments to get the exception, which compiled code does not return.
+    A function with internal state may not raise it again; then the last exception raised is used, if known.
 
     Parameters
     ----------
     stack : array
         Scratch of the laws after a run; its last `STACK_RESERVE` rows hold the record.
-    functions : sequence of Called
+    functions : sequence of CalledFunction
         What `compile_law` appended to its list.
     overcome : bool
-        Ask for a call in a step that was taken again, shorter, and then did without such a call.
+        Return a call in a step that was then repeated with a shorter step and succeeded without such a call.
     """
     record = np.real(stack[-STACK_RESERVE:])
     at = -record[0, 0] if overcome else record[0, 0]
@@ -366,12 +369,12 @@ def function_fault(
 
 
 def clear_faults(stack: np.ndarray) -> None:
-    """Wipe the record of a fault, as before a run: an analysis may try positions that a law is not made for."""
+    """Clear the record of a fault before a run: an analysis may try positions that a law is not made for."""
     stack[-STACK_RESERVE:] = 0.0
 
 
 def deferred_interrupts(functions: Sequence[CalledFunction]) -> AbstractContextManager[None]:
-    """Keep the user's interrupt until compiled code has returned, where that calls back into Python.
+    """Delay the user's interrupt until compiled code has returned, where that calls back into Python.
 
     Python would raise KeyboardInterrupt on entering the callback, and ctypes would swallow it.
     """

@@ -1,9 +1,9 @@
-"""Linear equations with the constraints left in (descriptor form), sparse for large mechanisms.
+"""Linear equations with explicit constraints (descriptor form), sparse for large mechanisms.
 
     M x'' + D x' + K x = G^T l,   G x = 0
 
-G has independent rows only, so that the equations have one solution. Large mechanisms at rest stay sparse, in
-absolute coordinates; refused is what `linearize` refuses of small ones, found by sparse means.
+G contains independent rows only, so that the solution is unique. The equations of large mechanisms at rest stay sparse,
+in absolute coordinates. They are refused in the same cases as by `linearize`, which are detected by sparse methods.
 """
 
 from __future__ import annotations
@@ -53,14 +53,14 @@ from ..tables.values import Values
 
 
 def values_with_input_step(e: EquationDerivatives, i: Input) -> Values:
-    """Numbers of the mechanism, a complex step along an input."""
+    """Values of the mechanism with a complex step of an input."""
     return e.stepped_law(i.parameter) if i.parameter != i.name else e.stepped(i.name)
 
 
 def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives by the inputs of the equations of motion, of all constraints, and of these on velocities.
+    """Derivatives of the equations of motion, of all constraints, and of their velocity form by the inputs.
 
-    (nv, inputs), then (rows and prescribed coordinates, inputs) twice.
+    Shapes: (nv, inputs), then twice (rows and prescribed coordinates, inputs).
     """
     by, g, n = [], [], []
     for i in inputs:
@@ -75,24 +75,29 @@ def input_effects(e: EquationDerivatives, inputs: Sequence[Input]) -> tuple[np.n
     return W[e.at["r"]], np.vstack([W[e.at["g"]], given]), np.vstack([W[e.at["n"]], rates])
 
 
-DENSE_VELOCITIES = 600  # velocities up to which the constraints are taken out and all is dense, and
-DENSE_FREEDOMS = 150  # freedoms, as counted: what is dense of more takes longer than all that is sparse
-PARTICIPATION = 1e-3  # of a dependency: elements with less have none in it
-LOST_DEPENDENCY = 1e-6  # of rows of unit size: dependencies that nearby rows change by as much are none there
-MASSLESS_MOTION = 1e12  # motion that forces make, where every inertia is one by itself: some motion has none
+# Up to so many velocities and freedoms the constraints are eliminated and the matrices are dense.
+
+DENSE_VELOCITIES = 600
+DENSE_FREEDOMS = 150  # velocities minus constraint rows
+# Elements whose part in a dependency is smaller do not take part in it.
+PARTICIPATION = 1e-3
+# Dependencies of unit rows that change by more than this at a nearby position do not exist there.
+LOST_DEPENDENCY = 1e-6
+# A response this large, with every inertia scaled to one, shows a motion without inertia.
+MASSLESS_MOTION = 1e12
 
 
 def exceeds_dense_size(free: int, velocities: int, rows: int) -> bool:
-    """Whether there are more velocities, or freedoms as counted than ``free``, than dense equations are made for."""
+    """Whether a mechanism is too large for dense equations: too many velocities, or more than ``free`` freedoms."""
     return velocities > DENSE_VELOCITIES or velocities - rows > free
 
 
 def uses_sparse_equations(x: MechanismState, free: int) -> bool:
-    """Whether the linear equations at a state are sparse: of many velocities, at rest, constraints on positions."""
+    """Whether the linear equations are sparse: large mechanism at rest, with constraints on positions only."""
     s = x.c.structure
     many = exceeds_dense_size(
         DENSE_VELOCITIES if s.loads else free, s.nv, len(s.rows)
-    )  # friction by reactions is for dense ones
+    )  # joint friction is implemented in the dense equations only
     return many and not s.tree and not np.any(x.v) and all(r.holonomic for r in s.rows)
 
 
@@ -102,11 +107,11 @@ class SparseEquations:
 
     Attributes
     ----------
-    e : Equations
+    e : EquationDerivatives
     scale : ndarray (nv,)
-        1 for metres, 1 / length of the mechanism for radians: what velocities are divided by.
+        Divisor of velocities: 1 for metres, 1 / length of the mechanism for radians.
     rows : ndarray (m,)
-        The constraint that each row of G is; beyond the constraints: that a turn which means nothing is none.
+        Constraint index of each row of G. Larger indices are the rows that fix rotations of point masses.
     G : sparse (m, nv)
     """
 
@@ -123,7 +128,7 @@ class SparseEquations:
 
     @cached_property
     def pencil(self) -> QuadraticPencil:
-        """The same in units in which all compares."""
+        """The same matrices in scaled units."""
         import scipy.sparse as sp
 
         S = sp.diags(self.scale)
@@ -132,7 +137,7 @@ class SparseEquations:
 
     @classmethod
     def at(cls, x: MechanismState, frozen: bool, to: Sequence[str] = ()) -> SparseEquations:
-        """At a state that `uses_sparse_equations`; ``to`` are parameters that inputs are.
+        """Equations at a state for which `uses_sparse_equations`; ``to`` are the inputs that are parameters.
 
         Raises
         ------
@@ -166,16 +171,16 @@ class SparseEquations:
         return found
 
     def freed(self, way: np.ndarray) -> np.ndarray:
-        """The part of changes of positions that the constraints allow."""
+        """Project a change of positions onto the motions that the constraints allow."""
         G = self.pencil.G
         along = way / self.scale
         return self.scale * (along - minimum_norm_solution(G, G @ along)) if G.shape[0] else way
 
     def _refuse_kinks(self, to: Sequence[str]) -> None:
-        """Refuse forces with a kink that a free motion crosses."""
+        """Refuse kinks of forces that a free motion crosses."""
         found = []
         for k in nonsmooth_points(self.e, to):
-            ways = [self.scale**2 * part for part in k.along]  # steepest, in units that compare
+            ways = [self.scale**2 * part for part in k.along]  # steepest direction, in scaled units
             dq, dv = (self.freed(way) for way in ways)
             if k.is_crossed_by(np.stack([dq, 0.0 * dq], 1), np.stack([0.0 * dv, dv], 1)):
                 found.append(k)
@@ -202,7 +207,7 @@ class SparseEquations:
             raise massless_motion_error(velocity_names(self.e.state.c.structure)[d].name)
 
     def _refuse_changing(self) -> None:
-        """Refuse equations that are others a moment later, though the mechanism rests."""
+        """Refuse equations that change with time although the mechanism rests."""
         x, r = self.e.state, self.e.at["r"]
         z = x.c.z.copy()
         then = EquationDerivatives(MechanismState.moving(x.c, x.t + COMPARISON_ANGLE / self.pencil.fastest, x.q, x.v))
@@ -214,7 +219,7 @@ class SparseEquations:
 
 
 def unit_rows(G: Any) -> tuple[Any, np.ndarray]:
-    """Rows of unit size, and what they were divided by."""
+    """Rows scaled to unit norm, and the norms."""
     import scipy.sparse as sp
 
     size = np.sqrt(np.asarray(G.multiply(G).sum(axis=1)).ravel())
@@ -223,7 +228,7 @@ def unit_rows(G: Any) -> tuple[Any, np.ndarray]:
 
 
 def _refuse_lost_rank(x: MechanismState, G: Any, weak: np.ndarray, vectors: np.ndarray, scale: np.ndarray) -> None:
-    """Refuse a position where rows depend on one another that do not nearby."""
+    """Refuse a position where rows are dependent that are independent nearby."""
     c = x.c
     z, random = c.z.copy(), np.random.default_rng(0).standard_normal(len(x.v))
     for _ in range(2):
@@ -242,7 +247,7 @@ def _refuse_lost_rank(x: MechanismState, G: Any, weak: np.ndarray, vectors: np.n
 
 
 def _lost_rank_error(x: MechanismState, remaining: np.ndarray, vectors: np.ndarray) -> SingularityError:
-    """The error that names the elements of dependencies of which something is left nearby."""
+    """The error that names the elements of dependencies that do not exist nearby."""
     _, d, Vt = np.linalg.svd(remaining, full_matrices=False)
     lost = np.abs(vectors @ Vt[d > LOST_DEPENDENCY].T).max(axis=1, initial=0.0)
     rows = x.c.structure.rows
@@ -251,7 +256,7 @@ def _lost_rank_error(x: MechanismState, remaining: np.ndarray, vectors: np.ndarr
 
 
 def sparse_descriptor(whole: SparseEquations, inputs: Sequence[Input], outputs: Sequence[str]) -> Descriptor:
-    """Of a large mechanism at rest; errors as `refuse_undetermined`."""
+    """Descriptor form of a large mechanism at rest; errors as in `refuse_undetermined_outputs_sparse`."""
     import scipy.sparse as sp
 
     nv = len(whole.scale)
@@ -264,7 +269,7 @@ def sparse_descriptor(whole: SparseEquations, inputs: Sequence[Input], outputs: 
 def dense_descriptor(
     e: EquationDerivatives, f: FreeCoordinates, frame: TurningFrame, inputs: Sequence[Input], outputs: Sequence[str]
 ) -> Descriptor:
-    """Of any mechanism, in the coordinates of its equations."""
+    """Descriptor form of any mechanism, in the coordinates of its equations."""
     import scipy.sparse as sp
 
     G = unit_rows(_all_rows(e) @ sp.diags(f.scale))[0]
@@ -279,7 +284,7 @@ def dense_descriptor(
 
 
 def _all_rows(e: EquationDerivatives) -> Any:
-    """Constraints, then prescribed coordinates, then turns that mean nothing; sparse."""
+    """Rows of constraints, of prescribed coordinates, and of rotations of point masses; sparse."""
     import scipy.sparse as sp
 
     nv, still = e.state.c.structure.nv, massless_rotations(e)
@@ -295,7 +300,7 @@ def _assembled_descriptor(
     outputs: Sequence[str],
     C: Any,
 ) -> Descriptor:
-    """With those of all rows that are independent."""
+    """Descriptor form with the independent ``rows`` of all rows."""
     import scipy.sparse as sp
 
     c, s, at = e.state.c, e.state.c.structure, e.at
@@ -309,7 +314,8 @@ def _assembled_descriptor(
     V = sp.vstack([e.by_position[at["n"]], sp.csr_matrix((others, s.nv))]).tocsr()
     C = C.tocsc()
     nv, held = s.nv, len(s.rows) + len(s.prescribed)
-    kept = rows[rows < held]  # what holds a turn that means nothing has no multiplier that anything depends on
+    # Rows that fix rotations of point masses have no multiplier that anything depends on.
+    kept = rows[rows < held]
     by_rows = sp.hstack([C[:, 3 * nv + kept], sp.csr_matrix((len(outputs), len(rows) - len(kept)))])
     D = np.array([_direct_feedthrough(e, outputs, i) for i in inputs]).reshape(len(inputs), len(outputs)).T
     of = [x.element.name for x in s.rows] + list(s.prescribed) + [names[d].name for d in massless_rotations(e)]
@@ -336,7 +342,7 @@ def _assembled_descriptor(
 
 
 def _direct_feedthrough(e: EquationDerivatives, outputs: Sequence[str], i: Input) -> np.ndarray:
-    """What an input does to the outputs by itself."""
+    """Derivatives of the outputs by an input at fixed state."""
     x = e.state
     n = len(x.v)
     still = [np.zeros((1, k)) for k in (n, n, n, len(x.lam) + len(x.c.structure.prescribed))]

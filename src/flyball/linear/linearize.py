@@ -1,8 +1,8 @@
 """Linear equations of motion about an equilibrium or a steady motion, with named inputs and outputs.
 
-Perturbed by inputs w, the reduced equations (see `reduced_equations`) read x' = A x + B0 w + B1 w' + B2 w''. Inputs
-that move the mechanism (drivers, lengths) act through their rates too, because the constraints hold for positions,
-velocities and accelerations; a change of the state, x~ = x - B2 w' - (B1 + A B2) w, takes the rates out.
+With inputs w the reduced equations (see `reduced_equations`) read x' = A x + B0 w + B1 w' + B2 w''. Inputs
+that move the mechanism (drivers, lengths) also act through their rates, because the constraints hold for positions,
+velocities and accelerations. The change of state x~ = x - B2 w' - (B1 + A B2) w eliminates the rates of w.
 """
 
 from __future__ import annotations
@@ -60,13 +60,14 @@ from .descriptor import (
 )
 from .operating_point import SizeTest, contact_operating_point, operating_state
 
-FRAME_TOLERANCE = 1e-5  # relative change of coefficients a moment later that is none
-IMPROPER = 1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
+FRAME_TOLERANCE = 1e-5  # relative change of coefficients with time that counts as none
+# Dependence of an output on an input's rate below this part of its total dependence on the input is rounding.
+IMPROPER = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
 class OperatingPointOptions(Options):
-    """Where the mechanism is, that small motions are asked of."""
+    """Options for the operating point of an analysis of small motions."""
 
     about: Result | Equilibrium | None
     t: float | None
@@ -84,7 +85,7 @@ class OperatingPointOptions(Options):
             )
 
     def state(self, model: Model, many: SizeTest | None = None) -> MechanismState:
-        """The state there; in absolute coordinates where velocities and rows are ``many``."""
+        """State at the operating point; in absolute coordinates if ``many`` holds for its velocities and rows."""
         return operating_state(
             model, self.about, t=self.t or 0.0, parameters=self.parameters, coordinates=self.coordinates, many=many
         )[0]
@@ -92,7 +93,7 @@ class OperatingPointOptions(Options):
 
 @dataclass(frozen=True, kw_only=True)
 class LinearizeOptions(OperatingPointOptions):
-    """What `Mechanism.linearize` is asked."""
+    """Arguments of `Mechanism.linearize`."""
 
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
@@ -112,11 +113,11 @@ def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
 
 
 def _smooth_linear_model(model: Model, o: LinearizeOptions) -> LinearModel:
-    """Of a mechanism in which nothing holds at times any more, but friction that slides."""
+    """Linear equations of a mechanism without switching elements, except friction that slides."""
     for name in o.outputs:
-        single_quantity(model, name)  # refuses those that do not exist; inputs are looked up where they are added
+        single_quantity(model, name)  # refuses unknown outputs; inputs are checked where they are added
     here = model
-    if o.about is None:  # the copy with inputs is assembled at once
+    if o.about is None:  # only the copy with inputs is assembled
         here, named = with_inputs(model, o.inputs)
     x = o.state(here, partial(exceeds_dense_size, DENSE_FREEDOMS))
     large = uses_sparse_equations(x, DENSE_FREEDOMS)
@@ -134,7 +135,7 @@ def _smooth_linear_model(model: Model, o: LinearizeOptions) -> LinearModel:
 def controlled_linear_model(model: Model, o: LinearizeOptions) -> tuple[LinearModel, str]:
     """Linear equations of a mechanism with controllers, and their stability.
 
-    They are those of one that has bodies in their place; with sampled ones over a cycle.
+    They follow from the auxiliary model. With sampled controllers they are difference equations over one cycle.
     """
     d = auxiliary_instant(model, o.state(model), o.coordinates, o.outputs, frozen=o.frozen)
     here, other = d.here, d.other
@@ -168,7 +169,7 @@ def controlled_linear_model(model: Model, o: LinearizeOptions) -> tuple[LinearMo
 
 
 def _sampled_signals(here: MechanismState, names: Sequence[str], first: int) -> list[SampledSignal]:
-    """What is sampled, in the order in which it is; its laws are the outputs from ``first`` on."""
+    """Sampled signals and states in the order of sampling; their laws are the outputs from ``first`` on."""
     numbers, known = here.c.values.numbers, {x.name: x for x in here.c.structure.controls}
     out = []
     for k, name in enumerate(names):
@@ -180,7 +181,7 @@ def _sampled_signals(here: MechanismState, names: Sequence[str], first: int) -> 
 def _reduced_linear_model(
     x: MechanismState, o: LinearizeOptions, named: list[Input], speed_scales: np.ndarray | None = None
 ) -> tuple[LinearModel, ReducedEquations]:
-    """Of mechanisms with few velocities: the constraints are taken out; ``speed_scales`` is as in `steady_motion.refuse_unbalanced`."""
+    """Linear equations with the constraints eliminated; ``speed_scales`` is as in `steady_motion.refuse_unbalanced`."""
     e, f, frame = _reduction_at(x, o.frozen, to=_parameter_inputs(named), speed_scales=speed_scales)
     r = reduced_equations(e, f, frame, _input_terms(e, f, named), speed_scales)
     if frame.turning.any() and (named or o.outputs):
@@ -191,19 +192,19 @@ def _reduced_linear_model(
 
 
 def _dense_state_space(model: Model, o: LinearizeOptions) -> StateSpace:
-    """What is dense of a large mechanism."""
+    """Dense state space of a large mechanism, computed only when needed."""
     x, named = _with_inputs(o.state(model), o.inputs)
     return _reduced_linear_model(x, o, named)[0].dense
 
 
 def _with_inputs(x: MechanismState, inputs: Sequence[str]) -> tuple[MechanismState, list[Input]]:
-    """The same state of a copy of the model, whose laws have the inputs."""
+    """The same state of a copy of the model whose laws contain the inputs, and the inputs."""
     model, named = with_inputs(x.c.structure.model, inputs)
     return _in_copy(model, x) if named else x, named
 
 
 def _parameter_inputs(inputs: list[Input]) -> list[str]:
-    """Those inputs that are parameters of the model."""
+    """Names of the inputs that are parameters of the model."""
     return [i.name for i in inputs if i.name == i.parameter]
 
 
@@ -215,7 +216,7 @@ def _refuse_frame_dependence(
     inputs: list[Input],
     outputs: Sequence[str],
 ) -> None:
-    """Refuse inputs and outputs that do not turn with the mechanism: their coefficients would change with time."""
+    """Refuse inputs and outputs that do not turn with the frame, whose coefficients would change with time."""
     then, g, own = advanced_equations(e.state, f, frame)
     later = reduced_equations(then, g, own, _input_terms(then, g, inputs))
     n = len(r.rate)
@@ -237,7 +238,7 @@ def _refuse_frame_dependence(
 def equations_without_inputs(
     x: MechanismState, frozen: bool = False, like: FreeCoordinates | None = None, speed_scales: np.ndarray | None = None
 ) -> tuple[FreeCoordinates, TurningFrame, ReducedEquations]:
-    """The reduced linear equations at a state, in the coordinates of others if given; errors as `linearize`."""
+    """Reduced linear equations at a state, in the coordinates of ``like`` if given; errors as in `linearize`."""
     e, f, frame = _reduction_at(x, frozen, like, speed_scales=speed_scales)
     return f, frame, reduced_equations(e, f, frame, None, speed_scales)
 
@@ -261,14 +262,14 @@ def _reduction_at(
 
 
 def _in_copy(model: Model, x: MechanismState) -> MechanismState:
-    """The same state of a copy of the model, whose laws have inputs."""
+    """The same state of another ``model``, a copy whose laws contain inputs."""
     c = compile_mechanism(model, parameters=x.c.parameters, tree=x.c.structure.tree)
     c.follow(x.c.hints)
     return MechanismState.moving(c, x.t, x.q, x.v)
 
 
 def _input_terms(e: EquationDerivatives, f: FreeCoordinates, inputs: list[Input]) -> InputTerms:
-    """What the inputs do to the equations."""
+    """Derivatives of the equations by the inputs."""
     r, g, n = input_effects(e, inputs)
     return InputTerms(r, g[f.on_positions], n)
 
@@ -276,7 +277,7 @@ def _input_terms(e: EquationDerivatives, f: FreeCoordinates, inputs: list[Input]
 def _output_matrix(
     e: EquationDerivatives, r: ReducedEquations, inputs: list[Input], names: Sequence[str]
 ) -> np.ndarray:
-    """Outputs by the states, the inputs and their rates, (outputs, n + 3 m)."""
+    """Derivatives of the outputs by the states, the inputs and their rates, (outputs, n + 3 m)."""
     n = len(r.rate)
     parts = [part.T for part in (r.position, r.velocity, r.acceleration, r.multipliers)]
     out = curve_derivatives(e.state, names, parts)
@@ -288,7 +289,7 @@ def _output_matrix(
 
 
 def _matrices(r: ReducedEquations, y: np.ndarray, inputs: list[Input], outputs: Sequence[str]) -> list[np.ndarray]:
-    """A, B, C, D in the state in which rates of inputs do not appear."""
+    """A, B, C, D for the state in which the rates of inputs are eliminated."""
     A, n = r.A, len(r.rate)
     B, B1, B2 = r.inputs(r.rate)
     C, (D, D1, D2) = y[:, :n], r.inputs(y)
@@ -306,7 +307,7 @@ def _matrices(r: ReducedEquations, y: np.ndarray, inputs: list[Input], outputs: 
 
 
 def _sorted(w: np.ndarray) -> np.ndarray:
-    """By imaginary, then real part; the upper one of a pair after the lower."""
+    """Eigenvalues sorted by size of the imaginary part, then real part; the upper one of a pair after the lower."""
     return w[np.lexsort((w.imag, w.real, np.abs(w.imag)))]
 
 
@@ -358,7 +359,7 @@ def _linear_model(
     )
 
 
-# Quantities that count from the start of a motion on: works and what is lost. A state says nothing of them.
+# Quantities accumulated from the start of a motion: works and energy losses. They do not depend on the state.
 
 
 CUMULATIVE_OUTPUTS_OF_ENERGY = ("balance", *CUMULATIVE_ENERGIES)
@@ -366,12 +367,12 @@ WORK = "work"
 
 
 def refuse_cumulative_outputs(model: Model, names: Sequence[str]) -> None:
-    """Refuse outputs of a linear model that integrals over the motion are.
+    """Refuse outputs of a linear model that are integrals over the motion.
 
     Raises
     ------
     ModelError
-        Naming the first of them.
+        With the name of the first such output.
     """
     for name in names:
         of = str(name)

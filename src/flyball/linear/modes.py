@@ -1,4 +1,4 @@
-"""Modes: eigenvalues and mode shapes of the linear equations, dense for all, sparse for the slowest of many."""
+"""Modes: eigenvalues and mode shapes of the linear equations, all of them (dense) or the slowest ones (sparse)."""
 
 from __future__ import annotations
 
@@ -28,18 +28,20 @@ from .linearize import OperatingPointOptions, equations_without_inputs
 from .operating_point import contact_operating_point
 
 DEFAULT_COUNT = 10
-FREEDOMS_PER_MODE = 4  # freedoms for each mode that is asked for, from which on these are found by themselves
+# With more freedoms than this per requested mode, the modes are computed by the sparse solver.
+FREEDOMS_PER_MODE = 4
 ZERO_EIGENVALUE = (
-    1e-6  # of the fastest: sparse eigenvalues below are zero; a double zero shows rounding by its square root
+    1e-6  # sparse eigenvalues below this part of the fastest are 0: rounding splits a double zero by its square root
 )
-GROWTH_UNCERTAINTY = 1e-6  # of a sparse eigenvalue, whose own uncertainty is not known: growth below is none
-SHAPE_ROUNDING = 1e-11  # parts of a shape, or of an eigenvalue, below this part of its largest are rounding
-RIGID_TOLERANCE = 1e-7  # directions of rigid motions below this part of the largest are none
+# Uncertainty of a sparse eigenvalue, relative to its size: a smaller real part is no growth.
+GROWTH_UNCERTAINTY = 1e-6
+SHAPE_ROUNDING = 1e-11  # parts of a shape or an eigenvalue below this part of its largest are rounding
+RIGID_TOLERANCE = 1e-7  # directions of rigid motions below this part of the largest count as zero
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModesOptions(OperatingPointOptions):
-    """What `Mechanism.modes` is asked."""
+    """Arguments of `Mechanism.modes`."""
 
     count: int | None
 
@@ -50,7 +52,7 @@ class ModesOptions(OperatingPointOptions):
 
 
 def modes(model: Model, o: ModesOptions) -> Modes:
-    """Natural motions about an equilibrium or a steady motion: see `Mechanism.modes`."""
+    """Compute the modes about an equilibrium or a steady motion: see `Mechanism.modes`."""
     if model.controllers:
         return _controlled_modes(model, o)
     if has_switching_elements(model):
@@ -60,7 +62,7 @@ def modes(model: Model, o: ModesOptions) -> Modes:
 
 
 def _smooth_modes(model: Model, o: ModesOptions) -> Modes:
-    """Of a mechanism in which nothing holds at times any more, but friction that slides."""
+    """Modes of a mechanism without switching elements, except friction that slides."""
     count, frozen = o.count, o.frozen
     free = DENSE_VELOCITIES if count is None else max(DENSE_FREEDOMS, FREEDOMS_PER_MODE * count)
     x = o.state(model, partial(exceeds_dense_size, free))
@@ -74,7 +76,7 @@ def _smooth_modes(model: Model, o: ModesOptions) -> Modes:
 
 
 def _selected_eigenvalues(eigenvalues: Spectrum, count: int | None) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of the eigenvalues that are told, one of each pair, slowest first; and of those left out."""
+    """Indices of the eigenvalues to report, one of each pair, slowest first, and of those left out."""
     w = eigenvalues.values
     listed = np.array([k for group in eigenvalues.groups for k in group[: eigenvalues.geometric[group[0]]]], int)
     one = listed[w[listed].imag >= 0.0]
@@ -85,7 +87,7 @@ def _selected_eigenvalues(eigenvalues: Spectrum, count: int | None) -> tuple[np.
 def _with_eigenvalue_data(
     found: Modes, eigenvalues: Spectrum, one: np.ndarray, rest: np.ndarray, frame: TurningFrame
 ) -> Modes:
-    """The same modes, with what the eigenvalues say besides."""
+    """Add multiplicities, residual, frame and growth to the modes."""
     found.turning, found.seen_from = frame.turning, frame.told
     found.multiplicity, found.geometric_multiplicity = eigenvalues.multiplicity[one], eigenvalues.geometric[one]
     found.residual = eigenvalues.residual
@@ -94,7 +96,7 @@ def _with_eigenvalue_data(
 
 
 def _controlled_modes(model: Model, o: ModesOptions) -> Modes:
-    """Of a mechanism with continuous controllers: of one that has bodies in their place, less these."""
+    """Modes of a mechanism with continuous controllers, from the auxiliary model; auxiliary bodies are left out."""
     refuse_sampled_controllers(model, "modes")
     d = auxiliary_instant(model, o.state(model), o.coordinates, (), frozen=o.frozen)
     slides, x = d.other.slides, d.state
@@ -112,14 +114,14 @@ def _controlled_modes(model: Model, o: ModesOptions) -> Modes:
 def _normalised_modes(
     x: MechanismState, eigenvalues: Spectrum, which: np.ndarray, shapes: np.ndarray, selected: np.ndarray | None = None
 ) -> Modes:
-    """Modes whose largest part is 1, seen from the ground; of the velocities ``selected`` only, if given."""
+    """Modes scaled to a largest component of 1, seen from the ground; only the velocities ``selected`` if given."""
     w, fastest = eigenvalues.values[which], float(np.abs(eigenvalues.values).max(initial=0.0))
     selected = np.ones(len(shapes), bool) if selected is None else selected
     return _scaled_modes(x, w, shapes[selected], fastest, selected)
 
 
 def _scaled_modes(x: MechanismState, w: np.ndarray, shapes: np.ndarray, fastest: float, selected: np.ndarray) -> Modes:
-    """The same of given eigenvalues, and parts of the shapes."""
+    """Scale modes with given eigenvalues ``w`` and shapes of the selected velocities."""
     names = [n for n, own in zip(velocity_names(x.c.structure), selected, strict=True) if own]
     length = (x.c.values.length / x.c.sizes)[selected, None]
     size = length * np.abs(shapes)
@@ -138,10 +140,11 @@ def _scaled_modes(x: MechanismState, w: np.ndarray, shapes: np.ndarray, fastest:
 
 
 def _sparse_modes(x: MechanismState, count: int, frozen: bool) -> Modes:
-    """The slowest modes of a large mechanism at rest."""
+    """Compute the slowest modes of a large mechanism at rest."""
     whole = SparseEquations.at(x, frozen)
     p = whole.pencil
-    w, X, residual = p.nearest(count + DEFAULT_COUNT)  # more: of pairs and rigid motions one is listed
+    # Compute more than requested: of pairs and rigid motions only one is listed.
+    w, X, residual = p.nearest(count + DEFAULT_COUNT)
     w = np.where(np.abs(w) <= ZERO_EIGENVALUE * p.fastest, 0.0, w)
     w = np.where(np.abs(w.imag) <= SHAPE_ROUNDING * np.abs(w), w.real, w)
     w = np.where(is_growing(w) & (w.real <= GROWTH_UNCERTAINTY * np.abs(w)), 1j * w.imag, w)

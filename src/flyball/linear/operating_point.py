@@ -1,8 +1,7 @@
-"""The operating point of a linearisation: the described state, an equilibrium, or the end of a motion.
+"""Operating point of a linearisation: the described state, an equilibrium, or the end of a motion.
 
-Where contacts are closed or stops, ropes and friction are active, the operating point is that of a mechanism in
-which these are joints and constraints; in a motion each switching element keeps the mode that it has at that
-instant.
+Closed contacts and active stops, ropes and friction are replaced by joints and constraints. For the end of a motion
+each switching element keeps the mode that it has at that time.
 """
 
 from __future__ import annotations
@@ -54,28 +53,28 @@ def operating_state(
     coordinates: str = "auto",
     many: SizeTest | None = None,
 ) -> tuple[MechanismState, str]:
-    """State of a mechanism, and the coordinates that it is in and why.
+    """State at the operating point, and its coordinates with the reason for their choice.
 
     Parameters
     ----------
     model : Model
     about : None, Result or Equilibrium
-        Where: as described and assembled at ``t``, where a motion ended, or an equilibrium.
+        The state as described and assembled at ``t``, the end of a motion, or an equilibrium.
     t : float [s]
-        Time, where ``about`` does not tell it.
+        Time; used if ``about`` is None.
     parameters : mapping, optional
-        Values in SI units in place of the model's, and of those that an equilibrium was found with.
+        Values in SI units that replace those of the model and of the equilibrium.
     coordinates : str
         ``"auto"``, ``"absolute"`` or ``"joint"``.
     many : callable, optional
-        Whether absolute coordinates are taken, in which large mechanisms are sparse, by numbers of velocities and rows.
+        Predicate on the numbers of velocities and rows; if true, absolute coordinates are used, which stay sparse.
 
     Raises
     ------
     AssemblyError
         If the mechanism cannot be assembled there.
     ModelError
-        If ``about`` is none of these.
+        If ``about`` has another type.
     """
     if isinstance(about, Result):
         start = find_initial_state(model, about.final[0], parameters, about, coordinates)
@@ -101,7 +100,7 @@ def _in_requested_coordinates(
     parameters: Mapping[str, float] | None,
     many: SizeTest | None,
 ) -> tuple[Assembly, str]:
-    """The assembly in the coordinates asked for; where none have few velocities, these are not made."""
+    """Convert an assembly to the requested coordinates; large mechanisms stay in absolute coordinates."""
     s = base.compiled.structure
     if many is not None and coordinates == "auto" and many(s.nv - len(s.rows), 0):
         return base, SPARSE_REASON
@@ -109,12 +108,12 @@ def _in_requested_coordinates(
 
 
 def _assembly_at_equilibrium(model: Model, about: Equilibrium, parameters: Mapping[str, float]) -> Assembly:
-    """The mechanism where an equilibrium found it; whether it rests there now is for others to see.
+    """Assemble the model at the position of an equilibrium, without a check that it still rests there.
 
     Raises
     ------
     ModelError
-        If the equilibrium is of another mechanism, or a preload of one that has been changed.
+        If the equilibrium is of another mechanism, or if the mechanism has changed since its preload was found.
     """
     old = about.assembly.compiled
     if about.preload:
@@ -136,14 +135,14 @@ O = TypeVar("O", bound="OperatingPointOptions")
 
 
 def contact_operating_point(model: Model, o: O, analysis: str) -> tuple[Model, O, tuple[str, ...]]:
-    """The mechanism with closed contacts as joints, the options about where it rests, and what has to be said.
+    """Model with closed contacts as joints, the options with this operating point, and notes for the result.
 
     Raises
     ------
     AnalysisError
         If forces do not balance there.
     ModelError
-        If a closed contact moves in a way that no joint does, it is asked about a motion, or an input is a parameter.
+        If no joint moves like a closed contact, ``about`` is a motion with contacts, or an input is a parameter.
     SingularityError
         If a contact is at its friction limit.
     """
@@ -182,7 +181,7 @@ def _refuse_parameter_inputs(model: Model, inputs: tuple[str, ...], analysis: st
 
 
 def _rest_assembly(model: Model, o: Any, analysis: str) -> Assembly:
-    """Where it rests."""
+    """Assembly at the position of rest."""
     if o.about is None:
         base = assemble(model, t=o.t or 0.0, parameters=o.parameters)
         if np.abs(base.v).max(initial=0.0) > 0.0:
@@ -198,7 +197,7 @@ def _rest_assembly(model: Model, o: Any, analysis: str) -> Assembly:
 
 
 def moving_error(model: Model, analysis: str) -> ModelError:
-    """What to say of parts that hold at times, where a mechanism is described in motion."""
+    """The error for switching elements in a mechanism that is described in motion."""
     other = "" if model.contacts or model.bulk else ", or about the end of a motion: about=m.simulate(...)"
     parts = ", ".join(e.title for e in unsupported_elements(model))
     return ModelError(
@@ -207,12 +206,12 @@ def moving_error(model: Model, analysis: str) -> ModelError:
 
 
 def _contact_notes(touches: tuple[Touch, ...], t: float) -> tuple[str, ...]:
-    """What holds for one side only.
+    """Notes on contacts that are about to part.
 
     Raises
     ------
     SingularityError
-        If friction is at its limit: one way it sticks, the other way it slides.
+        If friction is at its limit: it sticks in one direction and slides in the other.
     """
     limit = tuple(k.name for k in touches if k.state == AT_FRICTION_LIMIT)
     if limit:
@@ -227,26 +226,27 @@ def _contact_notes(touches: tuple[Touch, ...], t: float) -> tuple[str, ...]:
 
 
 def _equilibrium_at(at: Assembly) -> Equilibrium:
-    """The place, for those who look at nothing else of an equilibrium."""
+    """Wrap an assembly in an `Equilibrium` of which only the position is used."""
     none: Any = None
     return Equilibrium(
         t=at.t, stability=NOT_JUDGED, freedoms=(), stiffness=np.zeros((0, 0)), weakest={}, least=float("nan"),
-        unbalanced=0.0, method="", parameters=dict(at.compiled.parameters), result=none, assembly=at, speeds=motion_speed(at),
+        unbalanced=0.0, method="", parameters=dict(at.compiled.parameters), result=none, assembly=at,
+        speeds=motion_speed(at),
     )  # fmt: skip
 
 
-# A mechanism in motion at an instant, with the modes of then: what held is a constraint, what slid goes on sliding.
+# Operating point in motion with frozen modes: active elements become constraints, sliding friction goes on sliding.
 
 
 def frozen_mode_model(
     model: Model, about: Result, parameters: Mapping[str, float], analysis: str
 ) -> tuple[Model, Assembly, tuple]:
-    """The model with what held where a motion ended as constraints, that state of it, and what has to be said.
+    """Model with the elements active at the end of a motion as constraints, its state there, and notes.
 
     Raises
     ------
     ModelError
-        If the motion does not tell what held, or something of another kind did.
+        If the result has no recorded modes, or the model has contacts or bulk material.
     """
     if about.phases is None or model.contacts or model.bulk:
         raise ModelError(f"{analysis} with contact is about rest: give about=m.equilibrium(), not a motion")
@@ -281,6 +281,6 @@ def _mode_notes(model: Model, removed: dict[str, None], parts: list[Element], sl
 
 
 def motion_speed(at: Assembly) -> dict[str, float]:
-    """A word for it that the state moves, if it does."""
+    """The largest speed as ``{"motion": speed}`` if the state moves, else empty."""
     fastest = float(np.abs(at.v).max(initial=0.0))
     return {"motion": fastest} if fastest > 0.0 else {}

@@ -1,12 +1,12 @@
 """Root loci: eigenvalues over a parameter as branches, and the values at which stability changes.
 
-Branches are continued by eigenvalue and by mode shape (modal assurance criterion: Allemang and Brown 1982).
-Eigenvalues are no smooth functions where they meet: there they move as a square root does. What is smooth are
-symmetric functions of those that meet, such as the square of half their difference (Kato 1966, II.1). So an event
-is first bracketed by counting eigenvalues by where they lie, then found as the zero of the smooth function that
-belongs to it:
+Branches are continued by eigenvalue and by mode shape (modal assurance criterion: Allemang and Brown 1982). Where
+eigenvalues meet they are not smooth functions of the parameter: they move like a square root. Symmetric functions of
+the eigenvalues that meet are smooth, such as the square of half their difference (Kato 1966, II.1). An event is
+therefore first bracketed by counting the eigenvalues in each region of the complex plane, then found as the zero of
+the smooth function that belongs to it:
 
-    a real one through zero           itself
+    a real one through zero           the eigenvalue itself
     a pair through the imaginary axis its real part
     a pair on the axis parts at zero  (half the difference)^2, from -w^2 to +s^2
     two pairs on the axis meet        (half the difference)^2, from -d^2 to +s^2 (Krein collision)
@@ -41,20 +41,20 @@ from .linearize import OperatingPointOptions, equations_without_inputs
 
 @dataclass
 class EigenvalueSample:
-    """Eigenvalues at a place along the values of a parameter.
+    """Eigenvalues at one value of the parameter.
 
     Attributes
     ----------
     place : float
-        Index in the values; between two a fraction.
+        Index in the list of values; fractional between two values.
     value : float
-        The parameter's.
+        Value of the parameter.
     w, raw : ndarray (n,) complex
-        Eigenvalues without what is rounding, and as computed.
+        Eigenvalues with rounding removed, and as computed.
     shapes : ndarray (2 nv, n) complex
-        Unit vectors of changes of positions and velocities in natural units.
+        Unit vectors of position and velocity changes in natural units.
     told : str
-        The frame that they are seen from.
+        Description of the frame that they refer to.
     """
 
     place: float
@@ -66,9 +66,9 @@ class EigenvalueSample:
 
     @cached_property
     def kinds(self) -> np.ndarray:
-        """Where each eigenvalue lies: ``"zero"``, ``"+real"``, ``"-real"``, ``"axis"``, ``"+pair"``, ``"-pair"``, (n,).
+        """Region of each eigenvalue: ``"zero"``, ``"+real"``, ``"-real"``, ``"axis"``, ``"+pair"``, ``"-pair"``, (n,).
 
-        ``""`` stands for the lower one of a pair.
+        ``""`` marks the lower eigenvalue of a pair.
         """
         w = self.w
         real = half_plane(w)
@@ -78,18 +78,18 @@ class EigenvalueSample:
 
     @cached_property
     def sides(self) -> np.ndarray:
-        """Which half plane each eigenvalue lies in, (n,): 1, -1, or 0 for the axis."""
+        """Half plane of each eigenvalue, (n,): 1 (right), -1 (left), or 0 (imaginary axis)."""
         return half_plane(self.w)
 
     @cached_property
     def counts(self) -> dict[str, int]:
-        """How many eigenvalues, one of each pair, lie where."""
+        """Number of eigenvalues, one of each pair, in each region."""
         names, n = np.unique(self.kinds[self.kinds != ""], return_counts=True)
         return dict(zip(names.tolist(), n.tolist(), strict=True))
 
     @property
     def growing(self) -> int:
-        """How many eigenvalues have a positive real part."""
+        """Number of eigenvalues with a positive real part."""
         return self.counts.get("+real", 0) + 2 * self.counts.get("+pair", 0)
 
 
@@ -107,7 +107,7 @@ def eigenvalue_sample(
 
 
 def matching_branches(a: EigenvalueSample, b: EigenvalueSample) -> np.ndarray:
-    """Indices (n,) of b's eigenvalues that a's go on as."""
+    """Indices (n,) of the eigenvalues of ``b`` that continue those of ``a``."""
     from scipy.optimize import linear_sum_assignment
 
     size = np.abs(a.w)[:, None] + np.abs(b.w)
@@ -116,15 +116,13 @@ def matching_branches(a: EigenvalueSample, b: EigenvalueSample) -> np.ndarray:
     return linear_sum_assignment(apart + 1.0 - alike)[1]
 
 
-MIN_CROSSING_SLOPE = (
-    1e-3  # part of its usual change that the real part of an eigenvalue makes at least, on its way through
-)
+MIN_CROSSING_SLOPE = 1e-3  # smallest slope of a real part on its way through the axis, relative to its mean slope
 
 
 def crosses_axis(samples: Sequence[EigenvalueSample]) -> np.ndarray:
-    """Whether at each of some samples, in order, an eigenvalue is on the axis and off it before and after, (m,) bool.
+    """Whether, at each sample, an eigenvalue lies on the axis and off it before and after, (m,) bool.
 
-    Where several in a row are on the axis, the real part must go on changing from one to the next.
+    If it lies on the axis at several samples in a row, its real part must keep changing from one to the next.
     """
     branch = [np.arange(len(samples[0].w))]
     for a, b in pairwise(samples):
@@ -148,17 +146,17 @@ def crosses_axis(samples: Sequence[EigenvalueSample]) -> np.ndarray:
     return out
 
 
-ROOT_TOLERANCE = 1e-14  # of the stretch between two values, and of the value
-MAX_BISECTIONS = 48  # halvings after which what is left is taken for one event
-MAX_EVALUATIONS = 200  # evaluations between two values, after which only the change of stability is sought
-ZERO_TOLERANCE = 1e-6  # of what it is at the ends: what a smooth function may be at its zero
-SPLIT_FRACTIONS = (0.4375, 0.609375, 0.234375)  # where a stretch is parted: not where a round value is likely to lie
+ROOT_TOLERANCE = 1e-14  # relative to the interval between two values, and to the value
+MAX_BISECTIONS = 48  # bisections after which an interval counts as one event
+MAX_EVALUATIONS = 200  # evaluations per interval; beyond, only the change of stability is located
+ZERO_TOLERANCE = 1e-6  # residual allowed at a zero, relative to the values at the ends
+SPLIT_FRACTIONS = (0.4375, 0.609375, 0.234375)  # points where an interval is split; unlikely to hit a round value
 
-END_OFFSETS = (1e-6, 1e-3)  # parts of a stretch that are next to its end
-SLOPE_VARIATION = 0.1  # by what part of itself the slope of a real part may differ between these
-MAX_FOLLOWED_HALVINGS = 6  # halvings in which eigenvalues that seem to change places with others are followed
+END_OFFSETS = (1e-6, 1e-3)  # fractions of an interval that count as next to its end
+SLOPE_VARIATION = 0.1  # relative difference of the slopes of a real part between these
+MAX_FOLLOWED_HALVINGS = 6  # bisections that follow eigenvalues which seem to exchange places with others
 
-MEETING_KINDS = {  # what happens -> change of counts, of how many eigenvalues with a positive real part
+MEETING_KINDS = {  # event -> (change of the counts, change of the number of growing eigenvalues)
     "parting at zero": ({"axis": -1, "+real": 1, "-real": 1}, 1),
     "pairs meet": ({"axis": -2, "+pair": 1, "-pair": 1}, 2),
     "+ real ones meet": ({"+real": -2, "+pair": 1}, 0),
@@ -167,12 +165,12 @@ MEETING_KINDS = {  # what happens -> change of counts, of how many eigenvalues w
 
 SmoothFunction = Callable[
     [EigenvalueSample], tuple[float, complex]
-]  # a function that is zero at an event, and the eigenvalue
+]  # function that is zero at an event, and the eigenvalue there
 
 
 @dataclass
 class StabilityEvent:
-    """A change of where eigenvalues lie, and how many more have a positive real part after it."""
+    """An event at which eigenvalues change region, and the change of the number of growing eigenvalues."""
 
     what: str
     at: EigenvalueSample
@@ -181,14 +179,14 @@ class StabilityEvent:
 
 
 class CrossingSearch:
-    """Finds events between samples.
+    """Search for stability events between samples.
 
     Parameters
     ----------
     at : callable
-        Takes a sample at a place.
+        Computes the sample at a place.
     always : int
-        How many eigenvalues are zero at all values.
+        Number of eigenvalues that are zero at all values.
     """
 
     def __init__(self, at: Callable[[float], EigenvalueSample], always: int) -> None:
@@ -196,7 +194,7 @@ class CrossingSearch:
         self.taken: list[EigenvalueSample] = []
 
     def at(self, place: float) -> EigenvalueSample:
-        """A sample at a place; all are kept."""
+        """Sample at a place; computed once and stored."""
         found = next((x for x in self.taken if x.place == place), None)
         if found is None:
             found = self.take(place)
@@ -211,7 +209,7 @@ class CrossingSearch:
         return at_a + (self._parted(low, high, before, 0) if low.place < high.place else []) + at_b
 
     def _end(self, x: EigenvalueSample, y: EigenvalueSample) -> tuple[list[StabilityEvent], EigenvalueSample]:
-        """Events at the very end x of the stretch to y, and a sample beyond them."""
+        """Events at the end ``x`` of the interval to ``y``, and a sample beyond them."""
         found = self._at_end(x, y)
         more = abs(sum(e.change for e in found))
         for part in (*END_OFFSETS, *SPLIT_FRACTIONS[::-1]) if found else ():
@@ -239,7 +237,7 @@ class CrossingSearch:
         return self._parted(a, middle, before, depth + 1) + self._parted(middle, b, before, depth + 1)
 
     def _at_end(self, x: EigenvalueSample, y: EigenvalueSample) -> list[StabilityEvent]:
-        """What begins to grow, or ceases to, at the very end x of the stretch to y."""
+        """Events at the end ``x`` of the interval to ``y``: eigenvalues that begin or cease to grow there."""
         there = np.isin(x.kinds, ("axis", "zero"))
         on = matching_branches(x, y)
         ones = np.flatnonzero(there & np.isin(y.kinds[on], ("+pair", "+real")))
@@ -250,7 +248,7 @@ class CrossingSearch:
         return [StabilityEvent("at the end", x, w, n * more) for w, n in found]
 
     def _leaves(self, x: EigenvalueSample, y: EigenvalueSample, ones: np.ndarray, growing: int) -> bool:
-        """Whether eigenvalues leave the axis at x: as many grow next to it, or their real parts change evenly."""
+        """Whether eigenvalues leave the axis at ``x``: that many grow next to it, or their real parts change evenly."""
         next_to, near = (self.at(x.place + part * (y.place - x.place)) for part in END_OFFSETS)
         if next_to.growing == x.growing + growing:
             return True
@@ -260,7 +258,7 @@ class CrossingSearch:
         return bool((even & (y.kinds[matching_branches(x, y)[ones]] == "+pair")).all())
 
     def _middle(self, a: EigenvalueSample, b: EigenvalueSample) -> EigenvalueSample:
-        """A sample between two, none of whose eigenvalues is on its way through the axis if that can be."""
+        """Sample between two, if possible without an eigenvalue that is just crossing the axis."""
         for part in SPLIT_FRACTIONS:
             found = self.at(a.place + part * (b.place - a.place))
             if not crosses_axis((a, found, b))[1]:
@@ -270,7 +268,7 @@ class CrossingSearch:
     def _zero(
         self, of: SmoothFunction, a: EigenvalueSample, b: EigenvalueSample
     ) -> tuple[EigenvalueSample, complex] | None:
-        """Where a smooth function is zero, and the eigenvalue there; None if it has not the zero that it should."""
+        """Zero of a smooth function, and the eigenvalue there; None if the function has no zero in the interval."""
         from scipy.optimize import brentq
 
         f0, f1 = of(a)[0], of(b)[0]
@@ -287,7 +285,7 @@ class CrossingSearch:
     def _isolated(
         self, a: EigenvalueSample, b: EigenvalueSample, through: list[tuple[complex, complex]]
     ) -> list[StabilityEvent] | None:
-        """Eigenvalues that change sides, each by itself; None if one has not the zero that it should."""
+        """Events of eigenvalues that cross the axis one by one; None if a zero is not found."""
         out = []
         for w0, w1 in through:
             found = self._zero(self._tracked({a.place: w0, b.place: w1}), a, b)
@@ -297,7 +295,7 @@ class CrossingSearch:
         return out
 
     def _meetings(self, a: EigenvalueSample, b: EigenvalueSample) -> list[StabilityEvent] | None:
-        """Two eigenvalues that meet, if that is all that happens."""
+        """Event of two eigenvalues that meet, if this explains all changes; else None."""
         for what, (counts, more) in MEETING_KINDS.items():
             for sign in (1, -1):
                 if _count_changes(a, b) == {k: sign * n for k, n in counts.items()}:
@@ -307,14 +305,14 @@ class CrossingSearch:
         return None
 
     def _tracked(self, known: dict[float, complex]) -> SmoothFunction:
-        """Real part of an eigenvalue that is known at some places, and where it is on the axis."""
+        """Function: real part of an eigenvalue known at some places, and its point on the axis."""
 
         def of(x: EigenvalueSample) -> tuple[float, complex]:
             if x.place not in known:
                 candidates = np.argsort(np.abs(x.raw))[self.always :]
                 k = int(candidates[np.argmin(np.abs(x.raw[candidates] - _interpolated(known, x.place)))])
                 value = complex(x.raw[k])
-                if x.w[k] == 0.0:  # it cannot be told from those that are always zero, but their sum can
+                if x.w[k] == 0.0:  # indistinguishable from the eigenvalues that are always zero, but their sum is not
                     value = complex(x.raw[x.w == 0.0].sum().real)
                 known[x.place] = value
             value = known[x.place]
@@ -323,7 +321,7 @@ class CrossingSearch:
         return of
 
     def _meeting(self, what: str, a: EigenvalueSample, b: EigenvalueSample) -> SmoothFunction | None:
-        """The square of half the difference of two eigenvalues that meet, and their mean."""
+        """Function: square of half the difference of two eigenvalues that meet, and their mean."""
         if what == "parting at zero":
 
             def near_zero(x: EigenvalueSample) -> tuple[float, complex]:
@@ -350,14 +348,14 @@ class CrossingSearch:
 
 
 def _count_changes(a: EigenvalueSample, b: EigenvalueSample) -> dict[str, int]:
-    """How many eigenvalues more lie where, in b than in a."""
+    """Change of the number of eigenvalues in each region from ``a`` to ``b``."""
     change = Counter(b.counts)
     change.subtract(a.counts)
     return {k: n for k, n in change.items() if n}
 
 
 def _axis_crossings(a: EigenvalueSample, b: EigenvalueSample) -> list[tuple[complex, complex]]:
-    """Eigenvalues, one of each pair, that go on as such with a real part of the other sign: (in a, in b)."""
+    """Eigenvalues, one of each pair, whose real part changes sign: (in ``a``, in ``b``)."""
     on = matching_branches(a, b)
     alike = np.isin(a.kinds, ("+real", "-real")) == np.isin(b.kinds[on], ("+real", "-real"))
     signs = ("+real", "-real", "+pair", "-pair")
@@ -366,7 +364,7 @@ def _axis_crossings(a: EigenvalueSample, b: EigenvalueSample) -> list[tuple[comp
 
 
 def _is_explained(a: EigenvalueSample, b: EigenvalueSample, through: list[tuple[complex, complex]]) -> bool:
-    """Whether eigenvalues that change sides are all that changes."""
+    """Whether the eigenvalues that cross the axis explain all changes."""
     change: Counter[str] = Counter()
     for w0, w1 in through:
         what = "pair" if w0.imag else "real"
@@ -375,7 +373,7 @@ def _is_explained(a: EigenvalueSample, b: EigenvalueSample, through: list[tuple[
 
 
 def _meeting_pair(what: str, a: EigenvalueSample, b: EigenvalueSample) -> tuple[np.ndarray, np.ndarray] | None:
-    """The two eigenvalues that meet, at both ends."""
+    """The two eigenvalues that meet, at both ends of the interval."""
     apart, pair = ("axis", "+pair") if what == "pairs meet" else (f"{what[0]}real", f"{what[0]}pair")
     here, there = (a, b) if a.counts.get(apart, 0) > b.counts.get(apart, 0) else (b, a)
     on = matching_branches(here, there)
@@ -389,13 +387,13 @@ def _meeting_pair(what: str, a: EigenvalueSample, b: EigenvalueSample) -> tuple[
 
 
 def _interpolated(known: dict[float, complex], place: float) -> complex:
-    """An eigenvalue as it follows from those known on both sides."""
+    """Eigenvalue interpolated linearly between the nearest known places."""
     low, high = max(k for k in known if k < place), min(k for k in known if k > place)
     return known[low] + (place - low) / (high - low) * (known[high] - known[low])
 
 
 def _unresolved_event(a: EigenvalueSample, b: EigenvalueSample) -> StabilityEvent:
-    """Several events that cannot be told apart, or one that is no zero of anything smooth."""
+    """Event for several events that cannot be separated, or for one that is no zero of a smooth function."""
     more = a if a.growing > b.growing else b
     grows = ("+real", "+pair")
     on = matching_branches(more, a if more is b else b)
@@ -404,21 +402,23 @@ def _unresolved_event(a: EigenvalueSample, b: EigenvalueSample) -> StabilityEven
     return StabilityEvent("several", b, complex(0.0, value.imag), b.growing - a.growing)
 
 
-EVENT_TOLERANCE = 1e-9  # of the stretch between two values: events closer together at one eigenvalue are one
-VALUE_ROUNDING = 1e-13  # of the largest value: what is none
+# Events closer than this, relative to the interval, at one eigenvalue are one event.
+EVENT_TOLERANCE = 1e-9
+VALUE_ROUNDING = 1e-13  # values below this part of the largest count as zero
 REFINEMENT_FRACTIONS = (
     0.25,
     0.0625,
     0.015625,
     0.00390625,
-)  # of the way to the next value: samples beside where branches meet
-MEETING_SPAN = 2.0  # stretches between values: eigenvalues that are one, and apart again within these, only meet
-MAX_REFINED_MEETINGS = 16  # places where branches meet that are shown finely
+)  # positions of extra samples beside a meeting of branches, relative to the interval
+# Equal eigenvalues that are distinct again within so many intervals only meet.
+MEETING_SPAN = 2.0
+MAX_REFINED_MEETINGS = 16  # meetings of branches with extra samples at most
 
 
 @dataclass(frozen=True, kw_only=True)
 class RootLocusOptions(OperatingPointOptions):
-    """What `Mechanism.root_locus` is asked."""
+    """Arguments of `Mechanism.root_locus`."""
 
     parameter: str
     values: Sequence[float] | np.ndarray
@@ -435,7 +435,7 @@ class RootLocusOptions(OperatingPointOptions):
             raise ModelError("root_locus: frozen does nothing where nothing moves: leave out frozen or equilibrium")
 
     def here(self, value: float, about: Equilibrium | None) -> OperatingPointOptions:
-        """Where the mechanism is at a value; at an equilibrium if that is given."""
+        """Operating point at a value; at an equilibrium if that is given."""
         t, parameters = self.t, dict(self.parameters or {})
         if self.parameter == "t":
             t = value
@@ -450,7 +450,7 @@ class RootLocusOptions(OperatingPointOptions):
         )
 
     def rest(self, values: Sequence[float] | np.ndarray, start: Equilibrium | None = None) -> EquilibriaOptions:
-        """What is asked for the equilibria at values."""
+        """Options of the equilibrium series at the values."""
         return EquilibriaOptions(
             parameter=self.parameter,
             values=values,
@@ -463,7 +463,7 @@ class RootLocusOptions(OperatingPointOptions):
 
 
 def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
-    """Eigenvalues over values of a parameter, as branches, and where stability changes: see `Mechanism.root_locus`."""
+    """Compute eigenvalues over a parameter as branches, and the stability changes: see `Mechanism.root_locus`."""
     refuse_unsupported(model, "root_locus", controlled=True)
     refuse_sampled_controllers(model, "root_locus")
     points = checked_values(model, o.parameter, o.values, o.t, o.parameters)
@@ -486,14 +486,14 @@ def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
 
 
 class _EquilibriumBranch:
-    """Equilibria at the values and between them, along one branch."""
+    """Equilibria at and between the values, along one branch."""
 
     def __init__(self, model: Model, o: RootLocusOptions, points: np.ndarray) -> None:
         self.model, self.o = model, o
         self.along = equilibria(model, o.rest(points)) if o.equilibrium else None
 
     def at(self, place: float, value: float) -> Equilibrium:
-        """The equilibrium at a place among the values."""
+        """Equilibrium at a place (fractional index) among the values."""
         assert self.along is not None
         about = self.along[int(place)]
         if place == int(place):
@@ -502,13 +502,13 @@ class _EquilibriumBranch:
 
 
 class _ControlledEquilibria:
-    """The same with controllers: each search begins at the nearest one that is known."""
+    """Equilibria with controllers; each search begins at the nearest known equilibrium."""
 
     def __init__(self, model: Model, o: RootLocusOptions, points: np.ndarray) -> None:
         self.model, self.o, self.known = model, o, dict[float, Equilibrium]()
 
     def at(self, place: float, value: float) -> Equilibrium:
-        """The equilibrium at a place among the values."""
+        """Equilibrium at a place (fractional index) among the values."""
         if place not in self.known:
             near = min(self.known, key=lambda k: abs(k - place), default=None)
             here = self.o.here(value, None)
@@ -520,7 +520,7 @@ class _ControlledEquilibria:
 def _trace_locus(
     done: RootLocus, points: np.ndarray, at: Callable[[float], EigenvalueSample], report: ReportProgress
 ) -> RootLocus:
-    """The locus at the values, then between them."""
+    """Compute the locus at the values, then the events and refinements between them."""
     taken: list[EigenvalueSample] = []
     for k, value in enumerate(points):
         try:
@@ -542,7 +542,7 @@ def _trace_locus(
 
 
 def _write_branches(done: RootLocus, samples: Sequence[EigenvalueSample]) -> None:
-    """Write samples as branches."""
+    """Sort the samples into branches and store them."""
     order = sorted(samples, key=lambda x: x.place)
     base, last = order[0], np.lexsort((order[0].w.real, order[0].w.imag))
     rows = [base.w[last]]
@@ -558,7 +558,7 @@ def _write_branches(done: RootLocus, samples: Sequence[EigenvalueSample]) -> Non
 
 
 def _is_meeting(base: EigenvalueSample, x: EigenvalueSample, following: Sequence[EigenvalueSample]) -> bool:
-    """Whether eigenvalues that are apart before and soon after are one at a sample, where none has its own shape."""
+    """Whether eigenvalues that are distinct before and soon after coincide at a sample, where shapes are ambiguous."""
     many = len(np.unique(x.w))
     if many >= len(np.unique(base.w)):
         return False
@@ -568,7 +568,7 @@ def _is_meeting(base: EigenvalueSample, x: EigenvalueSample, following: Sequence
 def _events_between(
     search: CrossingSearch, samples: Sequence[EigenvalueSample], report: ReportProgress
 ) -> list[StabilityEvent]:
-    """Events between the given values; those that lie on an event are passed over."""
+    """Events between the given values; values that lie on an event are skipped."""
     on = crosses_axis(samples)
     kept = [samples[0]]
     for k, x in enumerate(samples[1:], 1):
@@ -583,13 +583,13 @@ def _events_between(
 
 
 def _passes_zero(a: EigenvalueSample, x: EigenvalueSample, b: EigenvalueSample) -> bool:
-    """Whether more eigenvalues are zero at a sample than at either beside it."""
+    """Whether more eigenvalues are zero at a sample than at both neighbours."""
     before, here, after = (k.counts.get("zero", 0) for k in (a, x, b))
     return here > max(before, after)
 
 
 def _add_turning_samples(search: CrossingSearch, samples: list[EigenvalueSample]) -> None:
-    """Add samples where a parabola through three real parts of a branch turns on the other side of the axis."""
+    """Add a sample where a parabola through three real parts of a branch has its vertex across the axis."""
     more = []
     for a, b, c in zip(samples, samples[1:], samples[2:], strict=False):
         if not a.counts == b.counts == c.counts:
@@ -609,7 +609,7 @@ def _add_turning_samples(search: CrossingSearch, samples: list[EigenvalueSample]
 
 
 def _stability_changes(events: Sequence[StabilityEvent], samples: Sequence[EigenvalueSample]) -> list[Crossing]:
-    """Changes of stability, those at one place and eigenvalue as one."""
+    """Stability changes; events at one place and eigenvalue are merged."""
     fastest = max(float(np.abs(x.w).max(initial=0.0)) for x in samples)
     least = VALUE_ROUNDING * max(abs(x.value) for x in samples)
     found: list[tuple[float, Crossing]] = []
@@ -633,7 +633,7 @@ def _stability_changes(events: Sequence[StabilityEvent], samples: Sequence[Eigen
 def _refine_meetings(
     search: CrossingSearch, events: Sequence[StabilityEvent], samples: Sequence[EigenvalueSample]
 ) -> None:
-    """Samples beside the places where branches meet: there they move as a square root does."""
+    """Add samples beside meetings of branches, where eigenvalues move like a square root."""
     for e in events[:MAX_REFINED_MEETINGS]:
         for side in (-1.0, 1.0):
             end = np.floor(e.at.place) if side < 0.0 else np.floor(e.at.place) + 1.0

@@ -14,7 +14,7 @@ from .scalar import atan2, choose, cos, divide, sin, sqrt
 from .vec import add, cross, dot, mtv, mv, quaternion_product, scale
 
 SMALL_ANGLE_SQUARE = 1e-4  # square of the angle [rad^2] below which series are exact to rounding
-HALF_TURN = 3.1406  # above this angle [rad] the axis is about to flip and is not told any more
+HALF_TURN = 3.1406  # above this angle [rad] the axis is about to flip: no value
 NOT_A_NUMBER = float("nan")
 
 
@@ -24,7 +24,7 @@ def rotation_vector(R):
     e = (0.5 * (R[7] - R[5]), 0.5 * (R[2] - R[6]), 0.5 * (R[3] - R[1]))  # sin(angle) times the axis
     c = 0.5 * (R[0] + R[4] + R[8] - 1.0)
     s2 = dot(e, e)
-    far = choose(c, s2 - SMALL_ANGLE_SQUARE, s2 + 1.0)  # greater than zero where the series do not do
+    far = choose(c, s2 - SMALL_ANGLE_SQUARE, s2 + 1.0)  # positive where the series are not accurate
     s = sqrt(choose(far, s2, 1.0 + s2))
     angle = atan2(s, c)
     series = 1.0 + s2 * (1.0 / 6.0 + s2 * (3.0 / 40.0 + s2 * (15.0 / 336.0 + s2 * 105.0 / 3456.0)))  # asin(s) / s
@@ -50,7 +50,7 @@ def log_gradient(theta, a):
     return add(a, add(scale(0.5, across), scale(k, cross(theta, across))))
 
 
-LEAST_SCALAR_PART = 1e-150  # scalar part of a quaternion that half a turn is told by
+LEAST_SCALAR_PART = 1e-150  # smallest scalar part of a quaternion; it stands for half a turn
 
 
 @formula
@@ -63,7 +63,7 @@ def cayley_quaternion(d):
 
 @formula
 def cayley_step(q):
-    """The step of a quaternion; of half a turn a very large one."""
+    """Cayley step of a quaternion; very large for half a turn."""
     by = 2.0 / (q[0] if abs(q[0]) > LEAST_SCALAR_PART else LEAST_SCALAR_PART)
     return (by * q[1], by * q[2], by * q[3])
 
@@ -78,13 +78,13 @@ def rotation_change(d, a):
 
 @formula
 def cayley_rate(d, w):
-    """Rate of the step whose axes turn at w: w + d x w / 2 + d (d . w) / 4."""
+    """Rate of the Cayley step whose axes have angular velocity w: w + d x w / 2 + d (d . w) / 4."""
     return add(w, add(scale(0.5, cross(d, w)), scale(0.25 * dot(d, w), d)))
 
 
 @formula
 def coordinate_axis(axis, o):
-    """Coordinate axis in numbers of the type of o, which is zero."""
+    """Coordinate axis, in numbers of the type of o, which is zero."""
     if axis == 0:
         return (o + 1, o, o)
     if axis == 1:
@@ -94,7 +94,7 @@ def coordinate_axis(axis, o):
 
 @formula
 def axis_rotation(axis, angle):
-    """Rotation matrix, row by row, of a turn about a coordinate axis by an angle [rad]."""
+    """Rotation matrix, row by row, of a rotation about a coordinate axis by an angle [rad]."""
     c, s, o = cos(angle), sin(angle), 0.0 * angle
     if axis == 0:
         return (o + 1, o, o, o, c, -s, o, s, c)
@@ -105,7 +105,7 @@ def axis_rotation(axis, angle):
 
 @formula
 def axis_quaternion(axis, angle):
-    """Unit quaternion of a turn about a coordinate axis by an angle [rad]."""
+    """Unit quaternion of a rotation about a coordinate axis by an angle [rad]."""
     half = angle / 2
     e = scale(sin(half), coordinate_axis(axis, 0.0 * angle))
     return (cos(half), e[0], e[1], e[2])
@@ -113,27 +113,27 @@ def axis_quaternion(axis, angle):
 
 @formula
 def sequence_quaternion(i, j, k, a, b, c):
-    """Unit quaternion of three turns, each about an axis of the frame that the turns before have left."""
+    """Unit quaternion of a sequence of three rotations, each about an axis of the frame rotated by those before it."""
     return quaternion_product(quaternion_product(axis_quaternion(i, a), axis_quaternion(j, b)), axis_quaternion(k, c))
 
 
 @formula
 def axes_in_base(i, j, k, a, b):
-    """Axes of the three turns along the frame that stays: e_i, R_i(a) e_j, R_i(a) R_j(b) e_k."""
+    """Axes of the three rotations in the fixed frame: e_i, R_i(a) e_j, R_i(a) R_j(b) e_k."""
     o, A = 0.0 * (a + b), axis_rotation(i, a)
     return coordinate_axis(i, o), mv(A, coordinate_axis(j, o)), mv(A, mv(axis_rotation(j, b), coordinate_axis(k, o)))
 
 
 @formula
 def axes_in_body(i, j, k, b, c):
-    """Axes of the three turns along the frame that they lead to."""
+    """Axes of the three rotations in the rotated frame."""
     o, C = 0.0 * (b + c), axis_rotation(k, c)
     return mtv(C, mtv(axis_rotation(j, b), coordinate_axis(i, o))), mtv(C, coordinate_axis(j, o)), coordinate_axis(k, o)
 
 
 @formula
 def axes_in_base_rate(h, rates):
-    """Rates of the axes h as seen from the frame that stays: each is carried along by the turns before it."""
+    """Rates of the axes h in the fixed frame: each is moved by the rotations before it."""
     o = 0.0 * rates[0]
     first = scale(rates[0], h[0])
     return (o, o, o), cross(first, h[1]), cross(add(first, scale(rates[1], h[1])), h[2])
@@ -141,7 +141,7 @@ def axes_in_base_rate(h, rates):
 
 @formula
 def axes_in_body_rate(h, rates):
-    """Rates of the axes h as seen from the turned frame: each is left behind by the turns after it."""
+    """Rates of the axes h in the rotated frame: each is moved by the rotations after it."""
     o = 0.0 * rates[0]
     last = scale(rates[2], h[2])
     return cross(h[0], add(last, scale(rates[1], h[1]))), cross(h[1], last), (o, o, o)
@@ -149,7 +149,7 @@ def axes_in_body_rate(h, rates):
 
 @formula
 def reciprocal_rows(h):
-    """Rows of the inverse of the matrix with the columns h; not finite where these lie in a plane."""
+    """Rows of the inverse of the matrix with the columns h; not finite where these are coplanar."""
     n = cross(h[1], h[2])
     f = divide(1, dot(h[0], n))
     return scale(f, n), scale(f, cross(h[2], h[0])), scale(f, cross(h[0], h[1]))

@@ -1,13 +1,13 @@
-"""Scalar functions for every kind of number a formula meets.
+"""Scalar functions for every kind of number in formulas.
 
-The same call works on floats, complex numbers, NumPy arrays (a formula over time), expressions (whatever has a method
-``apply(name, *args)``: nodes of `graph/`; else SymPy's) and, through overloads, inside compiled code for real and
-complex numbers.
+The same call works on floats, complex numbers, NumPy arrays (a formula over time), expressions (any object with a
+method ``apply(name, *args)``: nodes of `expression_graph`; else SymPy's) and, through overloads, inside compiled code
+for real and complex numbers.
 
 Outside its domain a real function gives nan or inf, as in C, and never raises: a solver checks its state once a step
-and reports, it must not be torn out of the middle of one. Complex numbers follow the principal branches of `cmath`;
-functions that are not analytic (`atan2`, `absolute`, `sign`, `rounded`, `minimum`, `maximum`) decide on the real parts
-and carry the derivative in the imaginary part, so that a complex step gives their exact derivative.
+and reports it. Complex numbers follow the principal branches of `cmath`; functions that are not analytic (`atan2`,
+`absolute`, `sign`, `rounded`, `minimum`, `maximum`) decide on the real parts and carry the derivative in the imaginary
+part, so that a complex step gives their exact derivative.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _ANALYTIC: dict[Function, str] = {}
 
 
 def real_parts(x: Any) -> np.ndarray:
-    """Real parts to decide by, as floats: of complex numbers, and of expressions that do not move."""
+    """Real parts as floats, for decisions: of complex numbers, and of constant expressions."""
     x = np.asarray(x)
     return np.frompyfunc(lambda e: e.real, 1, 1)(x).astype(float) if x.dtype == object else x.real
 
@@ -53,7 +53,7 @@ def _has_array(*args: Any) -> bool:
 
 
 def _on_expressions(name: str, *args: Any) -> Any:
-    """Expression of a function by its name here."""
+    """Function of expressions, by its name in this module."""
     for x in args:
         if hasattr(x, "apply"):
             return x.apply(name, *args)
@@ -178,14 +178,14 @@ def choose(x, a, b):
 
 
 def unless_zero(x, a, b):
-    """A where the real part of x is not zero, else b; both are computed. Of an expression, not zero is granted."""
+    """A where the real part of x is not zero, else b; both are computed. For an expression, x != 0 is assumed."""
     if _has_array(x):
         return _on_array(unless_zero, lambda x, a, b: np.where(np.real(x) != 0, a, b), x, a, b)
     return a if nonzero(x) else b
 
 
 def magnitude(x):
-    """|Re x|: sizes decide when to stop, they carry no derivative."""
+    """|Re x|: sizes are for decisions and carry no derivative."""
     return x.apply("absolute", x) if hasattr(x, "apply") else x.real if x.real > 0.0 else -x.real
 
 
@@ -197,12 +197,12 @@ def larger(a, b):
 
 
 def nonzero(x):
-    """Whether a pivot is not zero, and a number; of an expression that is taken for granted, and noted."""
+    """Whether a pivot is a number other than zero; for an expression that is assumed, and recorded."""
     return x.granted("nonzero") if hasattr(x, "granted") else not (x.real == 0.0 or x.real != x.real)
 
 
 def positive(x):
-    """Whether the real part is greater than zero; of an expression that is taken for granted, and noted."""
+    """Whether the real part is greater than zero; for an expression that is assumed, and recorded."""
     return x.granted("positive") if hasattr(x, "granted") else x.real > 0.0
 
 
@@ -218,7 +218,7 @@ def divide(a, b):
 
 
 def power(a, b):
-    """A ** b; nan for a negative base with a broken exponent, inf for zero with a negative one, as in C."""
+    """A ** b; nan for a negative base with a non-integer exponent, inf for zero with a negative one, as in C."""
     if isinstance(a, float | int) and isinstance(b, float | int):
         try:
             return math.pow(a, b)
@@ -272,7 +272,7 @@ def quintic_rise(s):
 
 @when_compiling
 def _register() -> None:
-    """Tell the compiler what these functions are for real and complex numbers."""
+    """Register the compiled versions of these functions for real and complex numbers."""
     from numba import types
 
     from ..compiler.numba_target import overload
@@ -289,7 +289,7 @@ def _register() -> None:
             analytic(function, name)
 
     def stepped(function: Function, real: Function, complex_: Function) -> None:
-        """Overload a function whose complex argument carries a step: of first order, which is what it is for."""
+        """Overload a function whose complex argument carries a first-order step."""
 
         @overload(function)
         def choose(x):

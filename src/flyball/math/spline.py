@@ -1,15 +1,15 @@
-"""Piecewise cubics in a flat list of numbers: what tables of points become, for formulas, arrays and compiled code.
+"""Piecewise cubics in a flat list of numbers: interpolated tables for formulas, arrays and compiled code.
 
 A spline of m breaks stands in an array from place ``at`` on as::
 
     period, m, break[0] ... break[m-1], piece 0, piece 1, ..., piece m
 
-with four coefficients c0 c1 c2 c3 a piece, f = c0 + c1 s + c2 s^2 + c3 s^3. Piece k holds between break[k-1] and
+with four coefficients c0 c1 c2 c3 for each piece, f = c0 + c1 s + c2 s^2 + c3 s^3. Piece k covers break[k-1] to
 break[k], and s = x - break[k-1]; piece 0 extends the spline before the first break (there s = x - break[0]), piece m
 behind the last one. A break belongs to the piece behind it, the last one to the piece before it, so that the ends of a
-table count as inside. A period greater than zero says that x is first brought into [break[0], break[0] + period).
-Where a spline must not be asked beyond its ends, the outer pieces are nan, and begin so little farther out that
-rounding does not reach them (`GRACE`).
+table count as inside. With a period greater than zero, x is first brought into [break[0], break[0] + period). Where a
+spline must not be evaluated beyond its ends, the outer pieces are nan, and begin slightly farther out, beyond rounding
+errors (`GRACE`).
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ import numpy as np
 
 from ..compiler.formulas import formula, when_compiling
 
-GRACE = 1e-9  # part of a table's width by which rounding may go beyond its ends
+GRACE = 1e-9  # relative to a table's width: margin for rounding at its ends
 BREAKS = 2  # place of the first break
-PIECE = 4  # numbers a piece
+PIECE = 4  # numbers for each piece
 
 
 def spline(data, at, x):
     """Value, first and second derivative at ``x`` of the spline at ``data[at]``.
 
     ``x`` is a float, a complex number (its real part chooses the piece), an array, or an expression (or an array of
-    these), whose ``tabulated(data, at)`` says what becomes of it; ``data`` an array of floats or complex numbers (a
-    list will do for single numbers).
+    these), whose method ``tabulated(data, at)`` gives the result. ``data`` is an array of floats or complex numbers
+    (for single numbers also a list).
     """
     if hasattr(x, "tabulated"):
         return x.tabulated(data, at)
@@ -42,7 +42,7 @@ def spline(data, at, x):
 
 @formula
 def evaluate_piece(data, at, x):
-    """`spline` where x is a number: it chooses the piece."""
+    """`spline` where x is a number, which chooses the piece."""
     start, origin = find_piece(data, at, x)
     s = x - origin
     c0, c1, c2, c3 = data[start], data[start + 1], data[start + 2], data[start + 3]
@@ -50,7 +50,7 @@ def evaluate_piece(data, at, x):
 
 
 def find_piece(data, at, x):
-    """Place of the coefficients that hold at x, and the x that they count from."""
+    """Place of the coefficients that apply at x, and x relative to their origin."""
     if isinstance(x, float | int | complex):
         return find_piece_of_number(data, at, x)
     count = int(data[at + 1].real)
@@ -65,7 +65,7 @@ def find_piece(data, at, x):
 
 
 def find_piece_of_number(data, at, x):
-    """The same for one number, by bisection; this is what compiled code does."""
+    """`find_piece` for one number, by bisection; used in compiled code."""
     x = x.real
     count = int(data[at + 1].real)
     first = at + BREAKS
@@ -114,7 +114,7 @@ def complex_cubic(x: np.ndarray, y: np.ndarray, periodic: bool) -> np.ndarray:
 
 
 def pack_spline(x: np.ndarray, y: np.ndarray, pieces: np.ndarray, beyond: str) -> np.ndarray:
-    """The flat list of numbers: ``pieces`` between the points, and behind the ends what ``beyond`` says.
+    """Flat list of a spline: ``pieces`` between the points, and beyond the ends as ``beyond`` states.
 
     "hold", "line" (straight on), "repeat", or "refuse": nan.
     """
@@ -133,7 +133,7 @@ def pack_spline(x: np.ndarray, y: np.ndarray, pieces: np.ndarray, beyond: str) -
 
 
 def _shifted_cubic(piece: np.ndarray, by: float) -> list[float]:
-    """A cubic counted from another place."""
+    """A cubic relative to another origin."""
     c0, c1, c2, c3 = piece
     return [c0 + by * (c1 + by * (c2 + by * c3)), c1 + by * (2.0 * c2 + 3.0 * by * c3), c2 + 3.0 * by * c3, c3]
 
@@ -159,7 +159,7 @@ def spline_expression(data: Any, at: int, x: Any) -> Any:
 
 @when_compiling
 def _register() -> None:
-    """In compiled code x is one number."""
+    """Register the compiled version, where x is one number."""
     from ..compiler.numba_target import overload
 
     @overload(find_piece)

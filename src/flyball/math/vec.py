@@ -19,37 +19,37 @@ from .scalar import sqrt
 
 @formula
 def cross(a, b):
-    """A x b."""
+    """Cross product a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @formula
 def dot(a, b):
-    """A . b."""
+    """Dot product a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @formula
 def add(a, b):
-    """A + b."""
+    """Sum a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @formula
 def sub(a, b):
-    """A - b."""
+    """Difference a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @formula
 def scale(s, a):
-    """S a."""
+    """Product s a."""
     return (s * a[0], s * a[1], s * a[2])
 
 
 @formula
 def neg(a):
-    """-a."""
+    """Negative -a."""
     return (-a[0], -a[1], -a[2])
 
 
@@ -61,7 +61,7 @@ def norm(a):
 
 @formula
 def mv(R, a):
-    """R a."""
+    """Product R a."""
     return (
         R[0] * a[0] + R[1] * a[1] + R[2] * a[2],
         R[3] * a[0] + R[4] * a[1] + R[5] * a[2],
@@ -71,7 +71,7 @@ def mv(R, a):
 
 @formula
 def mtv(R, a):
-    """R^T a."""
+    """Product R^T a."""
     return (
         R[0] * a[0] + R[3] * a[1] + R[6] * a[2],
         R[1] * a[0] + R[4] * a[1] + R[7] * a[2],
@@ -81,7 +81,7 @@ def mtv(R, a):
 
 @formula
 def symmetric(J, a):
-    """J a of a symmetric J = (xx, xy, xz, yy, yz, zz)."""
+    """Product J a of a symmetric J = (xx, xy, xz, yy, yz, zz)."""
     return (
         J[0] * a[0] + J[1] * a[1] + J[2] * a[2],
         J[1] * a[0] + J[3] * a[1] + J[4] * a[2],
@@ -91,9 +91,9 @@ def symmetric(J, a):
 
 @formula
 def axes_across(n):
-    """Two unit vectors square to the unit vector n and to each other (Duff and others, 2017).
+    """Two unit vectors perpendicular to the unit vector n and to each other (Duff and others, 2017).
 
-    Where n lies in z = 0, z is the second, so that what moves in that plane stays in it to the last bit.
+    Where n lies in z = 0, z is the second, so that motion in that plane stays in it to the last bit.
     """
     if n[2] == 0.0:
         return (-n[1], n[0], 0.0 * n[0]), (0.0 * n[0], 0.0 * n[0], 1.0 + 0.0 * n[0])
@@ -105,7 +105,7 @@ def axes_across(n):
 
 @formula
 def mm(A, B):
-    """A B."""
+    """Product A B."""
     return (
         A[0] * B[0] + A[1] * B[3] + A[2] * B[6],
         A[0] * B[1] + A[1] * B[4] + A[2] * B[7],
@@ -121,7 +121,7 @@ def mm(A, B):
 
 @formula
 def transpose(R):
-    """R^T."""
+    """Transpose R^T."""
     return (R[0], R[3], R[6], R[1], R[4], R[7], R[2], R[5], R[8])
 
 
@@ -133,13 +133,13 @@ def col(R, i):
 
 @formula
 def load3(A, k, o):
-    """Three neighbours of row k of a table, from column o."""
+    """Three consecutive entries of row k of a table, from column o."""
     return (A[k, o], A[k, o + 1], A[k, o + 2])
 
 
 @formula
 def load9(A, k, o):
-    """Nine neighbours of row k of a table, from column o: a matrix row by row."""
+    """Nine consecutive entries of row k of a table, from column o: a matrix row by row."""
     return (
         A[k, o],
         A[k, o + 1],
@@ -186,7 +186,7 @@ def quaternion_matrix(w, x, y, z):
 
 @formula
 def quaternion_product(a, b):
-    """Hamilton product a b: first turn by b, then by a."""
+    """Hamilton product a b: the rotation b followed by a."""
     return (
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -204,7 +204,7 @@ def matrix_product(A: Any, B: Any) -> np.ndarray:
     if "c" not in (A.dtype.kind, B.dtype.kind):
         return _product_terms(A, B)
     real = _product_terms(A.real, B.real) - (_product_terms(A.imag, B.imag) + 0.0)  # no zero changes its sign
-    out = np.empty(real.shape, complex)  # NumPy multiplies complex arrays by their places in memory
+    out = np.empty(real.shape, complex)  # NumPy's complex multiplication depends on memory alignment
     out.real, out.imag = real, _product_terms(A.real, B.imag) + _product_terms(A.imag, B.real) + 0.0
     return out
 

@@ -61,7 +61,7 @@ _HEX = re.compile(r"#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 
 
 def check_color(text: str, who: str) -> None:
-    """Refuse what is neither the name of a colour nor #rgb or #rrggbb."""
+    """Refuse a string that is neither a colour name nor #rgb or #rrggbb."""
     if _HEX.fullmatch(text) or text.lower() in NAMES:
         return
     close = difflib.get_close_matches(text.lower(), sorted(NAMES), 1)
@@ -75,7 +75,7 @@ GROUND = "ground"
 
 
 def _solids(value: Any) -> Any:
-    """Shapes, or plain data of a model file that says their type."""
+    """Convert plain data of a model file with a type to shapes."""
     if isinstance(value, dict):
         kind = value.get("type")
         known = [k for k, c in Element.registry.items() if issubclass(c, Solid) and c is not Solid]
@@ -99,7 +99,7 @@ Shapes = Annotated[Solid | tuple[Solid, ...] | None, BeforeValidator(_solids)]
 
 
 def shape_tuple(shape: Solid | tuple[Solid, ...] | None) -> tuple[Solid, ...]:
-    """Shapes as a tuple, however many were given."""
+    """Return one or several shapes as a tuple."""
     if shape is None:
         return ()
     return shape if isinstance(shape, tuple) else (shape,)
@@ -109,34 +109,35 @@ def shape_tuple(shape: Solid | tuple[Solid, ...] | None) -> tuple[Solid, ...]:
 class Body(Element):
     """A rigid body.
 
-    Its reference frame is where the user puts it: ``position`` and ``angle`` (planar) or ``orientation`` (spatial)
-    in the drawn configuration. Mass properties and everything attached are counted from that frame.
+    Its reference frame is given by ``position`` and ``angle`` (planar) or ``orientation`` (spatial) in the drawn
+    configuration. Mass properties and attached points are given relative to that frame.
 
-    Give ``mass`` and ``inertia``; then shapes are for looks only. Or give shapes with a ``density`` or a ``mass``, or
-    with densities or masses of their own: these say what it weighs, where its centre of mass is, and its inertia. In a
-    planar mechanism shapes are solids as in space, and their inertia about z counts. What would have no effect is
+    Give either ``mass`` and ``inertia``; shapes are then for display only. Or give shapes with a ``density`` or a
+    ``mass``, or with densities or masses of their own: mass, centre of mass and inertia are then computed from these.
+    In a planar mechanism shapes are solids as in space, and their inertia about z is used. Fields without effect are
     refused.
 
     Parameters
     ----------
     name : str
     mass : number [kg]
-        0, with inertia 0, for a ring or link that only joins others and moves with them, as in a gimbal.
-        With shapes and no ``inertia``: shared out among the shapes by volume, or, where all have a density of their
-        own, by volume times density.
+        0, with inertia 0, for a massless ring or link that only connects others, as in a gimbal. With shapes and no
+        ``inertia``: distributed over the shapes by volume, or by volume times density if all have a density of their
+        own.
     inertia : number [kg m^2]
         Planar: one number. Spatial: three principal moments (Ixx, Iyy, Izz) or the inertia tensor as a symmetric 3x3
-        matrix, whose diagonal holds the moments, Ixx = sum of m (y^2 + z^2), and which off the diagonal holds *minus*
-        the products of inertia, Ixy = -sum of m x y. A program that lists products with the plus sign needs its signs
-        turned. 0 for a point mass: if all that acts on it acts at its centre of mass and needs no orientation, it has
-        velocities and does not turn; else joints must hold it. 0 for one moment, and the others equal, for an ideal
+        matrix, with the moments Ixx = sum of m (y^2 + z^2) on the diagonal and *minus* the products of inertia, Ixy =
+        -sum of m x y, off the diagonal. Reverse the signs of products that another program lists with the plus sign. 0
+        for a point mass: if everything that acts on it acts at its centre of mass and needs no orientation, it only
+        translates; otherwise joints must determine its rotation. 0 for one moment, and the others equal, for an ideal
         thin rod.
     inertia_about : point [m]
-        Point of the reference frame that ``inertia`` is about; the centre of mass if not given.
+        Reference point of ``inertia``, in the reference frame; the centre of mass if not given.
     inertia_axes : orientation
-        Axes that a spatial ``inertia`` is given in, relative to the reference frame; its axes if not given.
+        Axes of a spatial ``inertia``, relative to the reference frame; the frame's axes if not given.
     com : point [m]
-        Centre of mass in the reference frame. If not given: the shapes' where they give the inertia, else its origin.
+        Centre of mass in the reference frame. If not given: that of the shapes if they give the inertia, else the
+        origin.
     position : point [m]
         Origin of the reference frame, in the world.
     angle : number [rad]
@@ -144,21 +145,23 @@ class Body(Element):
     orientation : quaternion (scalar first), Bryant angles (x-y-z) [rad], rotation object or 3x3 matrix
         Spatial: orientation of the reference frame.
     velocity : vector [m/s]
-        Velocity of the reference frame's origin at the start, world axes. It is kept where joints and drivers allow
-        it; where they do not, the nearest is taken and said. If not given it is free: it follows from what is given
-        elsewhere, and where nothing determines it the kinetic energy of the whole is the least, so that what is told
-        nothing rests; told ``angular_velocity`` only, a body on no joint turns about its mass centre.
+        Initial velocity of the reference frame's origin, world axes. It is used if joints and drivers allow it;
+        otherwise the nearest consistent velocity is used and reported. If not given, it is free: it follows from other
+        given velocities; what these leave undetermined is chosen for the least total kinetic energy, so that a body
+        without given velocities is at rest, and a body without joints and only with ``angular_velocity`` turns about
+        its mass centre.
     angular_velocity : number or vector [rad/s]
-        At the start, world axes; the same holds: give 0 if a body on no joint that is told ``velocity`` is not to turn.
+        Initial angular velocity, world axes; as for ``velocity``. Give 0 if a body without joints but with ``velocity``
+        must not turn.
     shape : shape or list of shapes
-        What the body looks like and, unless ``inertia`` is given, what it weighs (see `Solid`).
+        Display geometry and, unless ``inertia`` is given, mass distribution (see `Solid`).
     density : number [kg/m^3]
-        Of the shapes that have no mass or density of their own.
+        Density of shapes without mass or density of their own.
     as_drawn : bool
-        Assembly must not change the pose, nor the velocities given here. It holds nothing during the motion: to weld a
-        body to ground add a `Fixed` joint.
+        Assembly must change neither the pose nor the velocities given here. It has no effect during the motion: to fix
+        a body to ground add a `Fixed` joint.
     material : str
-        `Material` that its shapes touch others with, where they name none of their own.
+        `Material` of shapes that do not name their own.
     color : str
         Colour in pictures: a name of CSS such as ``"steelblue"``, or ``"#rgb"`` or ``"#rrggbb"``.
     """
@@ -186,24 +189,24 @@ class Body(Element):
     }
 
     def check(self, n: SimpleNamespace) -> None:
-        """A colour that there is; masses and shapes are looked at by `mass_properties`."""
+        """Refuse an invalid colour; masses and shapes are checked by `mass_properties`."""
         if self.color is not None:
             check_color(self.color, self.title)
 
     def ends(self) -> dict[str, str]:
-        """Its reference frame."""
+        """Return the reference frame."""
         return {"M": self.name}
 
     def shapes(self) -> tuple[Solid, ...]:
-        """Its shapes, as a tuple."""
+        """Return its shapes, as a tuple."""
         return shape_tuple(self.shape)
 
     def solids(self) -> tuple[Solid, ...]:
-        """Its shapes that are seen: all but holes."""
+        """Return its visible shapes: all but holes."""
         return tuple(s for s in self.shapes() if not s.hole)
 
     def rotation(self, n: Any) -> np.ndarray:
-        """Rotation matrix of the reference frame in the drawn configuration."""
+        """Return the rotation matrix of the reference frame in the drawn configuration."""
         if n.orientation is not None:
             return orientation_matrix(n.orientation, f"orientation of {self.title}")
         return rotation_about(2, n.angle)
@@ -238,7 +241,7 @@ class Frame(Element):
 
 @element
 class Driver(Element):
-    """A coordinate made to follow a function of time (a rheonomic constraint).
+    """A coordinate that follows a prescribed function of time (a rheonomic constraint).
 
     Parameters
     ----------
@@ -248,19 +251,19 @@ class Driver(Element):
         ``"slider.x"``.
     law : expression
         Its value [rad] or [m], an expression of ``t``, tables, parameters, and sensors of positions and angles; its
-        derivatives are found exactly. No Python function, whose derivatives are not known.
+        derivatives are exact. Python functions are not permitted, since their derivatives are unknown.
     """
 
     coordinate: str = field(kw_only=False)
     law: Law = field(kw_only=False)
 
     category: ClassVar[str] = "drivers"
-    omission: ClassVar[float] = 0.5  # what it costs to leave it out where rows are too many
+    omission: ClassVar[float] = 0.5  # cost of omitting it as a remedy for redundant constraints
 
 
 @element
 class Initial(Element):
-    """A coordinate, its rate, or both, that assembly has to meet at the start. One of them must be given.
+    """Initial value of a coordinate, its rate, or both, which assembly satisfies. At least one must be given.
 
     Parameters
     ----------
@@ -276,21 +279,21 @@ class Initial(Element):
     category: ClassVar[str] = "initial"
 
     def check(self, n: SimpleNamespace) -> None:
-        """Something to meet."""
+        """Require a value or a rate."""
         if self.value is None and self.rate is None:
             raise ModelError(f"{self.title}: it says nothing; give value=..., rate=... or both")
 
 
 @element
 class Ground(Element):
-    """Shapes that stand still: a floor, a wall, a box without a lid.
+    """Fixed shapes: a floor, a wall, a box without a lid.
 
     Parameters
     ----------
     name : str
-        Of this part of ground, such as ``"floor"``.
+        Name of this part of ground, such as ``"floor"``.
     shape : shape or list of shapes
-        What is seen, and touched where a `Contact` says so. Masses of shapes mean nothing here.
+        Display geometry, and contact geometry if a `Contact` applies. Masses of shapes have no effect.
     position : point [m]
         Origin of its frame, in the world.
     angle : number [rad]
@@ -298,7 +301,7 @@ class Ground(Element):
     orientation : quaternion (scalar first), Bryant angles (x-y-z) [rad], rotation object or 3x3 matrix
         Spatial: orientation of its frame.
     material : str
-        `Material` of the shapes that name none of their own.
+        `Material` of shapes that do not name their own.
     color : str
         Colour in pictures.
     """
@@ -313,17 +316,17 @@ class Ground(Element):
     category: ClassVar[str] = "ground"
 
     def shapes(self) -> tuple[Solid, ...]:
-        """Its shapes, as a tuple."""
+        """Return its shapes, as a tuple."""
         return shape_tuple(self.shape)
 
     def rotation(self, n: Any) -> np.ndarray:
-        """Rotation matrix of its frame."""
+        """Return the rotation matrix of its frame."""
         if n.orientation is not None:
             return orientation_matrix(n.orientation, f"orientation of {self.title}")
         return rotation_about(2, n.angle)
 
     def check(self, n: SimpleNamespace) -> None:
-        """A shape, and nothing that has no effect on ground."""
+        """Require a shape, and refuse fields that have no effect on ground."""
         if self.color is not None:
             check_color(self.color, self.title)
         if not self.shapes():
@@ -341,14 +344,14 @@ def _check_weightless(e: Ground, s: Solid) -> None:
 
 
 def frame_of(e: Ground, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
-    """Origin and axes of its frame, in the world."""
+    """Return origin and axes of its frame, in the world."""
     p = np.zeros(3)
     p[: len(n.position)] = np.real(n.position)
     return p, np.real(e.rotation(n))
 
 
 def _read(path: Path) -> np.ndarray:
-    """The array in a file of NumPy, or in a text with commas."""
+    """Read an array from a NumPy file, or from comma-separated text."""
     kind = path.suffix.lower()
     if kind not in (".npy", ".csv"):
         raise ValueError("give an array of numbers, or the path of a file '*.npy' or '*.csv' that holds one")
@@ -361,7 +364,7 @@ def _read(path: Path) -> np.ndarray:
 
 
 def _numbers(value: Any) -> Any:
-    """An array of numbers of its own, not to be changed."""
+    """Return a read-only copy as an array of numbers."""
     if isinstance(value, (str, os.PathLike)):
         value = _read(current_folder() / value)
     try:
@@ -381,36 +384,36 @@ ARRAYS = ("position", "angle", "orientation", "velocity", "angular_velocity", "s
 
 @element
 class Bodies(Element):
-    """Many bodies of one shape, on nothing but gravity and contact: grains, balls, bricks.
+    """Many bodies of one shape, subject to gravity and contact only: grains, balls, bricks.
 
-    Their numbers are arrays in SI units with a row for each body: 100,000 take no longer to describe than one. In place
-    of an array the path of a file that holds it will do, ``"grains.npy"`` or ``"grains.csv"``, counted from the folder
-    of the model file; it is read at once, and what is saved holds the numbers. In messages and results the eighteenth
-    of ``"balls"`` is ``"balls[17]"``. Joints, drivers and forces act on a `Body`.
+    Their numbers are arrays in SI units with a row for each body: 100,000 take no longer to describe than one. An array
+    can also be given as the path of a file, ``"grains.npy"`` or ``"grains.csv"``, relative to the folder of the model
+    file; it is read immediately, and saved models contain the numbers. In messages and results the eighteenth of
+    ``"balls"`` is ``"balls[17]"``. Joints, drivers and forces cannot act on them; use a `Body`.
 
     Parameters
     ----------
     name : str
     shape : shape or list of shapes
-        Of each of them, in its own reference frame.
+        Shape of each body, in its reference frame.
     position : (n, 3) numbers [m]
-        Origins of their reference frames, in the world; in a planar mechanism (n, 2) will do.
+        Origins of their reference frames, in the world; in a planar mechanism (n, 2) suffices.
     density : number [kg/m^3]
         Of shapes without a mass or density of their own, as for a `Body`.
     mass, inertia : number [kg], [kg m^2]
-        Of each of them, as for a `Body`.
+        Of each body, as for a `Body`.
     angle : n numbers [rad]
-        Planar: orientations of the reference frames; 0 if not given. One number holds for all.
+        Planar: orientations of the reference frames; 0 if not given. One number applies to all.
     orientation : (n, 4) numbers
-        Spatial: quaternions, scalar first; the world's axes if not given. One row holds for all.
+        Spatial: quaternions, scalar first; the world's axes if not given. One row applies to all.
     velocity : (n, 3) numbers [m/s]
-        At the start, of the reference frames' origins, world axes; 0 if not given. One row holds for all.
+        At the start, of the reference frames' origins, world axes; 0 if not given. One row applies to all.
     angular_velocity : (n, 3) numbers [rad/s]
-        At the start, world axes; in a planar mechanism n numbers. 0 if not given. One row holds for all.
+        At the start, world axes; in a planar mechanism n numbers. 0 if not given. One row applies to all.
     scale : n numbers [1]
-        Size of each relative to ``shape``: lengths grow with it, masses with its cube, inertias with its fifth power.
+        Size of each relative to ``shape``: lengths scale with it, masses with its cube, inertias with its fifth power.
     material : str
-        `Material` of the shapes that name none of their own.
+        `Material` of shapes that do not name their own.
     color : str
         Colour in pictures.
     """
@@ -431,7 +434,7 @@ class Bodies(Element):
     category: ClassVar[str] = "bulk"
 
     def __eq__(self, other: object) -> bool:
-        """Equal if everything is, to the bit."""
+        """Return whether every field is equal, to the bit."""
         return isinstance(other, Bodies) and all(
             _same(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)
         )
@@ -447,12 +450,12 @@ class Bodies(Element):
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Return the number of bodies."""
         return len(self.position)
 
     @cached_property
     def one(self) -> Body:
-        """One of them, with ``scale`` 1 and at the origin."""
+        """Return one of them as a `Body`, with ``scale`` 1 and at the origin."""
         return Body(
             self.name,
             shape=self.shape,
@@ -464,11 +467,11 @@ class Bodies(Element):
         )
 
     def shapes(self) -> tuple[Solid, ...]:
-        """Its shapes, as a tuple."""
+        """Return its shapes, as a tuple."""
         return shape_tuple(self.shape)
 
     def check(self, n: SimpleNamespace) -> None:
-        """Arrays of as many finite numbers as there are bodies; what depends on the plane is looked at later."""
+        """Require arrays with finite numbers for all bodies; whatever depends on the plane is checked later."""
         self.one.check(n)
         if not self.shapes():
             raise ModelError(f"{self.title}: it has no shape; give shape=Sphere(radius=...) or another")
@@ -489,12 +492,12 @@ class Bodies(Element):
             raise ModelError(f"{self.title}: scale[{k}] is {self.scale.flat[k]:g}; it must be greater than 0")
 
     def weight(self, n: SimpleNamespace, env: Any, planar: bool) -> MassProperties:
-        """Mass properties of one of them with ``scale`` 1.
+        """Return the mass properties of one of them with ``scale`` 1.
 
         Raises
         ------
         ModelError
-            If a shape makes no sense, or it has no mass or inertia.
+            If a shape is invalid, or there is no mass or inertia.
         """
         given = {name: getattr(n, name) for name in ("mass", "density", "inertia")}
         given |= dict.fromkeys(("inertia_about", "inertia_axes", "com"))
@@ -509,7 +512,7 @@ class Bodies(Element):
         Raises
         ------
         ModelError
-            If an array has another shape than it must.
+            If an array has the wrong shape.
         """
         n = self.count
         p = _rows(self, "position", n, (3, 2) if planar else (3,))
@@ -538,7 +541,7 @@ class Bodies(Element):
         return np.stack(quaternion_matrix(*e.T), axis=1).reshape(n, 3, 3)
 
     def sizes(self) -> np.ndarray:
-        """Scale (n,) of each."""
+        """Return the scale (n,) of each body."""
         return np.ones(self.count) if self.scale is None else _line(self, "scale", self.count)
 
 
@@ -549,7 +552,7 @@ def _same(a: Any, b: Any) -> bool:
 
 
 def _rows(e: Bodies, name: str, n: int, widths: tuple[int, ...]) -> np.ndarray:
-    """An array (n, 3 or 4) of a field: as given, one row for all, or zeros."""
+    """Return the array (n, 3 or 4) of a field: as given, one row repeated, or zeros."""
     out = np.zeros((n, widths[0]))
     a = getattr(e, name)
     if a is None:
@@ -562,7 +565,7 @@ def _rows(e: Bodies, name: str, n: int, widths: tuple[int, ...]) -> np.ndarray:
 
 
 def _line(e: Bodies, name: str, n: int) -> np.ndarray:
-    """An array (n,) of a field: as given, one number for all, or zeros."""
+    """Return the array (n,) of a field: as given, one number repeated, or zeros."""
     a = getattr(e, name)
     if a is not None and a.shape not in ((), (n,)):
         raise ModelError(f"{e.title}: {name} has the shape {a.shape}; it must be ({n},), a number for each body")

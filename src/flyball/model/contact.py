@@ -1,7 +1,7 @@
 """Contact between bodies: which bodies may touch, surface materials, laws of the normal force.
 
-Materials state friction, restitution, rolling resistance and surface velocity; a pair of materials may override
-them. `Contact` says which bodies touch and which law holds for them.
+Materials define friction, restitution, rolling resistance and surface velocity; a pair of materials may override them.
+`Contact` defines which bodies may touch, and their contact law.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ if TYPE_CHECKING:
 
 
 HARD, LINEAR, HERTZ, HUNT_CROSSLEY = "hard", "linear", "hertz", "hunt-crossley"
-LAW_NUMBERS = {  # that a law takes
+LAW_NUMBERS = {  # parameters of each law
     HARD: (),
     LINEAR: ("stiffness", "damping"),
     HERTZ: ("stiffness",),
     HUNT_CROSSLEY: ("stiffness", "exponent", "dissipation"),
 }
 ALL_LAW_NUMBERS = ("stiffness", "exponent", "dissipation", "damping")
-DEFAULT_EXPONENT = 1.5  # of Hertz' law
+DEFAULT_EXPONENT = 1.5  # exponent of Hertz' law
 
 
 def _law(value: Any) -> Any:
@@ -66,7 +66,7 @@ Pressure = Annotated[Number, Unit("Pa")]
 
 
 def check_law(e: Element, n: SimpleNamespace) -> None:
-    """Refuse laws of the normal force without their numbers, and numbers without their law.
+    """Refuse laws of the normal force without their parameters, and parameters without their law.
 
     Raises
     ------
@@ -95,13 +95,13 @@ def check_law(e: Element, n: SimpleNamespace) -> None:
 
 
 def unit_of_stiffness(n: SimpleNamespace) -> str:
-    """N over the metre to the law's power."""
+    """Return the unit of stiffness: N over the metre to the law's power."""
     power = 1.0 if n.law == LINEAR else DEFAULT_EXPONENT if n.exponent is None else float(n.exponent.real)
     return "N/m" if power == 1.0 else f"N/m^{power:g}"
 
 
 def _check_unit(e: Element, unit: str) -> None:
-    """The unit of stiffness follows from the exponent."""
+    """Check that the unit of stiffness fits the exponent."""
     given = e.stiffness  # type: ignore[attr-defined]
     if isinstance(given, str):
         parts = split_quantity(given)
@@ -113,7 +113,7 @@ def _check_unit(e: Element, unit: str) -> None:
 
 
 def check_elasticity(e: Element, n: SimpleNamespace) -> None:
-    """Refuse elastic constants that no isotropic solid has, and one without the other.
+    """Refuse elastic constants that are impossible for an isotropic solid, and one without the other.
 
     Raises
     ------
@@ -136,7 +136,7 @@ SURFACE_NUMBERS = ("friction", "static_friction", "restitution", "rolling_fricti
 
 
 def check_restitution(e: Element, n: SimpleNamespace) -> None:
-    """Refuse a restitution that is not from 0 to 1."""
+    """Refuse a restitution outside 0 to 1."""
     nonnegative(e, n, "restitution")
     if n.restitution is not None and not n.restitution.real <= 1.0:
         raise ModelError(
@@ -145,7 +145,7 @@ def check_restitution(e: Element, n: SimpleNamespace) -> None:
 
 
 def check_surface(e: Element, n: SimpleNamespace) -> None:
-    """Refuse numbers that no surface has.
+    """Refuse impossible surface properties.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def check_surface(e: Element, n: SimpleNamespace) -> None:
 
 
 def friction_pair(x: Any) -> tuple[Any, Any]:
-    """Along the grain and across it."""
+    """Return friction along the grain and across it."""
     return (x[0], x[1]) if isinstance(x, tuple) else (x, x)
 
 
@@ -177,11 +177,10 @@ def friction_pair(x: Any) -> tuple[Any, Any]:
 class Material(Element):
     """A surface, as bodies and shapes name it: ``Body(..., material="rubber")``.
 
-    What touches has a material on either side. Of friction and restitution the geometric mean of both holds, so that
-    what is slippery or dead on one side is on both (as in Box2D and Jolt); of the lengths of rolling and spinning
-    friction the greater, since the softer gives way (as in MuJoCo); surface velocities add up. What a material leaves
-    out is that of the `Contact`, or else that of the other side. Where a pair is known by measurement, a
-    `MaterialPair` says it.
+    A contact combines two materials. Friction and restitution are the geometric means of both, so that a zero on one
+    side gives zero (as in Box2D and Jolt); the lengths of rolling and spinning friction are the greater ones, since the
+    softer body deforms (as in MuJoCo); surface velocities are added. Properties that a material leaves out are those of
+    the `Contact`, or else those of the other side. Measured properties of a pair are given by a `MaterialPair`.
 
     Parameters
     ----------
@@ -189,24 +188,24 @@ class Material(Element):
     friction : number, or two numbers [1]
         Coefficient of sliding friction. Two: along the grain (greater than 0) and across it.
     static_friction : number [1]
-        Of what sticks, not less; the same as ``friction`` if not given. With a grain: along it; across it greater or
-        smaller as ``friction`` is.
+        Coefficient of static friction, not smaller; equal to ``friction`` if not given. With a grain: along it; across
+        it in the ratio of ``friction``.
     restitution : number [1]
-        From 0 (dead) to 1 (elastic); 0 if nothing says it.
+        From 0 (no rebound) to 1 (elastic); 0 if given nowhere.
     rolling_friction : number [m]
-        Lever arm of the resistance to rolling: the greatest torque over the normal force.
+        Lever arm of the rolling resistance: the greatest torque divided by the normal force.
     spinning_friction : number [m]
-        The same about the normal: about two thirds of friction times the radius of the spot that touches.
+        The same about the normal: about two thirds of friction times the radius of the contact patch.
     grain : direction
-        Of the first of two numbers of friction, in the reference frame of the body; where it stands square on the
-        surface, the second number holds all around.
+        Direction of the first of two friction coefficients, in the reference frame of the body; if it is normal to the
+        surface, the second coefficient applies in all directions.
     surface_velocity : vector [m/s]
-        Of the surface relative to the body, in the body's reference frame: of a conveyor belt. Only its part along
-        the surface counts.
+        Velocity of the surface relative to the body (conveyor belt), in the body's reference frame. Only its tangential
+        component is used.
     youngs_modulus : number [Pa]
-        Of the solid, for a `Contact` whose ``law`` is that of Hertz or of Hunt and Crossley and says no stiffness.
+        Of the solid, for a `Contact` with the ``law`` of Hertz or of Hunt and Crossley without a given stiffness.
     poissons_ratio : number [1]
-        The same; both or none.
+        As ``youngs_modulus``; both or none.
     """
 
     friction: Friction | None = None
@@ -222,7 +221,7 @@ class Material(Element):
     category: ClassVar[str] = "materials"
 
     def check(self, n: SimpleNamespace) -> None:
-        """Numbers that a surface can have; a grain where, and only where, two numbers of friction ask for it."""
+        """Require valid surface properties; a grain if, and only if, two friction coefficients are given."""
         two = isinstance(n.friction, tuple)
         if two and (len(n.friction) != 2 or any(isinstance(x, tuple) for x in n.friction)):
             raise ModelError(
@@ -247,19 +246,19 @@ class Material(Element):
 
 @element
 class MaterialPair(Element):
-    """What two materials are to each other, in place of what follows from each of them.
+    """Properties of a pair of materials, in place of those combined from both.
 
     Parameters
     ----------
     first, second : str
         Names of the materials; both may be the same.
     friction, static_friction, restitution : number [1]
-        As for `Material`; what is not given follows from the materials.
+        As for `Material`; properties that are not given follow from the materials.
     rolling_friction, spinning_friction : number [m]
     law, stiffness, exponent, dissipation, damping
-        How they give way to each other, as for `Contact`; restitution is of what is hard.
+        Compliant contact law, as for `Contact`; restitution applies to hard contact only.
     name : str
-        Made of those of the materials if not given.
+        Composed of the materials' names if not given.
     """
 
     name: str = field(default="", kw_only=True)
@@ -279,12 +278,12 @@ class MaterialPair(Element):
     category: ClassVar[str] = "material_pairs"
 
     def __post_init__(self) -> None:
-        """A name."""
+        """Set the default name."""
         if not self.name:
             object.__setattr__(self, "name", f"{self.first} on {self.second}")
 
     def check(self, n: SimpleNamespace) -> None:
-        """Numbers that surfaces can have, one at least."""
+        """Require valid surface properties, at least one."""
         check_surface(self, n)
         check_law(self, n)
         if all(getattr(n, k) is None for k in (*SURFACE_NUMBERS, "law")):
@@ -294,7 +293,7 @@ class MaterialPair(Element):
 
 
 def _names(value: Any) -> Any:
-    """A name, or several, as a tuple."""
+    """Convert a name, or several, to a tuple."""
     value = python_data(value)
     if isinstance(value, str):
         value = (value,)
@@ -306,7 +305,7 @@ def _names(value: Any) -> Any:
 
 
 def _pairs(value: Any) -> Any:
-    """Pairs of names."""
+    """Convert to pairs of names."""
     value = python_data(value)
     if isinstance(value, tuple) and len(value) == 2 and all(isinstance(x, str) for x in value):
         value = (value,)
@@ -324,44 +323,45 @@ Pairs = Annotated[tuple[tuple[str, str], ...], BeforeValidator(_pairs)]
 
 @element
 class Contact(Element):
-    """Bodies touch, by their shapes: with Coulomb friction, and hard, unless ``law`` says how they give way.
+    """Contact between bodies with shapes, with Coulomb friction; hard, unless ``law`` is compliant.
 
-    ``m.add(fb.Contact(friction=0.3))`` lets everything that has a shape touch everything else: bodies, `Bodies`, what
-    stands on `Ground`. Bodies that a joint connects are left out. A further `Contact` that names bodies holds for these
-    in place of the first.
+    ``m.add(fb.Contact(friction=0.3))`` applies to all pairs of things with shapes: bodies, `Bodies` and `Ground`.
+    Bodies that a joint connects are left out. A further `Contact` that names bodies replaces the first for these.
 
     Parameters
     ----------
     name : str
     between : name or list of names
-        Bodies, `Bodies`, parts of ground (``"ground"``: all of them) that touch each other; everything if not given.
+        Bodies, `Bodies`, parts of ground (``"ground"``: all of them) that may touch each other; everything if not
+        given.
     others : name or list of names
-        If given, ``between`` touches these, and neither touches its own kind.
+        If given, members of ``between`` may touch these, but not each other.
     friction : number [1]
-        Coefficient of sliding friction of what has no `Material` that says it; of a contact with ``between``, of all
-        that it holds for. 0 is smooth. A belt, a grain and the like are told by a `Material`.
+        Coefficient of sliding friction for surfaces whose `Material` gives none; with ``between``, for all its pairs. 0
+        is frictionless. Belts, grain and the like are defined by a `Material`.
     static_friction : number [1]
-        Of what sticks, not less; the same as ``friction`` if not given.
+        Coefficient of static friction, not smaller; equal to ``friction`` if not given.
     restitution : number [1]
-        From 0 (dead) to 1 (elastic); 0 if nothing says it.
+        From 0 (no rebound) to 1 (elastic); 0 if given nowhere.
     rolling_friction, spinning_friction : number [m]
-        Lever arms of the resistance to rolling and to spinning about the normal (see `Material`); 0 if nothing says it.
+        Lever arms of the resistance to rolling and to spinning about the normal (see `Material`); 0 if given nowhere.
     law : {"hard", "linear", "hertz", "hunt-crossley"}
-        Normal force over the overlap d: none may be (hard, if nothing says it); k d + damping ddot; k d^(3/2) (Hertz
-        1881); k d^n (1 + dissipation ddot) (Hunt and Crossley 1975). It never pulls. Friction is the same for all.
+        Normal force as a function of the overlap d: hard (no overlap; the default); k d + damping ddot; k d^(3/2)
+        (Hertz 1881); k d^n (1 + dissipation ddot) (Hunt and Crossley 1975). It never pulls. Friction is the same for
+        all laws.
     stiffness : number [N/m^n]
-        k, of each point that touches: in N/m for ``"linear"``, N/m^1.5 for Hertz' exponent. If not given, that of
-        spheres on each other or on flat shapes, by Young's moduli and Poisson's ratios of their materials.
+        k, for each contact point: in N/m for ``"linear"``, N/m^1.5 for Hertz' exponent. If not given, that of spheres
+        on each other or on flat shapes, by Young's moduli and Poisson's ratios of their materials.
     exponent : number [1]
         n of ``"hunt-crossley"``; 1.5 if not given.
     dissipation : number [s/m]
-        Of ``"hunt-crossley"``: an impact at a small speed v gives back 1 - 2/3 dissipation v of it. 0 if not given.
+        Of ``"hunt-crossley"``: the restitution at a small impact speed v is 1 - 2/3 dissipation v. 0 if not given.
     damping : number [N s/m]
         Of ``"linear"``. 0 if not given.
     joined : bool
-        Bodies that a joint connects touch too. What is joined to ground touches the shapes of ground in any case.
+        Include bodies that a joint connects. Bodies joined to ground can touch ground in any case.
     exclude : list of pairs of names
-        What does not touch.
+        Pairs that do not touch.
     """
 
     name: str = field(default="contact", kw_only=False)
@@ -383,7 +383,7 @@ class Contact(Element):
     category: ClassVar[str] = "contacts"
 
     def check(self, n: SimpleNamespace) -> None:
-        """Numbers that surfaces can have, and others only beside something."""
+        """Require valid surface properties, and the names that ``others`` and ``exclude`` depend on."""
         check_surface(self, n)
         check_law(self, n)
         if self.others is not None and self.between is None:
@@ -397,24 +397,26 @@ Owner = Body | Bodies | Ground
 
 
 def has_contact(model: Model) -> bool:
-    """Whether there is something that only a motion by impulses knows: contacts, rigid stops, many bodies."""
+    """Return whether the mechanism has elements for motions with impulses only: contacts, rigid stops, many bodies."""
     return bool(model.contacts or model.bulk or any(not e.acts() for e in model.limits))
 
 
 def has_switching_elements(model: Model) -> bool:
-    """Whether something holds at times: the same, and what sticks, locks, latches or goes taut; or events."""
+    """Return whether any element switches: these, or friction, locks, latches, inextensible ropes; or events."""
     held = any(w.kind != ELASTIC for e in model.elements() for w in e.switches())
     return has_contact(model) or held or any(e.category == "events" for e in model.elements())
 
 
 def not_for_impulse_stepping(model: Model) -> list[Element]:
-    """One-sided elements that steps by impulses do not know: latches, rigid play, ropes that do not stretch."""
+    """Return the one-sided elements that impulse time stepping does not support: latches, rigid play, inextensible
+    ropes.
+    """
     known = "Limit"
     return [e for e in (*model.forces, *model.limits) if not e.acts() and type(e).__name__ != known]
 
 
 def contact_warnings(model: Model) -> tuple[str, ...]:
-    """What to say of shapes that nothing can touch, for want of a contact, and of bodies that can touch nothing."""
+    """Return warnings on shapes that nothing can touch for want of a contact, and on bodies that can touch nothing."""
     there: list[Owner] = [*model.ground, *model.bulk]
     if model.contacts or not any(s.touches for e in there for s in e.shapes()):
         return _shapeless(model)
@@ -425,10 +427,10 @@ def contact_warnings(model: Model) -> tuple[str, ...]:
 
 
 def _shapeless(model: Model) -> tuple[str, ...]:
-    """Warns of bodies without a shape where a contact holds for everything: they fall through whatever is there.
+    """Warn of bodies without a shape if a contact applies to everything: they fall through other bodies.
 
-    No warning where a chain of joints, drivers or forces with two ends connects a body to ground or to a shape: these
-    carry it. A shape with ``looks=True`` says that a body is not to touch.
+    There is no warning if a chain of joints, drivers or two-ended forces connects a body to ground or to a body with a
+    shape, which supports it. A shape with ``looks=True`` excludes a body from contact on purpose.
     """
     contact = next((c for c in model.contacts if c.between is None), None)
     bare = [b.name for b in model.bodies if not b.shapes()] if contact else []
@@ -453,7 +455,7 @@ def _shapeless(model: Model) -> tuple[str, ...]:
 
 
 def _connections(model: Model) -> Iterator[set[str]]:
-    """Bodies, and ground, that a joint, a driver or a force with two ends connects."""
+    """Return the bodies, and ground, that a joint, a driver or a two-ended force connects."""
     for e in (*model.joints, *model.forces, *model.limits):
         yield {model.carrier(name, e) for name in e.ends().values()} if hasattr(e, "ends") else set()
     along = ((e, text) for e in (*model.forces, *model.limits) for text in getattr(e, "along", tuple)())
@@ -464,12 +466,12 @@ def _connections(model: Model) -> Iterator[set[str]]:
 
 
 def shape_owners(model: Model) -> list[Owner]:
-    """All that may have shapes: parts of ground, bodies, many bodies."""
+    """Return everything that may have shapes: parts of ground, bodies, sets of bodies."""
     return [*model.ground, *model.bodies, *model.bulk]
 
 
 def check_touching(model: Model, e: Element) -> None:
-    """Refuse names of materials and bodies that are not there, and contacts that hold for the same.
+    """Refuse unknown names of materials and bodies, and contacts for the same pairs.
 
     Raises
     ------
@@ -493,7 +495,7 @@ def check_touching(model: Model, e: Element) -> None:
 
 
 def _refuse_idle(e: Owner) -> None:
-    """Refuse materials of what touches nothing."""
+    """Refuse materials of bodies that cannot touch anything."""
     shapes = e.shapes()
     for s in shapes:
         if s.material is not None and not s.touches:
@@ -504,7 +506,7 @@ def _refuse_idle(e: Owner) -> None:
 
 
 def contact_names(e: Contact) -> Iterator[str]:
-    """Every name that a contact gives."""
+    """Return every name in a contact."""
     yield from e.between or ()
     yield from e.others or ()
     for pair in e.exclude:
@@ -536,12 +538,12 @@ def _touching(model: Model, name: str, e: Contact) -> None:
 
 
 def _where(e: Contact, name: str) -> str:
-    """The field that names it."""
+    """Return the field that contains a name."""
     return field_with(e, name) or "exclude: "
 
 
 def _refuse_second(model: Model, e: Contact) -> None:
-    """One contact for everything is enough."""
+    """Refuse a second contact for everything."""
     other = next((c for c in model.contacts if c.name != e.name and c.between is None), None)
     if other is not None and e.between is None:
         raise ModelError(
@@ -551,7 +553,7 @@ def _refuse_second(model: Model, e: Contact) -> None:
 
 
 def _refuse_overlap(model: Model, e: Contact) -> None:
-    """Two contacts that name bodies are about different ones."""
+    """Refuse two contacts that name the same pairs of bodies."""
     for other in model.contacts:
         if other.name == e.name or other.between is None or e.between is None:
             continue
@@ -565,7 +567,7 @@ def _refuse_overlap(model: Model, e: Contact) -> None:
 
 
 def _contact_partners(model: Model, e: Contact) -> tuple[set[str], set[str]]:
-    """Names on either side of a contact, with the parts of ground in place of ground."""
+    """Return the names on either side of a contact, with the parts of ground in place of ground."""
     ground = {g.name for g in model.ground}
     first, second = (
         set(x) - {GROUND} | (ground if GROUND in x else set()) for x in (e.between or (), e.others or e.between or ())

@@ -19,26 +19,26 @@ Term = tuple[float, ...]  # the kind of a row and its eight parameters
 
 @element
 class Touch(TwoFrameForce):
-    """A place of a `Contact`: what stays apart, and with friction what sticks or slides there.
+    """A contact point of a `Contact`: a gap row and, with friction, slip rows.
 
-    These are made from the shapes when a motion begins, not written by hand.
+    Contact points are created from the shapes when a motion begins, not by the user.
 
     Parameters
     ----------
     name : str
-        ``"ball-floor"``, with a number where two bodies have several.
+        ``"ball-floor"``, with a number if two bodies have several.
     body_i, body_j : str
-        Bodies of F and M; ``"ground"`` for what stands still.
+        Bodies of F and M; ``"ground"`` is the world.
     frames : two tuples of 12 numbers
-        F and M in the world as drawn: origin, rotation row by row.
+        F and M in the world in the reference configuration: origin, rotation row by row.
     gap : tuple of 9 numbers
-        The row that says how far apart the sides are: its kind, its parameters.
+        The row of the distance between the sides: its kind, its parameters.
     seen : tuple of 9 numbers
-        The same as it is watched while they are apart, where that is another.
+        The row that is monitored while the contact is open, if it is a different one.
     slips : tuples of 9 numbers
-        The rows that say how fast the sides slide, one in the plane and two in space; none without friction.
+        The rows of the sliding velocities, one in the plane and two in space; none without friction.
     friction : two numbers
-        Coefficients of rest and of sliding.
+        Coefficients of static and sliding friction.
     restitution : number
     """
 
@@ -49,35 +49,35 @@ class Touch(TwoFrameForce):
     friction: tuple[float, float] = (0.0, 0.0)
     restitution: float = 0.0
 
-    kind: ClassVar[int] = 1000  # behind all others; no formula of its own: it acts by its switches
+    kind: ClassVar[int] = 1000  # behind all other kinds; no formula of its own: it acts by its switches
     outputs: ClassVar[dict[str, str]] = {"gap": "m", "normal": "N", "friction": "N", "slip": "m/s"}
     sliding: ClassVar[bool] = True
 
     @property
     def radius(self) -> float:
-        """Of the ball about M's origin; 0 of a corner."""
+        """Return the radius of the ball about M's origin; 0 for a corner."""
         return self.gap[7] if int(self.gap[0]) == displacement.KIND else self.gap[4]
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame]:
-        """Its frames."""
+        """Return its frames."""
         F, M = ((np.array(x[:3]), np.array(x[3:]).reshape(3, 3)) for x in self.frames)
         return {"F": F, "M": M}
 
     def acts(self) -> bool:
-        """Whether there is friction."""
+        """Return whether there is friction."""
         return bool(self.slips)
 
     def conservative(self) -> bool:
-        """What is smooth takes nothing."""
+        """Return whether it is frictionless and so dissipates nothing."""
         return not self.slips
 
     def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[float, float]:
-        """The face that its corner is on, and 0."""
+        """Return the face on which its corner is, and 0."""
         f, m = ((tuple(p), tuple(R.ravel())) for p, R in (F, M))
         return corner_on_box.foot(self.gap[1:], f, m, 0.0, None), 0.0
 
     def switches(self) -> tuple[Switch, ...]:
-        """The gap, and the slip along each tangent."""
+        """Return the gap switch, and a slip switch for each tangent."""
         seen = () if self.seen is None else (("F", "M", _row(self.seen)),)
         out = [Switch(STOP, "gap", path=(("F", "M", _row(self.gap)),), seen=seen)]
         for k, slip in enumerate(self.slips):
@@ -89,7 +89,7 @@ class Touch(TwoFrameForce):
         return tuple(out)
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
-        """Of the gap its least value and the restitution, of a slip both coefficients."""
+        """Return, for the gap, its least value and the restitution; for a slip both coefficients."""
         return (0.0, np.inf, self.restitution) if label == "gap" else () if label == "edge" else self.friction
 
 

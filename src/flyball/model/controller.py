@@ -1,8 +1,8 @@
-"""Sensors, and what every controller declares: states of its own, signals that laws may name, and its inputs.
+"""Sensors and the base class of controllers: states, signals that laws may name, and inputs.
 
-A controller is described by formulas in the language of laws, whose names are those of its own states, its own
-signals and its inputs. A state of a continuous controller has a rate, one of a sampled controller a next value. A
-sampled controller holds its signals from one instant to the next: to laws they are states, too.
+A controller is described by formulas in the language of laws, whose names are those of its own states, its own signals
+and its inputs. A state of a continuous controller has a rate, one of a sampled controller a next value. The signals of
+a sampled controller are constant between instants: laws treat them as states, too.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ class Sensor(Element):
     """A measured quantity with a name of its own.
 
     Positions, angles, lengths and their rates may be named in the laws of forces; positions, angles and lengths in
-    those of drivers too. Whatever depends on accelerations (reactions, accelerations themselves) is an output only.
-    Sampling never forces the integrator to a step.
+    those of drivers too. Quantities that depend on accelerations (reactions, accelerations themselves) are outputs
+    only. Sensors never limit the integrator's steps.
 
     Parameters
     ----------
@@ -45,16 +45,16 @@ class Sensor(Element):
 
 @element
 class IMU(Element):
-    """An inertial measurement unit fixed on a body: what accelerometers and gyroscopes in it would show.
+    """An inertial measurement unit fixed on a body: the readings of accelerometers and gyroscopes.
 
-    Its curves are the specific force ``fx``, ``fy``, ``fz`` [m/s^2] (acceleration of its origin less gravity) and the
+    Its curves are the specific force ``fx``, ``fy``, ``fz`` [m/s^2] (acceleration of its origin minus gravity) and the
     angular velocity ``wx``, ``wy``, ``wz`` [rad/s], both along its own axes. In the plane: ``fx``, ``fy``, ``w``.
 
     Parameters
     ----------
     name : str
     frame : str
-        Body or frame that it is fixed to; it has its origin and axes.
+        Body or frame to which it is fixed, with the frame's origin and axes.
     """
 
     frame: str = field(kw_only=False)
@@ -67,11 +67,11 @@ class IMU(Element):
 
 
 OUTPUT = "output"
-"""What a single output is called if nobody names it."""
+"""Default name of a single output."""
 
 
 class ControlState(NamedTuple):
-    """One number that a controller keeps.
+    """One state variable of a controller.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class ControlState(NamedTuple):
     law : str
         Formula of its rate; of a sampled controller, of the value from the next sample on.
     initial : float
-        What it begins with, a number in ``n`` of `Controller.states`.
+        Initial value, from the fields ``n`` of `Controller.states`.
     """
 
     name: str
@@ -89,7 +89,7 @@ class ControlState(NamedTuple):
 
 @dataclass(frozen=True)
 class Controller(Element, ABC):
-    """A controller: what laws of forces and motors, and expressions of events, may name.
+    """Base class of controllers, whose signals laws of forces and motors, and expressions of events, may name.
 
     ``pid`` is the output of the controller of that name, ``pid.error`` another signal, ``pid.integral`` a state.
     """
@@ -101,26 +101,26 @@ class Controller(Element, ABC):
 
     category: ClassVar[str] = "controllers"
     compared: ClassVar[tuple[str, ...]] = ()
-    """Signals that pictures show beside one another: what is to be followed, and what follows."""
+    """Signals that plots show together: reference and response."""
 
     @property
     def sampled(self) -> bool:
-        """Whether it acts at instants: offset, offset + period, offset + 2 period, ..."""
+        """Return whether it is sampled: it then acts at offset, offset + period, offset + 2 period, ..."""
         return self.period is not None
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """Those of its signals that it is there for."""
+        """Return the names of its output signals."""
         return (OUTPUT,)
 
     @property
     def bare(self) -> str:
-        """The signal that the bare name stands for: its output; none where there are several."""
+        """Return the signal that the controller's bare name means: its output; empty if there are several."""
         return self.output_names[0] if len(self.output_names) == 1 else ""
 
     @property
     def holds(self) -> bool:
-        """Whether it holds its signals from one instant to the next; if not they follow from its states."""
+        """Return whether its signals are constant between instants; otherwise they follow from its states."""
         return self.sampled
 
     def ends(self) -> dict[str, str]:
@@ -128,47 +128,47 @@ class Controller(Element, ABC):
         return {}
 
     def check(self, n: SimpleNamespace) -> None:
-        """Refuse instants that are none."""
+        """Refuse invalid sampling instants."""
         positive(self, n, "period")
         if n.period is None and n.offset != 0.0:
             raise ModelError(f"{self.title}: offset does nothing without period; leave it out")
 
     def ordered(self) -> tuple[str, str] | None:
-        """Two of what it is given of which the first must not exceed the second; it has no output where it does."""
+        """Return two of its inputs, the first of which must not exceed the second; otherwise there is no output."""
         return None
 
     def unlimited(self) -> Controller:
-        """The same without limits of its output; itself where it has none."""
+        """Return the controller without limits of its output; itself if it has none."""
         return self
 
     def smoother(self, state: str) -> str:
-        """What to give instead where the rate of a state jumps by what this controller is; empty: laws of the user."""
+        """Return the remedy if the controller itself makes the rate of a state jump; empty if only user laws can."""
         return ""
 
     @abstractmethod
     def given(self) -> dict[str, Any]:
-        """Laws of the user's by the names that formulas know them by: inputs, gains, limits."""
+        """Return the user's laws by the names that the formulas use: inputs, gains, limits."""
 
     def called(self, given: str) -> str:
-        """What messages call something that it is given."""
+        """Return the name of an input for messages."""
         return "input" if given == "of" else given
 
     @abstractmethod
     def signals(self) -> dict[str, str]:
-        """Name of each signal -> its formula, outputs first."""
+        """Return the formulas of the signals by name, outputs first."""
 
     @abstractmethod
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
-        """Its states; ``n`` holds the resolved fields."""
+        """Return its states; ``n`` contains the resolved fields."""
 
 
 def numbered_names(letter: str, count: int) -> tuple[str, ...]:
-    """Names of so many states or signals: x1, x2; of one only the letter."""
+    """Return names of states or signals: x1, x2, ...; for a single one only the letter."""
     return (letter,) if count == 1 else tuple(f"{letter}{k + 1}" for k in range(count))
 
 
 def refuse_equal(e: Controller, names: Any) -> None:
-    """Refuse states and signals of one name, and names that are no plain words."""
+    """Refuse states and signals of equal names, and names that are not plain words."""
     seen: set[str] = set()
     for name in names:
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):

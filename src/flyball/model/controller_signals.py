@@ -1,8 +1,8 @@
 """Signals of controllers as expressions of measured quantities, time, parameters and the controllers' states.
 
-Where a law names a controller, the formula of its output is substituted, so that all readers of laws know it,
-nonsmooth points of limits included. A state is a name such as ``pid.integral``, which laws read as they read a
-sensor. Algebraic loops of signals are solved where each signal is linear in the others.
+If a law names a controller, the formula of its output is substituted, so that all analyses of laws, such as the search
+for nonsmooth points, include the controller. A state is a name such as ``pid.integral``, which laws read like a sensor.
+Algebraic loops of signals are solved if each signal is linear in the others.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ if TYPE_CHECKING:
 
 
 ZERO, ONE = (SyntaxNode("number", (), x) for x in (0.0, 1.0))
-SINGULAR_GAIN = 1e-9  # of 1: what is left of a loop's own gain below which it says nothing of its signal
+SINGULAR_GAIN = 1e-9  # distance of a loop's gain from 1 below which the loop does not determine its signal
 
 
 def solve_loop(tree: SyntaxNode, name: str, whose: str, ring: str) -> SyntaxNode:
-    """What a signal is, by a formula of it in which its own name stands: y = a y + b gives b / (1 - a).
+    """Solve the formula of a signal that contains the signal itself: y = a y + b gives b / (1 - a).
 
     Parameters
     ----------
     tree : Node
     name : str
-        Of the signal.
+        Name of the signal.
     whose, ring : str
-        The controller and the signals on the way round, for messages.
+        The controller and the signals of the loop, for messages.
 
     Raises
     ------
     ModelError
-        If the formula is not linear in the signal, or any signal fulfils it, or none.
+        If the formula is not linear in the signal, or every value or none satisfies it.
     """
     parts = _linear(tree, name)
     if parts is None:
@@ -60,7 +60,7 @@ def solve_loop(tree: SyntaxNode, name: str, whose: str, ring: str) -> SyntaxNode
 
 
 def _folded(tree: SyntaxNode) -> SyntaxNode:
-    """The tree with sums, products and ratios of numbers in one."""
+    """Fold sums, products and ratios of numbers in the tree."""
     if not tree.args:
         return tree
     args = tuple(_folded(x) for x in tree.args)
@@ -72,7 +72,7 @@ def _folded(tree: SyntaxNode) -> SyntaxNode:
 
 
 def _linear(tree: SyntaxNode, name: str) -> tuple[SyntaxNode, SyntaxNode] | None:
-    """Factor and rest, a and b of a y + b, both without the name; None if it is not of this form."""
+    """Return a and b of a y + b, both without the name y; None if the tree does not have this form."""
     if all(n.kind != "name" or n.value != name for n in tree.walk()):
         return ZERO, _folded(tree)
     if tree.kind == "name":
@@ -123,13 +123,13 @@ def _over(x: SyntaxNode, y: SyntaxNode) -> SyntaxNode:
 
 
 MAX_OPERATIONS = 20_000
-"""Operations of one law, controllers' formulas in their places: longer ones are refused."""
+"""Largest number of operations of a law after substitution of controllers' formulas."""
 CONTROLLER_INPUT = LawOf(None, curves=True)
-"""What laws that controllers are given may use."""
+"""Names that laws of controllers' inputs may use."""
 
 
 class ConnectedState(NamedTuple):
-    """One state of a controller, wired; of a sampled one also a signal, which is held."""
+    """One state of a controller with its law in terms of measured quantities; for a sampled one also a held signal."""
 
     controller: Controller
     state: str
@@ -138,22 +138,22 @@ class ConnectedState(NamedTuple):
 
     @property
     def name(self) -> str:
-        """As laws read it: "pid.integral"."""
+        """Name in laws: "pid.integral"."""
         return f"{self.controller.name}.{self.state}"
 
 
 def controllers_by_name(model: Model) -> dict[str, Controller]:
-    """Controllers by name, those that are just being added too."""
+    """Return the controllers by name, including those that are being added."""
     return {c.name: c for c in (*model.controllers, *vars(model).get("_adding", ()))}
 
 
 def signal_names(model: Model) -> Collection[str]:
-    """All names of signals and states that laws may use."""
+    """Return all names of signals and states that laws may use."""
     return _signal_graph(model).names if controllers_by_name(model) else ()
 
 
 def substitute_signals(model: Model, law: Expression, of: LawOf) -> Expression:
-    """The law with formulas of controllers' signals in the places of their names; of a function its arguments are."""
+    """Replace controllers' signals in the law by their formulas; for a function in its arguments."""
     known = set(signal_names(model))
     if not law.names & known:
         return law
@@ -164,23 +164,24 @@ def substitute_signals(model: Model, law: Expression, of: LawOf) -> Expression:
 
 
 def signal_law(model: Model, e: Controller, name: str) -> Expression:
-    """A signal of a controller, or a state, as a law."""
+    """Return a signal or state of a controller as a law."""
     return Expression(f"{e.name}.{name}", _signal_graph(model).signal(e, name), None, f"{name} of {e.title}")
 
 
 def input_law(model: Model, e: Controller, name: str) -> Expression:
-    """What a controller is given, as a law."""
+    """Return an input of a controller as a law."""
     return Expression(name, _signal_graph(model).template(e, name), None, f"{e.called(name)} of {e.title}")
 
 
 def controller_states(model: Model) -> list[ConnectedState]:
-    """All states of all controllers: those with a rate; then of sampled ones signals, in the order in which they are
-    known, and states.
+    """Return all states of all controllers, in order of evaluation.
+
+    First those with a rate; then, of sampled controllers, held signals in the order of their dependence, and states.
 
     Raises
     ------
     ModelError
-        If signals of sampled controllers depend on each other in a ring.
+        If signals of sampled controllers depend on each other in a loop.
     """
     return (
         model.kept.get("wired", None, 1, lambda: _controller_states(model))
@@ -203,7 +204,7 @@ def _controller_states(model: Model) -> list[ConnectedState]:
 
 
 def _in_order(held: list[ConnectedState]) -> list[ConnectedState]:
-    """Signals that are held, each after those that it is said by at the same instant."""
+    """Return held signals, each after those on which it depends at the same instant."""
     waiting, out = {x.name: x for x in held}, list[ConnectedState]()
     while waiting:
         ready = [x for x in waiting.values() if not x.law.names & waiting.keys()]
@@ -215,7 +216,7 @@ def _in_order(held: list[ConnectedState]) -> list[ConnectedState]:
 
 
 def _loop_message(waiting: dict[str, ConnectedState]) -> str:
-    """What to say of signals that need each other at one instant."""
+    """Return the message on signals that depend on each other at one instant."""
     way = [next(iter(waiting))]
     while (name := next(iter(sorted(waiting[way[-1]].law.names & waiting.keys())))) not in way:
         way.append(name)
@@ -228,7 +229,7 @@ def _loop_message(waiting: dict[str, ConnectedState]) -> str:
 
 
 def check_controller(model: Model, e: Controller) -> None:
-    """Refuse a controller whose laws name what is not there, or depend on themselves."""
+    """Refuse a controller whose laws use unknown names or depend on themselves."""
     own = controller_names(model, e)
     refuse_equal(e, own)
     for name, law in e.given().items():
@@ -243,7 +244,7 @@ def check_controller(model: Model, e: Controller) -> None:
 
 
 def controller_names(model: Model, e: Controller) -> list[str]:
-    """Names of a controller's signals and states."""
+    """Return the names of a controller's signals and states."""
     return [*e.signals(), *(x.name for x in _signal_graph(model).states[e.name])]
 
 
@@ -252,7 +253,7 @@ def _signal_graph(model: Model) -> _SignalGraph:
 
 
 class _SignalGraph:
-    """The controllers of one model, as their formulas are put in place."""
+    """The controllers of one model, while their formulas are substituted."""
 
     def __init__(self, model: Model) -> None:
         self.model, self.all = model, controllers_by_name(model)
@@ -265,7 +266,7 @@ class _SignalGraph:
         self.names |= {name for name, e in self.all.items() if e.bare}
 
     def signal(self, e: Controller, name: str) -> SyntaxNode:
-        """A signal as an expression; solved for where it depends on itself, or refused."""
+        """Return a signal as an expression, solved for if it depends on itself, or refuse it."""
         key = e.name, name
         if key in self.known:
             return self.known[key]
@@ -280,12 +281,12 @@ class _SignalGraph:
         self.way.pop()
         if told in self.rings:
             tree = solve_loop(tree, told, e.title, self.rings[told])
-        if all(n.kind != "name" or n.value not in self.way for n in tree.walk()):  # of a ring it is known with the rest
+        if all(n.kind != "name" or n.value not in self.way for n in tree.walk()):  # in a loop it is known together with the others
             self.known[key] = tree
         return tree
 
     def template(self, e: Controller, text: str) -> SyntaxNode:
-        """A formula of a controller's own, of its signals, its states, and what it is given."""
+        """Return a controller's own formula of its signals, states and inputs."""
         tree = Expression.parse(text).tree
         given, own = e.given(), self.own[e.name]
 
@@ -298,14 +299,14 @@ class _SignalGraph:
         return self.limited(_at(_replaced(tree, found), 0), e.title)
 
     def law(self, value: Any, where: str) -> SyntaxNode:
-        """A law of the user's that a controller is given."""
+        """Return a user's law for a controller's input."""
         law = self.model.law(value, CONTROLLER_INPUT, where, whole=False)
         if law.function is None:
             return self.placed(law.tree)
         return self.placed(call_node(law.tree, self.model.names_in_laws(CONTROLLER_INPUT), law.text, where))
 
     def placed(self, tree: SyntaxNode) -> SyntaxNode:
-        """A law's tree with signals in place."""
+        """Return a law's tree with signals substituted."""
 
         def found(node: SyntaxNode) -> SyntaxNode | None:
             owner, dot, what = node.value.partition(".")
@@ -318,7 +319,7 @@ class _SignalGraph:
         return self.limited(_replaced(tree, found), "a law")
 
     def limited(self, tree: SyntaxNode, whose: str) -> SyntaxNode:
-        """The tree; refused if it is too long."""
+        """Return the tree; refuse it if it is too long."""
         if sum(1 for _ in tree.walk()) > MAX_OPERATIONS:
             raise ModelError(
                 f"{whose} is a formula of more than {MAX_OPERATIONS} operations, controllers that follow one another at the same "
@@ -328,7 +329,7 @@ class _SignalGraph:
 
 
 def _replaced(tree: SyntaxNode, found: Any) -> SyntaxNode:
-    """The tree with what ``found`` gives for names, at their places in the text."""
+    """Return the tree with names replaced by ``found``, at their positions in the text."""
     if tree.kind == "name":
         new = found(tree)
         return tree if new is None else _at(new, tree.start)
@@ -338,12 +339,12 @@ def _replaced(tree: SyntaxNode, found: Any) -> SyntaxNode:
 
 
 def _at(tree: SyntaxNode, start: int) -> SyntaxNode:
-    """The tree as if it stood at a place of no width."""
+    """Return the tree as if it were at a position of zero width."""
     return dataclasses.replace(tree, start=start, stop=start, args=tuple(_at(a, start) for a in tree.args))
 
 
 def refuse_in_driver(model: Model, law: Expression, where: str) -> None:
-    """Refuse controllers in the law of a driver, which needs derivatives that a controller's signals have not."""
+    """Refuse controllers in the law of a driver, which needs derivatives that controllers' signals do not have."""
     for name in sorted(law.names):
         owner = name.partition(".")[0]
         if owner in controllers_by_name(model):
@@ -354,7 +355,7 @@ def refuse_in_driver(model: Model, law: Expression, where: str) -> None:
 
 
 def refuse_unknown(model: Model, law: Expression) -> None:
-    """Refuse signals that a controller has not."""
+    """Refuse unknown signals of a controller."""
     all_, known = controllers_by_name(model), set(signal_names(model))
     for name in sorted(law.names - known):
         if name.partition(".")[0] in all_:
@@ -362,7 +363,7 @@ def refuse_unknown(model: Model, law: Expression) -> None:
 
 
 def _unknown(model: Model, name: str) -> str:
-    """What to say of a name whose owner is a controller."""
+    """Return the message on an unknown name whose owner is a controller."""
     owner, _, what = name.partition(".")
     e = controllers_by_name(model)[owner]
     own = controller_names(model, e)

@@ -1,7 +1,7 @@
-"""What every described thing shares: a name, frozen validated fields, numbers with units or expressions.
+"""Base class of all described elements: a name, frozen validated fields, numbers with units or expressions.
 
-Fields carry their dimension in their type, so that one walk turns whatever the user wrote (number, unit string,
-expression of parameters) into SI floats, and complains with the element's and the field's name.
+Field types carry their dimension, so that one function converts whatever the user wrote (number, unit string,
+expression of parameters) to SI floats, with messages that name the element and the field.
 """
 
 from __future__ import annotations
@@ -24,34 +24,34 @@ from ..errors import ModelError
 from .expressions import number
 
 T = TypeVar("T", bound=type)
-LARGEST_NUMBER = 1e50  # numbers of elements; what is computed from them holds products of several
-LONG_TEXT = 300  # letters of a value in a message
+LARGEST_NUMBER = 1e50  # largest numbers of elements; products of several of them must stay finite
+LONG_TEXT = 300  # characters of a value in a message
 
 
 @dataclass(frozen=True)
 class Unit:
-    """Dimension of a field, as an SI unit; any, if None."""
+    """Dimension of a field, as an SI unit; None: any."""
 
     dimension: str | None
 
 
 @dataclass(frozen=True)
 class Vector:
-    """A field that is a vector of the plane or of space, or several of them."""
+    """Marker of a field that is a vector of the plane or of space, or several of them."""
 
 
 @dataclass(frozen=True)
 class LawOf:
-    """A field that is an expression of time and measured inputs; its value has this dimension (any, if None)."""
+    """Marker of a field that is an expression of time and measured inputs; its value has this dimension (None: any)."""
 
     dimension: str | None
     inputs: tuple[str, ...] = ()
     curves: bool = False  # whether it may name curves of parts, such as A.angle
-    forces: bool = False  # and what parts carry, such as A.force
+    forces: bool = False  # whether it may name forces of parts, such as A.force
 
 
 def python_data(value: Any) -> Any:
-    """NumPy scalars and arrays become Python numbers and lists; a bool is no number."""
+    """Convert NumPy scalars and arrays to Python numbers and lists; refuse bool as a number."""
     if isinstance(value, bool):
         raise ValueError("a truth value is not a number")
     if isinstance(value, bytes):
@@ -64,7 +64,7 @@ def python_data(value: Any) -> Any:
 
 
 def _flag(value: Any) -> Any:
-    """True and false are nothing else: no "yes", no 1."""
+    """Accept only true and false: no "yes", no 1."""
     if hasattr(value, "item"):
         value = value.item()
     if not isinstance(value, bool):
@@ -73,7 +73,7 @@ def _flag(value: Any) -> Any:
 
 
 def _name(value: Any) -> Any:
-    """A text that is not empty."""
+    """Require a string that is not empty."""
     if not isinstance(value, str) or not value:
         raise ValueError("give a name")
     return value
@@ -110,8 +110,8 @@ CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 def element(cls: T) -> T:
-    """Make a class of frozen, validated fields; its own fields are keyword-only."""
-    if not _is_built_in(cls):  # its names may be gone when a first one is made: of a file that was run, of a function
+    """Class decorator for frozen, validated fields; the class's own fields are keyword-only."""
+    if not _is_built_in(cls):  # names of its types may be gone when a first instance is made
         frame = sys._getframe(1)
         cls.__annotations__ = inspect.get_annotations(
             cls, globals=frame.f_globals, locals={**frame.f_locals, **vars(cls)}, eval_str=True
@@ -137,7 +137,7 @@ def element(cls: T) -> T:
 
 @cache
 def _validator(cls: Any) -> Any:
-    """Pydantic's validator of a class, made when its first instance is: many classes never have one."""
+    """Return pydantic's validator of a class, created with its first instance: many classes never have one."""
     return TypeAdapter(cls).validator
 
 
@@ -149,7 +149,7 @@ class _Type(str):
 
 
 def _signature(cls: Any) -> inspect.Signature:
-    """The fields, those that need no name first: what editors and ``help`` show."""
+    """Return the signature with positional fields first, as editors and ``help`` show it."""
     parameters = []
     for f in dataclasses.fields(cls):
         kind = inspect.Parameter.KEYWORD_ONLY if f.kw_only else inspect.Parameter.POSITIONAL_OR_KEYWORD
@@ -161,7 +161,7 @@ def _signature(cls: Any) -> inspect.Signature:
 
 
 def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error: ValidationError) -> str:
-    """One line for each wrong field: element, field, value, rule, and the fields there are."""
+    """Return one line for each invalid field: element, field, value, rule, and the available fields."""
     known = [f.name for f in dataclasses.fields(cls)]
     name = kwargs.get("name", args[0] if args else None)
     who = f"{kind} {name!r}" if isinstance(name, str) else kind
@@ -171,7 +171,7 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
     if any(k >= len(known) for k in late):
         has = f"it has {len(known)}: {', '.join(known)}" if known else "it has none"
         return f"{kind}: {len(args)} values are given for its fields; {has}"
-    wrong: dict[str, list[str]] = {}  # field -> what it may be: a union complains once for each of its members
+    wrong: dict[str, list[str]] = {}  # field -> permitted types: a union reports one error for each member
     for e in error.errors():
         place = [str(p) for p in e["loc"] if not _is_branch(str(p))]
         where = place[0] if place else ""
@@ -212,12 +212,12 @@ _TYPES = {
 
 
 def _is_branch(place: str) -> bool:
-    """Names that pydantic gives to the members of a union."""
+    """Return whether this is a name that pydantic gives to a member of a union."""
     return "[" in place or place in ("float", "str", "tuple", "constrained-str", "none", "callable")
 
 
 def _short(value: Any) -> str:
-    """A value as it is written, cut where it is long: the vertices of a mesh, for instance."""
+    """Return a value as written, shortened if it is long (vertices of a mesh, for instance)."""
     text = repr(value)
     return text if len(text) <= LONG_TEXT else text[:LONG_TEXT] + "..."
 
@@ -238,7 +238,7 @@ class Element:
 
     category: ClassVar[str] = "elements"
     registry: ClassVar[dict[str, type[Element]]] = {}
-    modules: ClassVar[dict[str, set[str]]] = {}  # name of a class -> modules that have defined one of that name
+    modules: ClassVar[dict[str, set[str]]] = {}  # class name -> modules that have defined a class of that name
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -253,12 +253,12 @@ class Element:
 
     @staticmethod
     def of_type(name: str, where: str = "") -> type[Element]:
-        """The class that a ``type`` in a model file names.
+        """Return the class named by a ``type`` in a model file.
 
         Raises
         ------
         ModelError
-            If several modules define a class of that name; it begins with ``where``.
+            If several modules define a class of that name; the message begins with ``where``.
         """
         if len(modules := Element.modules[name]) > 1:
             raise ModelError(
@@ -269,33 +269,33 @@ class Element:
 
     @property
     def title(self) -> str:
-        """Kind and name, for messages."""
+        """Return kind and name, for messages."""
         return f"{type(self).__name__} {self.name!r}"
 
     def check(self, n: SimpleNamespace) -> None:
-        """Refuse numbers that make no sense; ``n`` holds the resolved fields."""
+        """Refuse invalid numbers; ``n`` contains the resolved fields."""
 
     def bound(self, model: Any) -> Element:
-        """This element as it is in a model whose other elements decide what it means; mostly itself."""
+        """Return the element with properties that depend on the model's other elements; by default itself."""
         return self
 
     def acts(self) -> bool:
-        """Whether its formula says what it does; if not, it is a row that holds at times (`switches`) and no more."""
+        """Return whether it acts by a formula; if not, it only has rows that are active at times (`switches`)."""
         return True
 
     def switches(self) -> tuple[Any, ...]:
-        """Rows with modes that it has in a motion (`model.switch.Switch`)."""
+        """Return its rows with modes in a motion (`model.force.Switch`)."""
         return ()
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
-        """Numbers of such a row: least and greatest value of its quantity, restitution, more by its kind.
+        """Return the numbers of such a row: least and greatest value of its quantity, restitution, more by its kind.
 
-        ``separation`` is how far its points are apart as drawn.
+        ``separation`` is the distance of its points in the reference configuration.
         """
         return ()
 
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
-        """Weights of the coordinates whose sum such a row acts along; 1 each if none are given."""
+        """Return the weights of the coordinates in the sum along which such a row acts; 1 each if not given."""
         return ()
 
 
@@ -307,7 +307,7 @@ _MARKED: dict[tuple[Any, Any], dict[str, Any]] = {}
 
 
 def fields_with(cls: Any, marker: Any) -> dict[str, Any]:
-    """Fields whose type carries a marker (``Unit`` or ``LawOf``), with that marker."""
+    """Return the fields whose type carries a marker (``Unit`` or ``LawOf``), with that marker."""
     if (cls, marker) not in _MARKED:
         hints = typing.get_type_hints(cls, include_extras=True)
         found = {}
@@ -327,7 +327,7 @@ def _markers(hint: Any) -> list[Any]:
 
 
 def resolve(e: Element, env: Mapping[str, float]) -> SimpleNamespace:
-    """The element's fields with every number in SI floats; laws and other fields as they are written."""
+    """Return the element's fields with every number in SI floats; laws and other fields as written."""
     n = SimpleNamespace(**{f.name: getattr(e, f.name) for f in dataclasses.fields(e)})
     for name, unit in fields_with(e.__class__, Unit).items():
         setattr(n, name, si_numbers(getattr(e, name), env, unit.dimension, f"{name} of {e.title}"))
@@ -335,7 +335,7 @@ def resolve(e: Element, env: Mapping[str, float]) -> SimpleNamespace:
 
 
 def si_numbers(value: Any, env: Mapping[str, float], dimension: str | None, where: str) -> Any:
-    """What was written, a number or nested lists of them, in SI units; ``where`` is what it is, for messages."""
+    """Convert a number or nested lists of numbers to SI units; ``where`` describes it in messages."""
     if value is None:
         return None
     if isinstance(value, (tuple, list)):
@@ -346,7 +346,7 @@ def si_numbers(value: Any, env: Mapping[str, float], dimension: str | None, wher
 
 
 def checked_size(value: Any, dimension: str | None, where: str) -> Any:
-    """The number; refused if it is so large that nothing can be computed with it."""
+    """Return the number; refuse one too large to compute with."""
     if not abs(value) <= LARGEST_NUMBER:
         unit = f" {dimension}" if dimension not in (None, "", "1") else ""
         raise ModelError(
@@ -356,13 +356,13 @@ def checked_size(value: Any, dimension: str | None, where: str) -> Any:
 
 
 def written_fields(e: Any) -> dict[str, Any]:
-    """The fields that differ from their defaults, as plain data: what a model file holds."""
+    """Return the fields that differ from their defaults, as plain data for a model file."""
     out: dict[str, Any] = {}
     for f in dataclasses.fields(e):
         value = getattr(e, f.name)
         if hasattr(value, "tolist"):
             value = value.tolist()
-        if value == f.default and repr(value) == repr(f.default):  # -0.0 equals 0.0, yet is not the same
+        if value == f.default and repr(value) == repr(f.default):  # -0.0 equals 0.0, but is written differently
             continue
         if value is not None:
             out[f.name] = _data(value)
@@ -378,7 +378,7 @@ def _data(value: Any) -> Any:
 
 
 def field_with(e: Element, *values: str) -> str:
-    """The field that holds one of these texts, for messages: "body_i: "; nothing if there is none."""
+    """Return the field that contains one of these texts, for messages: "body_i: "; empty if there is none."""
     for f in dataclasses.fields(e):
         given = getattr(e, f.name)
         texts = given if isinstance(given, tuple) else (given,)

@@ -1,11 +1,12 @@
-"""Laws of forces and drivers as a whole: inputs added to them, and those that may jump.
+"""Laws of forces and drivers: inputs added to them, and refusal of laws that may jump.
 
-An input is something added to the law of a force or a driver, or to a parameter. It becomes a parameter of a copy
-of the model, zero there, so that the derivative by an input is one by a parameter: nothing needs to be known of the
+An input is a term added to the law of a force or a driver, or to a parameter. It becomes a parameter of a copy of the
+model, with the value zero, so that the derivative with respect to an input is one with respect to a parameter, for any
 element.
 
-A motion that meets a jump of a force at an instant that depends on its course changes by a further term there (the
-saltation matrix: Aizerman and Gantmakher 1958). Sensitivities do not follow it: such laws are refused.
+When a motion meets a jump of a force at an instant that depends on the motion, its derivative changes by a further term
+there (the saltation matrix: Aizerman and Gantmakher 1958). Sensitivities do not include this term: such laws are
+refused.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Input:
-    """An input: the parameter of the copied model that it is, its unit, and the driver that it moves, if any."""
+    """An input: its parameter in the copied model, its unit, and the driver that it moves, if any."""
 
     name: str
     parameter: str
@@ -62,7 +63,7 @@ def with_inputs(model: Model, names: Sequence[str]) -> tuple[Model, list[Input]]
             raise ModelError(f"{model.name!r} has no input {name!r}{suggest(name, there)}; {listing(there)}")
         e, field, at, of = known[name]
         parameter = f"input_{k}_of_{''.join(c if c.isalnum() else '_' for c in name)}"
-        while parameter in out.parameters:  # a preload's
+        while parameter in out.parameters:  # input of a preload
             parameter += "_"
         out.parameters[parameter] = 0.0
         _replace_law(out, e, field, at, of, parameter)
@@ -71,7 +72,7 @@ def with_inputs(model: Model, names: Sequence[str]) -> tuple[Model, list[Input]]
 
 
 def _input_unit(model: Model, e: Driver | Force, of: LawOf) -> str:
-    """Of what is added; the effort along a coordinate is a force or a torque."""
+    """Return the unit of the added term; an effort along a coordinate is a force or a torque."""
     if of.dimension:
         return of.dimension
     along = getattr(e, "coordinate", None)
@@ -79,7 +80,7 @@ def _input_unit(model: Model, e: Driver | Force, of: LawOf) -> str:
 
 
 def possible_inputs(model: Model) -> dict[str, tuple[Any, str, int, LawOf]]:
-    """Inputs of a mechanism besides its parameters: name -> (element, field of the law, which component, what of)."""
+    """Return the inputs besides the parameters: name -> (element, field of the law, component, measured quantity)."""
     out: dict[str, tuple[Any, str, int, LawOf]] = {}
     for d in model.drivers:
         out[d.name] = (d, "law", -1, LawOf(model.unit(d.coordinate, d)))
@@ -96,7 +97,7 @@ def possible_inputs(model: Model) -> dict[str, tuple[Any, str, int, LawOf]]:
 
 
 def _replace_law(model: Model, e: Driver | Force, field: str, at: int, of: LawOf, parameter: str) -> None:
-    """Put a copy of the element, to whose law the parameter is added, in its place."""
+    """Replace the element by a copy with the parameter added to its law."""
     current = model[e.name]
     value = getattr(current, field)
     if at >= 0:
@@ -107,7 +108,7 @@ def _replace_law(model: Model, e: Driver | Force, field: str, at: int, of: LawOf
 
 
 def _law_with_input(model: Model, e: Driver | Force, law: Any, of: LawOf, parameter: str) -> str:
-    """The law with the parameter added; both in SI units."""
+    """Return the law with the parameter added; both in SI units."""
     known = model.law(law, of, e.title, driver=isinstance(e, Driver))
     return parameter if known is None else f"({known}) + {parameter}"
 
@@ -120,12 +121,12 @@ SMOOTH_ALTERNATIVES = (
 
 
 def refuse_jumping_laws(model: Model, to: Sequence[str]) -> None:
-    """Refuse laws that decide by the motion, or at a time that is one of the parameters asked for.
+    """Refuse laws that branch on the motion, or at a time that depends on one of the given parameters.
 
     Raises
     ------
     ModelError
-        Naming the element and what its law decides by.
+        Naming the element and the deciding quantity.
     """
     for title, law in force_and_driver_laws(model):
         if by := _deciding_quantity(law, model, to):
@@ -136,7 +137,7 @@ def refuse_jumping_laws(model: Model, to: Sequence[str]) -> None:
 
 
 def refuse_jumping_rates(model: Model, to: Sequence[str]) -> None:
-    """The same of the rates of controllers' states."""
+    """Refuse such laws for the rates of controllers' states."""
     for x in controller_states(model):
         if by := _deciding_quantity(x.law, model, to):
             instead = x.controller.smoother(x.state) or SMOOTH_ALTERNATIVES
@@ -147,7 +148,7 @@ def refuse_jumping_rates(model: Model, to: Sequence[str]) -> None:
 
 
 def _deciding_quantity(law: Expression, model: Model, to: Sequence[str]) -> str:
-    """What a law decides by at instants that parameters shift; empty if it does not."""
+    """Return the quantity that a law branches on at instants that parameters shift; empty if there is none."""
     for node in law.tree.walk():
         if node.kind in DECIDING_OPERATORS:
             names = {n.value for n in node.walk() if n.kind == "name"}
@@ -159,7 +160,7 @@ def _deciding_quantity(law: Expression, model: Model, to: Sequence[str]) -> str:
 
 
 def force_and_driver_laws(model: Model) -> Iterator[tuple[str, Expression]]:
-    """Titles of forces and drivers with their laws."""
+    """Return the titles of forces and drivers with their laws."""
     given: list[tuple[Any, Any, LawOf]] = [(d, d.law, LawOf(model.unit(d.coordinate, d))) for d in model.drivers]
     for e in model.forces:
         for field, of in fields_with(e.__class__, LawOf).items():

@@ -17,7 +17,7 @@ from .messages import suggest
 
 @dataclass(frozen=True)
 class Action:
-    """Something that an `Event` does at its instant."""
+    """An action of an `Event` at its instant."""
 
     registry: ClassVar[dict[str, type[Action]]] = {}
 
@@ -27,32 +27,32 @@ class Action:
 
     @property
     def title(self) -> str:
-        """Its kind, and what it is about, for messages."""
+        """Return its kind and its target, for messages."""
         about = self.about()
         return f"{type(self).__name__} of {about!r}" if about else type(self).__name__
 
     def about(self) -> str:
-        """What it acts on: a parameter, joint, coordinate, element or body; nothing if empty."""
+        """Return its target: a parameter, joint, coordinate, element or body; empty if none."""
         return ""
 
     @property
     def told(self) -> str:
-        """What it does, in words."""
+        """Return a description of what it does."""
         return f"{type(self).__name__} {self.about()}".strip()
 
     def laws(self) -> tuple[tuple[str, Law], ...]:
-        """Its expressions, evaluated at the instant: (field, what was written)."""
+        """Return its expressions, evaluated at the instant: (field, as written)."""
         return ()
 
 
 @element
 class Stop(Action):
-    """The motion ends there, with success: ``do=[fb.Stop()]``."""
+    """End the motion successfully: ``do=[fb.Stop()]``."""
 
 
 @element
 class Note(Action):
-    """A text to go with the event in the list of what happened; nothing is done.
+    """A text for the event's entry in the event list; it has no other effect.
 
     Parameters
     ----------
@@ -64,81 +64,81 @@ class Note(Action):
 
 @element
 class Set(Action):
-    """A parameter has another value from then on, and all that is written with it; or a state of a controller has.
+    """Set a parameter, and everything that depends on it, or a state of a controller to a new value.
 
-    It may change forces, laws and masses, but not where anything is: a length that bodies hang on cannot jump.
+    It may change forces, laws and masses, but not positions: a length that determines positions cannot jump.
 
     Parameters
     ----------
     parameter : str
-        Or a state of a controller, which goes on from that value: ``"pid.integral"``.
+        Or a state of a controller, which continues from that value: ``"pid.integral"``.
     value : number, or an expression of parameters, ``t``, sensors and curves such as ``A.angle``
-        Its value from then on, reckoned at the instant, all parameters as they were before: ``"2*k"`` doubles k.
+        The new value, evaluated at the instant with the old parameters: ``"2*k"`` doubles k.
     """
 
     parameter: Name = field(kw_only=False)
     value: Number = field(kw_only=False)
 
     def about(self) -> str:
-        """The parameter."""
+        """Return the parameter."""
         return self.parameter
 
     def laws(self) -> tuple[tuple[str, Law], ...]:
-        """The value."""
+        """Return the value."""
         return (("value", self.value),)
 
 
 @element
 class Lock(Action):
-    """A joint or coordinate holds where it is then; its velocity is taken away by an impulse.
+    """Lock a joint or coordinate at its current value; an impulse removes its velocity.
 
     Parameters
     ----------
     what : str
         A joint (all its coordinates), or one coordinate, ``"A.angle"`` or ``"slider.x"``. Also a joint, limit or rope
-        that was released: it holds again.
+        that was released: it becomes active again.
     """
 
     what: Name = field(kw_only=False)
 
     def about(self) -> str:
-        """The joint or coordinate."""
+        """Return the joint or coordinate."""
         return self.what
 
 
 @element
 class Release(Action):
-    """What was locked moves freely again; a joint that no event locks, a limit or a rope lets go.
+    """Unlock what was locked; or deactivate a joint that no event locks, a limit or a rope.
 
     Parameters
     ----------
     what : str
-        A joint or coordinate that some event locks; a joint that none does, whose bodies part; a limit; a rope.
+        A joint or coordinate that some event locks; another joint, whose bodies then separate; a limit; a rope.
     """
 
     what: Name = field(kw_only=False)
 
     def about(self) -> str:
-        """What is let go."""
+        """Return what is released."""
         return self.what
 
 
 @element
 class Impulse(Action):
-    """A blow: velocities change at once, through all constraints.
+    """An impulse: velocities change instantaneously, consistent with all constraints.
 
     Parameters
     ----------
     on : str
-        A body, a frame fixed on one, at whose origin it acts, or a coordinate such as ``"A.angle"``.
+        A body, a frame fixed on one (the impulse acts at its origin), or a coordinate such as ``"A.angle"``.
     impulse : two or three numbers [N s], or one along a coordinate [N s] or [N m s]
-        Numbers, or expressions of parameters, ``t``, sensors and curves, reckoned at the instant.
+        Numbers, or expressions of parameters, ``t``, sensors and curves, evaluated at the instant.
     at : point [m]
-        Of the body, where it acts, in world coordinates of the drawn configuration; the centre of mass if not given.
+        Point of action on the body, in world coordinates of the drawn configuration; the centre of mass if not given.
     torque : number, or three numbers [N m s]
-        Impulse of a torque on the body: about the normal in a planar mechanism.
+        Angular impulse on the body: about the normal in a planar mechanism.
     axes : ``"world"`` or ``"body"``
-        Whose axes the components are along.
+        Axes of the components.
     """
 
     on: Name = field(kw_only=False)
@@ -162,22 +162,22 @@ class Impulse(Action):
     }
 
     def about(self) -> str:
-        """The body or coordinate."""
+        """Return the body or coordinate."""
         return self.on
 
     def laws(self) -> tuple[tuple[str, Law], ...]:
-        """All components."""
+        """Return all components."""
         pairs = (("impulse", self.impulse), ("torque", self.torque))
         return tuple((k, x) for k, given in pairs for x in component_list(given))
 
 
 def component_list(given: Any) -> tuple[Any, ...]:
-    """Components of a vector; one of a number; none of nothing."""
+    """Return the components of a vector; a number as one; none for None."""
     return () if given is None else given if isinstance(given, tuple) else (given,)
 
 
 def _actions(value: Any) -> Any:
-    """Actions, or plain data of a model file that says their type."""
+    """Convert plain data of a model file with a type to actions."""
     if isinstance(value, Mapping):
         fields = dict(value)
         kind, known = fields.pop("type", None), sorted(Action.registry)
@@ -208,7 +208,7 @@ OPENING, CLOSING = "([{", ")]}"
 
 
 def _count(value: Any) -> Any:
-    """A whole number from 1."""
+    """Convert to a whole number of at least 1."""
     value = python_data(value)
     if value is not None and (not isinstance(value, int) or value < 1):
         raise ValueError("give a whole number from 1")
@@ -217,25 +217,28 @@ def _count(value: Any) -> Any:
 
 @element
 class Event(Element):
-    """Something happens when a quantity passes zero: it is noted in ``run.events``, and what ``do`` says is done.
+    """An event at the zero crossing of a quantity: it is recorded in ``run.events``, and the actions ``do`` are
+    executed.
 
-    The instant is found to the tolerance of the motion. Names are those that laws know (``t``, parameters, sensors,
-    tables), curves of positions and velocities: ``A.angle``, ``A.angle_rate``, ``slider.vx``, ``spring.length``, and
-    what joints, ropes, stops, friction, springs along coordinates and drivers carry: ``A.fx``, ``A.force`` (its size),
+    The instant is located to the tolerance of the motion. Names are those of laws (``t``, parameters, sensors, tables),
+    curves of positions and velocities: ``A.angle``, ``A.angle_rate``, ``slider.vx``, ``spring.length``, and forces of
+    joints, ropes, stops, friction, springs along coordinates and drivers: ``A.fx``, ``A.force`` (magnitude),
     ``rope.tension``, ``D.effort``.
 
     Parameters
     ----------
     name : str
     when : expression, or Python function
-        The event is where it passes zero, or becomes true: ``"A.angle - pi/2"`` and ``"A.angle > pi/2"`` are the same.
-        ``"start"``: at the start of the motion, before all else.
+        The event occurs when it crosses zero, or becomes true: ``"A.angle - pi/2"`` and ``"A.angle > pi/2"`` are the
+        same. ``"start"``: at the start of the motion, before everything else.
     direction : {"rising", "falling", "either"}
-        Which way it passes zero.
+        Direction of the zero crossing.
     do : list of actions
-        `Stop`, `Set`, `Lock`, `Release`, `Impulse`, `Note`; all at once. Only noted if there is none.
+        `Stop`, `Set`, `Lock`, `Release`, `Impulse`, `Note`; all simultaneous. If there is none, the event is only
+        recorded.
     times : int
-        How often it happens at most; however often if not given. A motion that goes on from a result counts on.
+        Largest number of occurrences; unlimited if not given. A motion that continues from a result continues the
+        count.
     """
 
     when: Law = field(kw_only=False)
@@ -254,33 +257,33 @@ class Event(Element):
 
     @property
     def at_start(self) -> bool:
-        """Whether it happens at the start of the motion."""
+        """Return whether it occurs at the start of the motion."""
         return self.when == START
 
     @cached_property
     def law(self) -> Law:
-        """What passes zero: of a comparison the difference of its sides."""
+        """Return the event function; for a comparison the difference of its sides."""
         return comparison_difference(self.when, self) if isinstance(self.when, str) else self.when
 
     @property
     def of(self) -> LawOf:
-        """What its expressions may use."""
+        """Return what its expressions may use."""
         return LawOf(None, curves=True, forces=True)
 
     @property
     def told(self) -> str:
-        """When it is, and what it does, in words."""
+        """Return a description of its condition and actions."""
         way = "" if self.at_start or self.direction == "rising" else f" ({self.direction})"
         often = "" if self.times is None else f", at most {self.times} times" if self.times > 1 else ", once"
         return f"{self.when}{way}{often}: {', '.join(a.told for a in self.do) or 'noted'}"
 
     def laws(self) -> tuple[tuple[str, Law], ...]:
-        """All its expressions: where each stands, and what was written."""
+        """Return all its expressions: location, and text as written."""
         own = () if self.at_start else ((f"when of {self.title}", self.law),)
         return own + tuple((f"{k} of {a.title} in {self.title}", x) for a in self.do for k, x in a.laws())
 
     def check(self, n: SimpleNamespace) -> None:
-        """Refuse what means nothing at the start."""
+        """Refuse fields that have no meaning at the start."""
         if not self.at_start:
             return
         for name, usual in (("direction", "rising"), ("times", None)):
@@ -291,12 +294,12 @@ class Event(Element):
 
 
 def comparison_difference(text: str, e: Event) -> str:
-    """An expression whose rise through zero is where a comparison becomes true; what is none is itself.
+    """Return an expression that rises through zero when a comparison becomes true; other expressions are unchanged.
 
     Raises
     ------
     ModelError
-        If there are several comparisons, or words between them.
+        If there are several comparisons, or logical operators.
     """
     sides = comparison_sides(text, e)
     if sides is None:
@@ -306,7 +309,7 @@ def comparison_difference(text: str, e: Event) -> str:
 
 
 def comparison_sides(text: str, e: Event) -> tuple[str, str] | None:
-    """Both sides of a comparison, first the one that is to be less; None if it is none. See `comparison_difference`."""
+    """Return both sides of a comparison, the smaller one first; None if it is none. See `comparison_difference`."""
     depth, found = 0, []
     for k, c in enumerate(text):
         depth += (c in OPENING) - (c in CLOSING)

@@ -1,4 +1,4 @@
-"""Whether what an event names exists, and whether its actions are consistent."""
+"""Checks of events: names exist, and actions are consistent."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LockTarget:
-    """What an action holds or lets go.
+    """What an action locks or releases.
 
     Attributes
     ----------
     coordinates : tuple of str
-        Coordinates that are locked, each by a row of its own: ``"A.angle"``.
+        Locked coordinates, each with its own row: ``"A.angle"``.
     joint : str
-        Or the joint whose own rows hold or let go.
+        Or the joint whose own rows are switched on or off.
     element : str
-        Or the limit or rope that is in force or not.
+        Or the limit or rope that is switched on or off.
     """
 
     coordinates: tuple[str, ...] = ()
@@ -39,17 +39,17 @@ class LockTarget:
     element: str = ""
 
     def keys(self) -> tuple[str, ...]:
-        """What must not be locked and released at one instant."""
+        """Return what must not be locked and released at the same instant."""
         return self.coordinates or (self.joint or self.element,)
 
 
 def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
-    """What it is that ``a`` holds or lets go.
+    """Return what the action ``a`` locks or releases.
 
     Raises
     ------
     ModelError
-        If there is no such part, or it has nothing to be locked or released.
+        If there is no such part, or it cannot be locked or released.
     """
     what = f"{e.title}: {a.title}"
     if "." in a.what:
@@ -84,17 +84,17 @@ def lock_target(model: Model, e: Event, a: Lock | Release) -> LockTarget:
 
 
 def _locked_somewhere(model: Model, e: Event, names: set[str]) -> bool:
-    """Whether an event locks one of these."""
+    """Return whether an event locks one of these."""
     every = (*(x for x in model.events if x.name != e.name), e)
     return any(isinstance(a, Lock) and a.what in names for x in every for a in x.do)
 
 
 VALUE_LAW = LawOf(None, curves=True)
-"""What values that events set may use."""
+"""Names that the values of event actions may use."""
 
 
 def check_event(model: Model, e: Event) -> None:
-    """Refuse names that are not there, expressions that never change, and actions that contradict one another.
+    """Refuse unknown names, expressions that never change, and contradictory actions.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def check_event(model: Model, e: Event) -> None:
 
 
 def _check_when(model: Model, e: Event) -> None:
-    """It names something that changes along a motion."""
+    """Require that the condition depends on something that changes during a motion."""
     law = model.law(e.law, e.of, f"when of {e.title}")
     set_anywhere = {a.parameter for x in (*model.events, e) for a in x.do if isinstance(a, Set)}
     _refuse_unlike(model, e)
@@ -126,7 +126,7 @@ def _check_when(model: Model, e: Event) -> None:
 
 
 def _refuse_unlike(model: Model, e: Event) -> None:
-    """A curve is compared with a quantity of its own kind: no length with an angle."""
+    """Require that a curve is compared with a quantity of its own kind: not a length with an angle."""
     if not isinstance(e.when, str) or (sides := comparison_sides(e.when, e)) is None:
         return
     for curve, quantity in (sides, sides[::-1]):
@@ -171,7 +171,7 @@ def _refuse_driven(e: Event, a: Action, d: Driver, text: str) -> None:
 
 
 def _check_impulse(model: Model, e: Event, a: Impulse) -> None:
-    """On a body it has two or three components, along a coordinate one."""
+    """Require two or three components on a body, one along a coordinate."""
     what = f"{e.title}: {a.title}"
     if a.impulse is None and a.torque is None:
         raise ModelError(f"{what}: it is none; give impulse=..., such as fb.Impulse('ball', (1, 0))")
@@ -200,7 +200,7 @@ def _check_impulse(model: Model, e: Event, a: Impulse) -> None:
 
 
 def coordinate_of(model: Model, e: Event, a: Impulse) -> str:
-    """The coordinate that an impulse acts along: one that is named, or the only one of a joint."""
+    """Return the coordinate along which an impulse acts: one that is named, or the only one of a joint."""
     found = model.find(a.on)
     if "." in a.on:
         model.coordinate(a.on, e)
@@ -226,7 +226,7 @@ def _components(what: str, name: str, given: Any, n: int, example: str) -> None:
 
 
 def _refuse_contradictions(model: Model, e: Event) -> None:
-    """Each thing is done to once; what is locked is not released at the same instant."""
+    """Require that there is one action for each target, and that nothing is locked and released at the same instant."""
     done: dict[str, Action] = {}
     for a in e.do:
         if isinstance(a, (Lock, Release)):

@@ -1,8 +1,7 @@
 """The parser of expressions: text such as ``"5*sin(t)"`` to a tree of known operations.
 
-The grammar is Python's own; nothing is ever executed. A quantity may stand in a formula where parentheses or
-commas enclose it: ``"(60 rpm)*t"``, ``"sin(30 deg)"``. A Python function may stand in place of a formula: the
-names of its arguments say what it is given.
+The grammar is Python's own; nothing is executed. A formula may contain a quantity between parentheses or commas: ``"(60
+rpm)*t"``, ``"sin(30 deg)"``. A Python function may replace a formula: its arguments are passed by name.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from .units import split_quantity, to_si
 
 CONSTANTS = {"pi": math.pi, "e": math.e}
 
-# Functions a user may call, and the names of their arguments.
+# functions a user may call, and the names of their arguments
 FUNCTIONS = {
     **{
         name: ("x",)
@@ -58,13 +57,13 @@ _BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**
 _COMPARE = {ast.Lt: ("<", False), ast.LtE: ("<=", False), ast.Gt: ("<", True), ast.GtE: ("<=", True)}
 _CONDITIONS = ("<", "<=", "and", "or", "not")
 _MAX_DEPTH = 200
-_ENCLOSED = re.compile(r"(?<=[(,])[^(),<>]*(?=[),])")  # all that stands between parentheses or commas
+_ENCLOSED = re.compile(r"(?<=[(,])[^(),<>]*(?=[),])")  # text between parentheses or commas
 _WORDS = re.compile(r"\b(if|else|and|or|not|is|for|lambda)\b")
 
 
 @dataclass(frozen=True)
 class SyntaxNode:
-    """One operation of an expression: what, on what, and from where to where it stands in the text."""
+    """One operation of an expression: operator, operands, and its start and end in the text."""
 
     kind: str
     args: tuple[SyntaxNode, ...] = ()
@@ -73,7 +72,7 @@ class SyntaxNode:
     stop: int = 0
 
     def walk(self) -> Iterator[SyntaxNode]:
-        """This node and all below it."""
+        """Yield this node and all nodes below it."""
         yield self
         for arg in self.args:
             yield from arg.walk()
@@ -97,7 +96,7 @@ def tree_text(node: SyntaxNode) -> str:
 
 
 def parse_text(text: str, tables: Collection[str] = (), curves: bool = False) -> tuple[str, SyntaxNode]:
-    """The text on one line, and its tree; `ExpressionError` if it is not a formula.
+    """Return the text on one line, and its tree; `ExpressionError` if it is not a formula.
 
     ``tables``: names of tables; ``curves``: whether names may have dots, such as A.angle.
     """
@@ -117,7 +116,7 @@ def parse_text(text: str, tables: Collection[str] = (), curves: bool = False) ->
 
 
 def _masked(text: str) -> tuple[str, dict[str, tuple[float, int]]]:
-    """The text with a name, which no user can have meant, in place of each quantity; its value and its length."""
+    """Replace each quantity in the text by a name that no user can have meant; return also its value and length."""
     quantities: dict[str, tuple[float, int]] = {}
     spare = (c for c in map(chr, range(0x4E00, 0x9FA0)) if c not in text)
 
@@ -139,7 +138,7 @@ def _masked(text: str) -> tuple[str, dict[str, tuple[float, int]]]:
 
 
 class _Reader:
-    """Turns Python's syntax tree into nodes, refusing all that is no formula."""
+    """Converts Python's syntax tree into nodes and refuses everything that is not a formula."""
 
     def __init__(
         self,
@@ -150,7 +149,7 @@ class _Reader:
         curves: bool = False,
     ) -> None:
         self.text = text
-        self.masked = masked  # as Python reads it, as long as the text
+        self.masked = masked  # text as Python parses it, with unchanged length
         self.quantities = quantities
         self.tables, self.curves = tables, curves
         self.depth = 0
@@ -176,7 +175,7 @@ class _Reader:
         return SyntaxNode(kind, tuple(args), value, *self.span(node))
 
     def span(self, node: Any) -> tuple[int, int]:
-        """Where a node stands, in characters (Python counts bytes)."""
+        """Return the position of a node, in characters (Python counts bytes)."""
         data = self.masked.encode()
         start, stop = node.col_offset, node.end_col_offset
         return len(data[:start].decode()), len(data[:stop].decode())
@@ -206,7 +205,7 @@ class _Reader:
         return self.made(node, "name", value=node.id)
 
     def read_Attribute(self, node: ast.Attribute) -> SyntaxNode:
-        """A curve of a part, such as A.angle: a name with a dot."""
+        """Convert a curve of a part, such as A.angle: a name with a dot."""
         owner: ast.AST = node
         while isinstance(owner, ast.Attribute):
             owner = owner.value
@@ -274,7 +273,7 @@ _ALLOWED = "allowed are numbers, names, + - * / **, parentheses and functions su
 
 
 def refuse_expression(text: str, start: int, stop: int, problem: str, remedy: str) -> NoReturn:
-    """Raise `ExpressionError` with the text (of long ones the part that matters) and a caret under the place."""
+    """Raise `ExpressionError` with the text (only the relevant part of a long one) and a caret under the position."""
     first, last = max(0, start - 60), max(start, 60) + 40
     shown = ("..." if first else "") + text[first:last].rstrip() + ("..." if last < len(text) else "")
     start, stop = (x - first + (3 if first else 0) for x in (start, min(stop, last)))
@@ -294,18 +293,18 @@ def _remedy(text: str) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """The question after the nearest known names, or nothing."""
+    """Return the question with the nearest known names, or nothing."""
     close = difflib.get_close_matches(name, list(known), n=2, cutoff=0.6)
     return f"did you mean {' or '.join(repr(c) for c in close)}? " if close else ""
 
 
-MAX_ARGUMENTS = 6  # arguments that a function may take
+MAX_ARGUMENTS = 6  # largest number of arguments of a function
 
 _OPEN = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
 
 
 def function_tree(function: Callable[..., Any]) -> tuple[str, SyntaxNode]:
-    """Stand-in text and tree of a function: a node "function" whose arguments are names.
+    """Return a substitute text and the tree of a function: a node "function" whose arguments are names.
 
     An argument with a default is a node "optional" around its name (or "keyword" if it can be given by keyword only),
     with the default as its value.
@@ -347,12 +346,12 @@ def function_tree(function: Callable[..., Any]) -> tuple[str, SyntaxNode]:
 
 
 def function_arguments(node: SyntaxNode, known: Collection[str]) -> list[SyntaxNode]:
-    """What a function is given where these names are known: names, and defaults that stand before one of them.
+    """Return the arguments of a function for these known names: names, and defaults in front of one of them.
 
     Raises
     ------
     ExpressionError
-        If they are too many, or cannot be given by place.
+        If there are too many, or they cannot be passed by position.
     """
     name = function_name(node.value)
     given: list[SyntaxNode] = []
@@ -383,7 +382,7 @@ def function_arguments(node: SyntaxNode, known: Collection[str]) -> list[SyntaxN
 
 
 class FunctionCall(NamedTuple):
-    """What a node "called" calls, with its arguments' names for messages: a function as a part of an expression."""
+    """Callable of a node "called", with its arguments' names for messages: a function inside an expression."""
 
     function: Callable[..., Any]
     names: tuple[str, ...]
@@ -392,16 +391,16 @@ class FunctionCall(NamedTuple):
 
 
 def call_node(node: SyntaxNode, known: Collection[str], text: str, where: str) -> SyntaxNode:
-    """A function as a part of an expression: its arguments are nodes as any other's.
+    """Return a function as a part of an expression: its arguments are ordinary nodes.
 
     Parameters
     ----------
     node : Node
         The function's.
     known : collection of str
-        Names that it may be given.
+        Names that may be passed to it.
     text, where : str
-        What it is, and what it is the law of, for messages.
+        The function and the law's owner, for messages.
     """
     given = tuple(function_arguments(node, known))
     names = tuple("" if x.kind == "number" else x.value for x in given)
@@ -409,14 +408,14 @@ def call_node(node: SyntaxNode, known: Collection[str], text: str, where: str) -
 
 
 def function_name(function: Any) -> str:
-    """Name of a function for messages; a lambda is called lambda."""
+    """Return the name of a function for messages; "lambda" for a lambda."""
     function = getattr(function, "func", function)  # functools.partial
     name = str(getattr(function, "__name__", type(function).__name__))
     return "lambda" if name == "<lambda>" else name
 
 
 def apply_function(function: Callable[..., Any], *args: Any) -> Any:
-    """Value of a function on numbers; of arrays element by element, as it is written for numbers."""
+    """Return the value of a function; for arrays element by element, since it is written for numbers."""
     args = tuple(float(a) if isinstance(a, int) else a for a in args)
     if not any(isinstance(a, np.ndarray) for a in args):
         return function(*args)
@@ -432,7 +431,7 @@ _BETWEEN = ("+", "-", "*", "/", "**", "<", "<=", "and", "or")
 
 
 def expression_text(node: SyntaxNode, names: Mapping[str, str]) -> str:
-    """The text of a formula, with other names where ``names`` has some.
+    """Return the text of a formula, with names replaced according to ``names``.
 
     Raises
     ------

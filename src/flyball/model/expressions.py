@@ -1,8 +1,8 @@
-"""What a user may write where a number is wanted: a number, a quantity ("30 deg"), an expression ("2*k").
+"""Numbers, quantities ("30 deg") and expressions ("2*k") as users write them.
 
-Expressions are trees of known operations (`expression_parser`), evaluated here on numbers, arrays and symbols,
-and compiled to bytecode in `laws`. Laws may call tables by name, and a Python function may stand in place of a
-law. Named parameters may be numbers, quantities, or expressions of each other in any order.
+Expressions are trees of known operations (`expression_parser`), evaluated here on numbers, arrays and symbols, and
+compiled to bytecode in `laws`. Laws may call tables by name, and a Python function may replace a law. Named parameters
+may be numbers, quantities, or expressions of each other in any order.
 """
 
 from __future__ import annotations
@@ -48,11 +48,12 @@ class Expression:
     text: str
     tree: SyntaxNode = field(repr=False, compare=False)
     function: Callable[..., Any] | None = field(default=None, repr=False, hash=False)
-    where: str = field(default="", repr=False, compare=False)  # what it is the law of, for messages
+    where: str = field(default="", repr=False, compare=False)  # the law's owner, for messages
 
     @classmethod
     def parse(cls, text: str, tables: Collection[str] = (), curves: bool = False) -> Expression:
-        """Read an expression; ``tables`` are names that it may call like functions, ``curves``: dots in names.
+        """Parse an expression; ``tables`` are names that it may call like functions, ``curves``: whether names may have
+        dots.
 
         Raises
         ------
@@ -63,23 +64,23 @@ class Expression:
 
     @classmethod
     def of_function(cls, function: Callable[..., Any], where: str = "") -> Expression:
-        """The law that a Python function is; its arguments' names say what it is given.
+        """Return a law made of a Python function, whose arguments are passed by name.
 
         Raises
         ------
         ExpressionError
-            If its arguments have no fixed names, or are too many.
+            If its arguments have no fixed names, or there are too many.
         """
         return cls(*function_tree(function), function, where)
 
     @classmethod
     def constant(cls, value: float) -> Expression:
-        """The expression that is one number."""
+        """Return the expression of one number."""
         return cls(repr(float(value)), SyntaxNode("number", value=float(value)))
 
     @cached_property
     def names(self) -> frozenset[str]:
-        """Names of parameters, inputs and sensors used; of a function also those that it can do without."""
+        """Names of parameters, inputs and sensors used; for a function including optional ones."""
         return frozenset(node.value for node in self.tree.walk() if node.kind == "name")
 
     @cached_property
@@ -95,7 +96,7 @@ class Expression:
         return frozenset(node.value for node in self.tree.walk() if node.kind == "table")
 
     def require(self, known: Collection[str]) -> None:
-        """Raise `ExpressionError`, with the place and the nearest known names, if a name used is not known."""
+        """Raise `ExpressionError`, with the place and the nearest known names, if an unknown name is used."""
         for part in self._quantities:
             try:
                 refuse_attached(*part, {*known, *CONSTANTS}, None)
@@ -123,17 +124,18 @@ class Expression:
         refuse_expression(self.text, node.start, node.stop, f"unknown name '{name}'", listed)
 
     def evaluate(self, env: Mapping[str, Any], tables: Mapping[str, Table] | None = None) -> Any:
-        """Value with the names in `env`: numbers (real or complex), arrays, or SymPy symbols; and the tables it calls.
+        """Return the value for the names in `env`: numbers (real or complex), arrays, or SymPy symbols; and the tables
+        called.
 
         Out of a function's domain the value is nan or inf, not an error. Raises `ExpressionError` for unknown names.
-        What a Python function raises comes through.
+        Exceptions of a Python function are passed on.
         """
         self.require(env.keys())
         self.require_tables(tables or {})
         return _evaluate(self.tree, env, tables or {})
 
     def require_tables(self, known: Collection[str]) -> None:
-        """Raise `ExpressionError` if a table that it calls is not there."""
+        """Raise `ExpressionError` if a table that it calls does not exist."""
         for name in sorted(self.tables - set(known)) if self.tables else ():
             raise ExpressionError(f"'{self}': there is no table '{name}'; add the Table before the law that calls it")
 
@@ -152,7 +154,7 @@ class Expression:
 
 @lru_cache(maxsize=8192)
 def _parsed(text: str, tables: frozenset[str], curves: bool) -> Expression:
-    """The same text is read when an element is added, and again for each analysis."""
+    """Parse a text (cached: it is read when an element is added, and again for each analysis)."""
     return Expression(*parse_text(text, tables, curves))
 
 
@@ -190,7 +192,7 @@ def number(
         problem = f"'{value}' gives {result}" if isinstance(value, str | Expression) else f"the value is {value}"
         raise ModelError(f"{where}: {problem}, a finite number is wanted; {advice}")
     if isinstance(result, complex) and isinstance(value, str | Expression):
-        # complex numbers know roots and logarithms of negative ones, which the real function has not
+        # complex numbers have roots and logarithms of negative numbers, which the real function has not
         real = {name: x.real if isinstance(x, complex) else x for name, x in env.items()}
         return complex(number(value, real, dimension, where), result.imag)
     return result
@@ -204,10 +206,10 @@ def law_expression(
     names: Collection[str] = (),
     curves: bool = False,
 ) -> Expression:
-    """Turn what a user wrote as a law into an expression.
+    """Convert a law as written by a user to an expression.
 
     It may be a number, a quantity ("120 rpm"), a formula of t that may call ``tables``, or a Python function. ``names``
-    are those that the law may use, t besides; ``curves``: also those of parts, such as A.angle.
+    are those that the law may use besides t; ``curves``: whether it may use curves of parts, such as A.angle.
     """
     try:
         if isinstance(value, Expression):
@@ -222,7 +224,7 @@ def law_expression(
 
 
 def fold_constants(node: SyntaxNode, text: str) -> SyntaxNode:
-    """The tree with parts made of literals replaced by their value; `ExpressionError` if one is not finite."""
+    """Replace constant parts of the tree by their value; `ExpressionError` if one is not finite."""
     args = tuple(fold_constants(arg, text) for arg in node.args)
     if node.kind in ("step", "step5") and args[1].kind == args[3].kind == "number" and args[1].value == args[3].value:
         value = float(args[1].value)
@@ -238,12 +240,12 @@ def fold_constants(node: SyntaxNode, text: str) -> SyntaxNode:
 
 
 def is_number_text(text: str) -> bool:
-    """Whether a text is a number, with or without a unit, rather than an expression."""
+    """Return whether a text is a number, with or without a unit, rather than an expression."""
     return split_quantity(text) is not None
 
 
 def _number(value: Any, env: Mapping[str, Any], dimension: str | None, names: Collection[str]) -> Any:
-    if type(value) is float:  # first, as what comes most: Python asks for abstract kinds slowly
+    if type(value) is float:  # the most frequent case first: checks of abstract types are slow
         return value
     if type(value) is str:
         return _of_text(value, env, dimension, names)
@@ -269,10 +271,10 @@ def _number(value: Any, env: Mapping[str, Any], dimension: str | None, names: Co
 
 
 def _short(value: Any) -> str:
-    """A number as it is, or its first digits and how many there are."""
+    """Return a number as text, or its first digits and their count."""
     try:
         text = str(value)
-    except ValueError:  # Python writes no whole numbers of so many digits
+    except ValueError:  # Python does not print integers of so many digits
         return "this whole number"
     return text if len(text) <= 30 else f"{text[:10]}... ({len(text)} digits)"
 
@@ -380,7 +382,8 @@ _UNFOLDED = frozenset({"number", "name", "where", "<", "<=", "and", "or", "not",
 
 
 def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of named parameters, which may be numbers, quantities, or expressions of each other in any order.
+    """Return the values of named parameters, which may be numbers, quantities, or expressions of each other in any
+    order.
 
     Raises
     ------
@@ -409,7 +412,7 @@ def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def parameter_formulas(parameters: Mapping[str, Any]) -> dict[str, Expression]:
-    """Those of parameters that can be resolved which depend on others, each after those that it uses."""
+    """Return the parameters that depend on others, each after those that it uses."""
     formulas = {
         name: law_expression(value, None, f"parameter '{name}'")
         for name, value in parameters.items()
@@ -421,7 +424,7 @@ def parameter_formulas(parameters: Mapping[str, Any]) -> dict[str, Expression]:
 def resolve_changed(
     known: Mapping[str, Any], formulas: Mapping[str, Expression], changed: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """`resolve_parameters` with some changed to numbers: only these are found anew, and what depends on them.
+    """Resolve parameters again with some changed to numbers: only these and their dependents are evaluated.
 
     ``known`` are all values as they were, ``formulas`` those of `parameter_formulas`.
     """
@@ -437,7 +440,7 @@ def resolve_changed(
 
 
 def _in_order(formulas: Mapping[str, Expression]) -> list[str]:
-    """Names sorted so that each comes after those it uses."""
+    """Return names sorted so that each comes after those it uses."""
     order: dict[str, None] = {}
     for first in formulas:
         path = [first]

@@ -1,7 +1,7 @@
-"""What every force declares: formulas, parameters, laws, frames; one-sided elements and their switches.
+"""Base classes of forces: formulas, parameters, laws, frames; one-sided elements and their switches.
 
-A `Switch` is a row with modes: a constraint that holds at times (stops, friction, locks). `Unilateral` elements
-have a quantity that is free on one side, and held or pushed on the other.
+A `Switch` is a row with modes: a constraint that is active at times (stops, friction, locks). `Unilateral` elements
+have a quantity that is free on one side, and constrained or pushed on the other.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Force(Element):
 
     One family acts between a frame F and a frame M: ``inputs(par, F, M)`` (what its laws may depend on besides time)
     and ``wrench(par, F, M, laws, values)`` with the values of the inputs: force and torque on M at M's origin, world
-    axes; the reverse acts on F's body at the same point. The other acts along a measured quantity x:
-    ``effort(par, x, rate, laws, load)``, positive where it pushes x up (`CoordinateForce`). Either may have an
-    ``energy``. They stand in the subclass's file, as plain functions of numbers; ``kind`` numbers them.
+    axes; the reverse acts on F's body at the same point. The other acts along a measured quantity x: ``effort(par, x,
+    rate, laws, load)``, positive towards larger x (`CoordinateForce`). Either may have an ``energy``. Formulas are
+    plain functions of numbers in the subclass's file; ``kind`` numbers them.
     """
 
     category: ClassVar[str] = "forces"
@@ -41,40 +41,40 @@ class Force(Element):
     energy: ClassVar[Callable | None] = None
     outputs: ClassVar[dict[str, str]] = {}
     drawn: ClassVar[str] = ""
-    single: ClassVar[str] = ""  # "rope" or "friction": steps by impulses take it as a single row, not as a force
-    fails: ClassVar[str] = "Its numbers are too large"  # where its formulas give no number, and what to do
+    single: ClassVar[str] = ""  # "rope" or "friction": impulse time stepping treats it as a single row, not as a force
+    fails: ClassVar[str] = "Its numbers are too large"  # when its formulas return no number, and the remedy
 
     def ends(self) -> dict[str, str]:
-        """Role of each of its frames -> body or frame that it is on."""
+        """Return role of each of its frames -> its body or frame."""
         raise NotImplementedError
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
-        """Its frames in the world as drawn, if it says where they are; else they are those that it names."""
+        """Return its frames in the world in the reference configuration, if it is given by points; else None."""
         return None
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Up to sixteen numbers that the formulas see."""
+        """Return up to sixteen parameters of the formulas."""
         return ()
 
     def laws(self) -> tuple[Law | None, ...]:
-        """Up to three expressions that the formulas see."""
+        """Return up to three expressions of the formulas."""
         return ()
 
     def conservative(self) -> bool:
-        """Whether its energy is all that it ever takes or gives."""
+        """Return whether it only exchanges stored energy: no damping, no law."""
         return False
 
     def needs(self) -> str:
-        """Element whose numbers its own depend on too, which then are ``n.of``; none if empty."""
+        """Return another element whose numbers its own depend on, as ``n.of``; empty if none."""
         return ""
 
     def on_points(self) -> bool:
-        """Whether it sees of its frames no more than where their origins are, and makes no torque about them."""
+        """Return whether it depends only on the origins of its frames, and makes no torque about them."""
         return False
 
 
 def no_inputs(par, F, M):  # type: ignore[no-untyped-def]
-    """Nothing that laws may depend on."""
+    """Return zeros: laws have no inputs."""
     return 0.0 * M[0][0], 0.0 * M[0][0]
 
 
@@ -100,13 +100,13 @@ class TwoPointForce(Force):
         return {"F": (a, np.eye(3)), "M": (b, np.eye(3))}
 
     def on_points(self) -> bool:
-        """The line is all it needs."""
+        """Return True: the force depends on the two points only."""
         return True
 
 
 @dataclass(frozen=True)
 class TwoFrameForce(Force):
-    """A force and a torque between two frames that lie on one another when they are drawn at a point."""
+    """A force and a torque between two frames that coincide in the reference configuration."""
 
     body_i: str
     body_j: str
@@ -121,7 +121,7 @@ class TwoFrameForce(Force):
 
 @dataclass(frozen=True)
 class BodyForce(Force):
-    """A force or torque on one body, from outside."""
+    """An external force or torque on one body."""
 
     body: str
     inputs: ClassVar[Callable] = staticmethod(no_inputs)
@@ -136,42 +136,43 @@ class CoordinateForce(Force):
     """A force along a measured quantity: a joint's coordinate, or a sum of distances."""
 
     effort: ClassVar[Callable]
-    outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}  # value and rate first
-    dimensions: ClassVar[dict[str, tuple[str, str]]] = {  # of fields, along a displacement and about an angle
+    outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}  # names of its inputs, value and rate first
+    dimensions: ClassVar[dict[str, tuple[str, str]]] = {  # dimensions of fields for a displacement and for an angle
         "stiffness": ("N/m", "N*m/rad"),
         "damping": ("N*s/m", "N*m*s/rad"),
         "viscous": ("N*s/m", "N*m*s/rad"),
         "rest": ("m", "rad"),
         "force": ("N", "N*m"),
     }
-    not_negative: ClassVar[tuple[str, ...]] = ()  # laws that must not be
-    sign: ClassVar[float] = 1.0  # of the output that follows value and rate, relative to the effort
+    not_negative: ClassVar[tuple[str, ...]] = ()  # laws that must not be negative
+    sign: ClassVar[float] = 1.0  # sign of the output after value and rate, relative to the effort
 
     def ends(self) -> dict[str, str]:
         """No frames of its own."""
         return {}
 
     def coordinate_text(self) -> str:
-        """The coordinate that it acts along: ``"A.angle"``."""
+        """Return the coordinate along which it acts: ``"A.angle"``."""
         return ""
 
     def along(self) -> tuple[str, ...]:
-        """Coordinates whose sum it acts along, each times its weight (`switch_weights`); none if it has a path."""
+        """Return the coordinates of the sum along which it acts, with weights `switch_weights`; empty if it has a path.
+        """
         return (self.coordinate_text(),) if self.coordinate_text() else ()
 
     def outward(self, n: SimpleNamespace) -> float:
-        """1, or -1 where results tell its quantity, rate and effort the other way round than the formulas have them."""
+        """Return 1, or -1 if results reverse its quantity, rate and effort relative to the formulas."""
         return 1.0
 
     def examine(self, model: Model) -> None:
-        """Refuse what it cannot act along."""
+        """Refuse coordinates along which it cannot act."""
 
     def path(self) -> tuple[tuple[str, str, Row], ...]:
-        """Or the terms (role of F, role of M, formula) whose sum it acts along."""
+        """Return the terms (role of F, role of M, formula) of the sum along which it acts, if it has no coordinates."""
         return ()
 
     def on_points(self) -> bool:
-        """Its terms say."""
+        """Return whether its terms depend on points only."""
         return all(set("FM") <= set(formula.of_kind.points) for _, _, formula in self.path())
 
 
@@ -186,7 +187,7 @@ class JointForce(CoordinateForce):
         return f"{self.joint}.angle"
 
     def examine(self, model: Model) -> None:
-        """It acts about a joint, not on a body's angle."""
+        """Require the angle of a joint, not of a body."""
         model.joint(self.joint, self, "angle")
 
 
@@ -197,20 +198,20 @@ class Switch:
     Attributes
     ----------
     kind : int
-        STOP, FRICTION, ONE_WAY, LOCK, ELASTIC, RATCHET or SLIP of `constraints.modes`.
+        STOP, FRICTION, ONE_WAY, LOCK, ELASTIC, RATCHET or SLIP of `constraints.switch_kinds`.
     label : str
-        Which of the element's it is; empty if it has one.
+        Label of the switch; empty if the element has only one.
     along : tuple of str
         Coordinates (``"A.angle"``, ``"block.x"``) whose sum is the quantity, with weights if there are several.
     path : tuple of (role, role, Row)
         Or terms between frames of the element's own, such as the parts of a rope.
     seen : tuple of (role, role, Row)
-        What is measured in place of ``path``, where the row itself says less than that while it is off.
+        Terms measured in place of ``path`` while the row is off, if the row itself is not sufficient then.
     other : str
-        Label of the element's switch that it belongs to: of a slip, the gap.
+        Label of the element's switch that it depends on: for a slip, the gap.
     slides : bool
         Whether the element is a force along the same quantity that acts while the row is off (friction), or whose
-        corners are watched (what is elastic).
+        nonsmooth points are monitored (elastic elements).
     weighted : bool
         Whether a single coordinate has a weight too.
     """
@@ -226,7 +227,7 @@ class Switch:
 
     @property
     def summed(self) -> bool:
-        """Whether the quantity is a sum with weights (`Element.switch_weights`), and so the element's own."""
+        """Return whether the quantity is a weighted sum (`Element.switch_weights`), which belongs to the element."""
         return self.weighted or len(self.along) > 1
 
 
@@ -237,48 +238,48 @@ DIRECTIONS = (1.0, -1.0)
 class Unilateral(CoordinateForce):
     """A stop, a play, a latch: along a coordinate, or along a weighted sum of some.
 
-    A rigid one is a row that holds at times (`switches`), an elastic one a force with a corner. Of either a result
-    tells ``value`` and ``rate`` of the quantity, the ``force`` along it (positive where it pushes the value up), and
-    ``closed``: 1 where it holds or pushes at its lower side, -1 at its upper, 0 where it is open.
+    A rigid one is a row that is active at times (`switches`), an elastic one a force with a nonsmooth point. For both,
+    a result contains ``value`` and ``rate`` of the quantity, the ``force`` along it (positive towards larger values),
+    and ``closed``: 1 in contact at its lower side, -1 at its upper, 0 if open.
     """
 
     category: ClassVar[str] = "limits"
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort", "closed": "1"}
 
     def acts(self) -> bool:
-        """Whether it is a force: an elastic one."""
+        """Return whether it acts as a force: it does if it is elastic."""
         return getattr(self, "stiffness", None) is not None
 
     def check_range(self, n: SimpleNamespace, unit: str) -> None:
-        """Refuse sides that leave no room; ``unit`` is that of its quantity."""
+        """Refuse limits that leave no range; ``unit`` is that of its quantity."""
 
     def conservative(self) -> bool:
-        """Whether its energy is all that it ever takes or gives."""
+        """Return whether it has no damping, so that it only exchanges stored energy."""
         return getattr(self, "damping", 0.0) == 0.0
 
 
 @dataclass(frozen=True)
 class Latch(Unilateral):
-    """What may move one way: a coordinate, or the difference of two."""
+    """An element that allows one direction of motion: of a coordinate, or of the difference of two."""
 
     coordinate: str
 
     def along(self) -> tuple[str, ...]:
-        """The coordinate, and that which it is relative to."""
+        """Return the coordinate, and the one it is relative to."""
         other = getattr(self, "relative_to", None)
         return (self.coordinate,) if other is None else (self.coordinate, other)
 
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
-        """Such that the quantity may grow."""
+        """Return weights such that the quantity may increase."""
         way = float(n.direction.real)
         return (way, -way)[: len(self.along())]
 
     def outward(self, n: SimpleNamespace) -> float:
-        """As the user's coordinate goes."""
+        """Return the sign of the user's coordinate."""
         return float(n.direction.real)
 
     def examine(self, model: Model) -> None:
-        """Its coordinates are there, and of one kind."""
+        """Require existing coordinates of one kind."""
         for text in self.along():
             model.coordinate(text, self)
         if len(self.along()) == 2:
@@ -286,7 +287,7 @@ class Latch(Unilateral):
 
 
 def check_elastic(e: Element, n: SimpleNamespace, rigid: str = "a rigid one, which gives no way") -> None:
-    """Refuse a stiffness that is none, and what goes with the other kind of stop only."""
+    """Refuse an invalid stiffness, and fields of the other kind of stop."""
     positive(e, n, "stiffness", why=f"Leave it out for {rigid}")
     nonnegative(e, n, "damping")
     if n.stiffness is None and n.damping != 0.0:
@@ -301,13 +302,13 @@ def check_elastic(e: Element, n: SimpleNamespace, rigid: str = "a rigid one, whi
 
 
 def check_direction(e: Element, value: Any) -> None:
-    """Refuse a direction that is none."""
+    """Refuse an invalid direction."""
     if value not in DIRECTIONS:
         raise ModelError(f"{e.title}: direction is {value!r}; it must be 1 (the value may grow) or -1 (it may fall)")
 
 
 def check_same_kind(e: Any, model: Model, first: str, second: str) -> None:
-    """Refuse two coordinates of which one is an angle and the other a length, or that are the same."""
+    """Refuse two coordinates of different kinds, or the same coordinate twice."""
     if first == second:
         raise ModelError(f"{e.title}: {first!r} relative to itself never moves; name another, or leave it out")
     units = [model.unit(text, e) for text in (first, second)]

@@ -1,4 +1,4 @@
-"""Vectors and orientations as users write them, converted to NumPy arrays."""
+"""Conversion of vectors and orientations, as users write them, to NumPy arrays."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .element import Unit, python_data
 
 
 def vector(values: Any, planar: bool, what: str, direction: bool = False) -> np.ndarray:
-    """Three components from two (planar) or three; a direction comes back with unit length.
+    """Return three components from two (planar) or three; a direction is normalised.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def vector(values: Any, planar: bool, what: str, direction: bool = False) -> np.
 
 
 def triad(z: np.ndarray) -> np.ndarray:
-    """Right-handed axes (columns) with the given unit vector as z; the world's axes where z is vertical.
+    """Return right-handed axes (columns) with the given unit vector as z; the world's axes if z is vertical.
 
     The imaginary part of a complex z tilts the vertical by the shortest way.
     """
@@ -61,22 +61,23 @@ def rotation_about(axis: int, angle: float) -> np.ndarray:
 
 
 def quaternion_to_matrix(e: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a unit quaternion, scalar first."""
+    """Return the rotation matrix of a unit quaternion, scalar first."""
     return np.array(quaternion_matrix(*e)).reshape(3, 3)
 
 
 def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion, scalar first and not negative, of a rotation matrix; of many, (..., 3, 3), in one call."""
+    """Return the unit quaternion, scalar first and not negative, of a rotation matrix, or of many, (..., 3, 3)."""
     return quaternion_of(R)
 
 
 def orientation_matrix(value: Any, what: str) -> np.ndarray:
-    """Rotation matrix from a quaternion (4, scalar first), Bryant angles (3, about x, then y, then z) or a matrix.
+    """Return a rotation matrix from a quaternion (4, scalar first), Bryant angles (3, about x, then y, then z) or a
+    matrix.
 
     Raises
     ------
     ModelError
-        If it has another shape, a quaternion is zero, or a matrix is no rotation.
+        If it has another shape, a quaternion is zero, or a matrix is not a rotation.
     """
     a = np.asarray(value)
     if a.shape == (3, 3):
@@ -89,7 +90,7 @@ def orientation_matrix(value: Any, what: str) -> np.ndarray:
 
 
 def oriented(value: Any) -> Any:
-    """A rotation object (with ``as_quat`` or ``as_matrix``) becomes a quaternion, scalar first."""
+    """Convert a rotation object (with ``as_quat`` or ``as_matrix``) to a quaternion, scalar first."""
     if hasattr(value, "as_matrix"):
         value = matrix_to_quaternion(np.asarray(value.as_matrix()))
     value = python_data(value)

@@ -35,12 +35,12 @@ class ShapeMasses:
 
 
 def parallel_axis_term(mass: Any, d: np.ndarray) -> np.ndarray:
-    """Inertia of a point mass at d: m (d.d 1 - d d^T), the term of the parallel axis theorem (Hahn, eq. 4.26)."""
+    """Return the inertia of a point mass at d: m (d.d 1 - d d^T), the parallel axis term (Hahn, eq. 4.26)."""
     return mass * (inner_product(d, d) * np.eye(3) - np.outer(d, d))
 
 
 def checked_shapes(body: Body | Ground, env: Any, planar: bool) -> list[tuple[Solid, SimpleNamespace, str]]:
-    """The body's (or ground's) shapes with their numbers and what to call them in messages, every one checked."""
+    """Return the shapes of a body (or ground), checked, each with its numbers and its title for messages."""
     out = []
     shapes = body.shapes()
     for k, s in enumerate(shapes, 1):
@@ -58,7 +58,7 @@ def checked_shapes(body: Body | Ground, env: Any, planar: bool) -> list[tuple[So
 
 @contextmanager
 def _errors_located(where: str) -> Iterator[None]:
-    """Errors in here say where they happened."""
+    """Context manager that adds the location to error messages."""
     try:
         yield
     except ModelError as error:
@@ -97,7 +97,7 @@ def shape_masses(body: Body, n: SimpleNamespace, shapes: list[tuple[Solid, Simpl
 
 
 def _consistent(body: Body, n: SimpleNamespace, shapes: list[tuple[Solid, SimpleNamespace, str]]) -> None:
-    """Every shape has a mass in one way, and nothing that is given has no effect."""
+    """Require one source of mass for every shape, and no fields without effect."""
     own = [x.mass is not None or x.density is not None for _, x, _ in shapes]
     if n.mass is not None:
         if n.density is not None:
@@ -127,7 +127,7 @@ def _consistent(body: Body, n: SimpleNamespace, shapes: list[tuple[Solid, Simple
 
 
 TRIANGLE_TOLERANCE = 1e-9
-SYMMETRY_TOLERANCE = 1e-9  # a centre of mass that differs by less than this part of the body's size is the same
+SYMMETRY_TOLERANCE = 1e-9  # centres of mass that differ by less than this part of the body's size count as equal
 
 
 @dataclass(frozen=True)
@@ -137,21 +137,21 @@ class MassProperties:
     mass: float
     com: np.ndarray
     inertia: np.ndarray
-    volume: float | None = None  # of the shapes [m^3], where these give the inertia
+    volume: float | None = None  # volume of the shapes [m^3], if these give the inertia
 
 
 def mass_properties(body: Body, n: SimpleNamespace, env: Any, planar: bool) -> MassProperties:
     """Mass properties of a body with resolved fields ``n``.
 
-    Either mass and inertia are given, and shapes are for looks only; or the shapes that are not for looks only give
-    the centre of mass and the inertia, and the mass unless it is given. In a planar mechanism only the inertia about
-    z counts, and the centre of mass in the plane.
+    Either mass and inertia are given, and shapes are for display only; or the shapes (except display shapes) give the
+    centre of mass and the inertia, and the mass unless it is given. In a planar mechanism only the inertia about z and
+    the in-plane centre of mass are used.
 
     Raises
     ------
     ModelError
-        If mass or inertia is missing, given in two ways, negative, not symmetric, or breaks the triangle inequality
-        by more than 1e-9 of its size; if a shape makes no sense.
+        If mass or inertia is missing, given in two ways, negative, not symmetric, or breaks the triangle inequality by
+        more than 1e-9 of its size; if a shape is invalid.
     """
     if n.mass is not None and not n.mass.real > 0.0 and not _is_massless(n):
         why = (
@@ -175,7 +175,7 @@ def mass_properties(body: Body, n: SimpleNamespace, env: Any, planar: bool) -> M
 
 
 def _is_massless(n: SimpleNamespace) -> bool:
-    """Whether a body has neither mass nor inertia: a part that only joins others."""
+    """Return whether a body has neither mass nor inertia: a massless connecting part."""
     return (
         n.mass == 0.0
         and n.inertia is not None
@@ -220,7 +220,7 @@ def principal(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _from_shapes(body: Body, n: SimpleNamespace, planar: bool, heavy: list) -> MassProperties:
-    """Centre of mass and inertia from the shapes."""
+    """Return centre of mass and inertia from the shapes."""
     if not heavy:
         hint = "inertia=0.01" if planar else "inertia=(Ixx, Iyy, Izz)"
         why = "its shapes are for looks only; " if body.shapes() else ""
@@ -242,7 +242,7 @@ def _from_shapes(body: Body, n: SimpleNamespace, planar: bool, heavy: list) -> M
 
 
 def _from_numbers(body: Body, n: SimpleNamespace, planar: bool, heavy: list) -> MassProperties:
-    """What is given; nothing that shapes say of masses may stand beside it."""
+    """Return the given values; mass data of shapes are then refused."""
     if n.mass is None:
         why = "; inertia is given, so the shapes are for looks only: give" if heavy else "; give"
         raise ModelError(f"{body.title}: its mass is missing{why} mass=..., or leave inertia out and give a density")
@@ -260,7 +260,7 @@ def _from_numbers(body: Body, n: SimpleNamespace, planar: bool, heavy: list) -> 
 
 
 def _given(body: Body, n: SimpleNamespace, planar: bool, com: np.ndarray) -> np.ndarray:
-    """The inertia given, turned to the body's axes and moved to the centre of mass."""
+    """Return the given inertia in the body's axes about the centre of mass."""
     if planar:
         if isinstance(n.inertia, tuple):
             raise ModelError(f"{body.title}: in a planar mechanism inertia is one number, got {n.inertia}")
@@ -282,7 +282,7 @@ def _given(body: Body, n: SimpleNamespace, planar: bool, com: np.ndarray) -> np.
 
 
 def _matrix(body: Body, n: SimpleNamespace) -> np.ndarray:
-    """Three moments or a symmetric matrix, as a matrix."""
+    """Return three moments or a symmetric matrix as a matrix."""
     ragged = isinstance(n.inertia, tuple) and len({isinstance(x, tuple) and len(x) for x in n.inertia}) > 1
     a = np.zeros(0) if ragged else np.asarray(n.inertia)
     a = np.full(3, a) if a.shape == () and a == 0 else a
@@ -299,7 +299,7 @@ def _matrix(body: Body, n: SimpleNamespace) -> np.ndarray:
 
 
 def _check(body: Body, n: SimpleNamespace, found: MassProperties) -> None:
-    """Refuse an inertia that no body of positive mass has."""
+    """Refuse an inertia that is impossible for a body of positive mass."""
     a, b, c = _moments(found.inertia)
     slack = TRIANGLE_TOLERANCE * max(abs(c), abs(a))
     inside = "Its holes must lie inside the other shapes" if n.inertia is None else ""
@@ -326,7 +326,7 @@ def _moments(J: np.ndarray) -> np.ndarray:
 
 
 def _suspect_inertia(n: SimpleNamespace) -> str:
-    """What of the given inertia may be wrong."""
+    """Return the likely error in the given inertia."""
     if n.inertia_about is not None:
         return "Check whether inertia_about is the point that it is about"
     if isinstance(n.inertia, tuple) and isinstance(n.inertia[0], tuple):

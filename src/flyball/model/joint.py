@@ -1,4 +1,4 @@
-"""What every joint and coupling declares: constraint rows, relative coordinates, frames."""
+"""Base classes of joints and couplings: constraint rows, relative coordinates, frames."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 WorldFrame = tuple[np.ndarray, np.ndarray]
 
 Z_TO_X = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
-"""Turn of a frame whose x axis becomes the z axis of the frame it starts from."""
+"""Rotation of a frame whose x axis becomes the z axis of the original frame."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Coordinate:
     turn_F: tuple = ()
     turn_M: tuple = ()
     sign: float = 1.0
-    offset: str = ""  # the field that gives its value in the drawn configuration
+    offset: str = ""  # field with its value in the drawn configuration
 
     @property
     def unit(self) -> str:
@@ -44,22 +44,22 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class Primitive:
-    """One step of the chain that a joint is made of where it is a tree joint, from frame F to frame M."""
+    """One step, from frame F to frame M, of the chain that represents a joint as a tree joint."""
 
-    kind: str  # "R" turns about the axis, "P" slides along it, "S" turns about its point
-    axis: str = "z"  # of the frame it starts from; F as it has been moved
-    coordinate: str = ""  # the joint's coordinate that it is, if that has a name
+    kind: str  # "R" rotates about the axis, "P" slides along it, "S" rotates about the point
+    axis: str = "z"  # axis of the frame from which it starts; F as moved by the previous steps
+    coordinate: str = ""  # the joint's coordinate that it represents, if that has a name
 
 
 FLOATING = (Primitive("P", "x"), Primitive("P", "y"), Primitive("P", "z"), Primitive("S"))
-"""A chain that leaves everything free: for joints that have none of their own."""
+"""A chain of six free motions, for joints that have no chain of their own."""
 
 
 @dataclass(frozen=True)
 class Joint(Element):
     """Rows of constraint between a frame F on ``body_i`` and a frame M on ``body_j``.
 
-    A joint is data: a subclass states its ``blocks`` and ``coordinates`` and is finished.
+    A joint is data: a subclass only defines its ``blocks`` and ``coordinates``.
     """
 
     body_i: str
@@ -71,52 +71,54 @@ class Joint(Element):
     category: ClassVar[str] = "joints"
     blocks: ClassVar[tuple[Row, ...]] = ()
     coordinates: ClassVar[dict[str, Coordinate]] = {}
-    chain: ClassVar[tuple[Primitive, ...] | None] = None  # what it leaves free, slides first; None: no chain of its own
-    kept: ClassVar[tuple[Row, ...]] = ()  # blocks that its chain leaves to be fulfilled
-    rest: ClassVar[tuple[tuple[float, ...], ...]] = ()  # M in F, axes as columns, where every coordinate is zero
-    planar_normal: ClassVar[str] = "z"  # joint axis that points out of the plane; "" if it cannot be planar
+    chain: ClassVar[tuple[Primitive, ...] | None] = None  # its free motions, slides first; None: no chain of its own
+    kept: ClassVar[tuple[Row, ...]] = ()  # blocks that its chain does not satisfy by itself
+    rest: ClassVar[tuple[tuple[float, ...], ...]] = ()  # axes of M in F (columns) for zero coordinates
+    planar_normal: ClassVar[str] = "z"  # joint axis that becomes the normal of the plane; "" if it cannot be planar
     spatial: ClassVar[bool] = True
-    in_space: ClassVar[str] = "Prismatic"  # what to take in its place where it is for the plane only
+    in_space: ClassVar[str] = "Prismatic"  # replacement for a joint that exists in the plane only
     needs_axis: ClassVar[bool] = False
-    axisless: ClassVar[bool] = False  # no axis of that name is its own
+    axisless: ClassVar[bool] = False  # value for axes that have no name of their own
     drawn: ClassVar[str] = "fixed"  # symbol in pictures
-    replaceable: ClassVar[bool] = False  # whether a joint that holds less may take its place where rows are too many
-    stand_in: ClassVar[float] = 0.0  # what it costs to put it in such a place; 0: it is never proposed
-    omission: ClassVar[float] = 3.5  # what it costs to leave it out
-    called: ClassVar[str] = ""  # by proposals, if not by its kind
-    one_sided: ClassVar[bool] = False  # whether its first row stands for a contact that can push only
-    both_sides: ClassVar[str] = ""  # what says that such a contact is held on both sides after all, for messages
-    one_surface: ClassVar[bool] = False  # whether its coordinates are slips of one and the same surface
+    replaceable: ClassVar[bool] = False  # whether a joint with fewer constraints may replace it as a remedy for redundancy
+    stand_in: ClassVar[float] = 0.0  # cost of using it as a replacement; 0: it is never proposed
+    omission: ClassVar[float] = 3.5  # cost of leaving it out
+    called: ClassVar[str] = ""  # its name in proposals, if not its kind
+    one_sided: ClassVar[bool] = False  # whether its first row represents a contact that can only push
+    both_sides: ClassVar[str] = ""  # the field that makes such a contact two-sided, for messages
+    one_surface: ClassVar[bool] = False  # whether its coordinates are slips of one surface
     thread: ClassVar[bool] = False  # whether its surface is a thread, along which all its coordinates slide together
 
     def ends(self) -> dict[str, str]:
-        """Role of each of its frames -> body or frame that it is on."""
+        """Return role of each of its frames -> its body or frame."""
         return {"F": self.body_i, "M": self.body_j}
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
-        """Its frames in the world as drawn, if it says where they are; else they are those that it names."""
+        """Return its frames in the world in the reference configuration, if it is given by ``at``; else None."""
         return None if n.at is None else dict(zip("FM", self.world_frames(n, planar), strict=True))
 
     def rows(self, planar: bool) -> list[Row]:
-        """The rows that count: in the plane, those that speak of the normal are fulfilled anyway."""
+        """Return its active rows: in the plane, rows about the normal are always satisfied."""
         return list(_rows(type(self), planar))  # type: ignore[arg-type]
 
     def primitives(self, planar: bool) -> tuple[Primitive, ...]:
-        """Its chain as a tree joint: in the plane, what leaves it falls away."""
+        """Return its chain as a tree joint, reduced to the plane if planar."""
         return _primitives(type(self), planar)  # type: ignore[arg-type]
 
     def loose(self, planar: bool) -> list[Row]:
-        """The rows that remain where it is a tree joint."""
+        """Return the rows that remain if it is a tree joint."""
         return [r for r in self.rows(planar) if self.chain is None or r in self.kept]
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
-        """F and M (origin, rotation) in world coordinates of the drawn configuration, for a joint given by ``at``."""
+        """Return F and M (origin, rotation) in world coordinates of the drawn configuration, for a joint given by
+        ``at``.
+        """
         p = vector(n.at, planar, f"'at' of {self.title}")
         R = self.orientation(n.axis, planar)
         return (p, R), (p, R)
 
     def orientation(self, axis: tuple[float, ...] | None, planar: bool) -> np.ndarray:
-        """Axes of the joint frame: z along the joint's axis; in the plane one axis is the normal."""
+        """Return the axes of the joint frame: z along the joint's axis; in the plane one axis is the normal."""
         if axis is None:
             if self.needs_axis and (not planar or self.planar_normal != "z"):
                 example = "(1, 0)" if planar else "(0, 0, 1)"
@@ -135,25 +137,25 @@ class Joint(Element):
         return triad(a)
 
     def measured(self, planar: bool) -> dict[str, Coordinate]:
-        """Its relative coordinates: in the plane, those along the normal fall away."""
+        """Return its relative coordinates, reduced to the plane if planar."""
         if not planar:
             return self.coordinates
         return {k: c for k, c in self.coordinates.items() if self.planar_normal not in c.row.axes or not c.row.axes}
 
     def offset(self, n: SimpleNamespace, coordinate: str) -> float:
-        """Value of a coordinate in the drawn configuration."""
+        """Return the value of a coordinate in the drawn configuration."""
         name = self.coordinates[coordinate].offset
         return getattr(n, name) if name else 0.0
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """Parameters 0 to 6 of a row, given the drawn frames; the last is what its value is compared with.
+        """Return parameters 0 to 6 of a row for the drawn frames; the last is subtracted from its value.
 
-        Of a `ConstraintRow` up to six: what its formula gets as ``par``, in SI units.
+        For a `ConstraintRow` up to six: ``par`` of its formula, in SI units.
         """
         return row.par[:7]
 
     def row_parameters(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """The same, seven.
+        """Return the same, padded to seven.
 
         Raises
         ------
@@ -169,21 +171,21 @@ class Joint(Element):
         return (*par, *(0.0,) * (7 - len(par)))
 
     def weight(self, n: SimpleNamespace, coordinate: str, F: WorldFrame, M: WorldFrame) -> float:
-        """Coefficient of a coordinate that is added to a row (``Row.plus``)."""
+        """Return the coefficient of a coordinate that is added to a row (``Row.plus``)."""
         raise NotImplementedError
 
     def pushing_sign(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> float | None:
-        """Sign of the first row's force while a one-sided contact pushes; 0 if unknown, None if both sides hold."""
+        """Return the sign of the first row's force while a one-sided contact pushes; 0: unknown, None: two-sided."""
         return 1.0
 
     def curves(self, n: SimpleNamespace) -> tuple[list[float], ...]:
-        """Splines that its rows read, as flat lists of numbers (see ``math.spline``)."""
+        """Return the splines that its rows read, as flat lists of numbers (see ``math.spline``)."""
         return ()
 
 
 @cache
 def _rows(kind: type[Joint], planar: bool) -> tuple[Row, ...]:
-    """The rows that count; of all joints of a kind the same."""
+    """Return the active rows of all joints of a kind (cached)."""
     if not planar:
         return kind.blocks
     return tuple(r for r in kind.blocks if ("z" if r.world else kind.planar_normal) not in r.axes)
@@ -191,7 +193,7 @@ def _rows(kind: type[Joint], planar: bool) -> tuple[Row, ...]:
 
 @cache
 def _primitives(kind: type[Joint], planar: bool) -> tuple[Primitive, ...]:
-    """The chain as a tree joint; of all joints of a kind the same."""
+    """Return the chain of all joints of a kind as tree joints (cached)."""
     chain = FLOATING if kind.chain is None else kind.chain
     if not planar:
         return chain
@@ -202,30 +204,32 @@ def _primitives(kind: type[Joint], planar: bool) -> tuple[Primitive, ...]:
 
 @dataclass(frozen=True)
 class Coupling(Element):
-    """One row of constraint: a sum of coordinates, each with its weight, stays what it is when drawn.
+    """One constraint row: a weighted sum of coordinates keeps its reference value.
 
-    Whole turns of angles count, so a gear train holds its phase over any number of turns.
+    Full turns of angles are counted, so a gear train keeps its phase over any number of turns.
     """
 
     category: ClassVar[str] = "couplings"
-    omission: ClassVar[float] = 2.0  # what it costs to leave it out where rows are too many
+    omission: ClassVar[float] = 2.0  # cost of leaving it out as a remedy for redundancy
     drawn: ClassVar[str] = "coupler"
-    dimensions: ClassVar[dict[str, tuple[str, ...]]] = {}  # field -> units that its numbers may have
+    dimensions: ClassVar[dict[str, tuple[str, ...]]] = {}  # field -> permitted units
 
     def coupled(self) -> tuple[str, ...]:
-        """The coordinates: ``"joint.coordinate"``, or ``"body.x"``."""
+        """Return the coordinates: ``"joint.coordinate"``, or ``"body.x"``."""
         raise NotImplementedError
 
     def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
-        """A weight for each coordinate; ``axes(joint)`` is a joint's axis in the world as drawn."""
+        """Return a weight for each coordinate; ``axes(joint)`` is a joint's axis in the world in the reference
+        configuration.
+        """
         raise NotImplementedError
 
     def first_weight(self, n: SimpleNamespace) -> float:
-        """Weight of the first coordinate, as given."""
+        """Return the weight of the first coordinate, as given."""
         return 1.0
 
     def total(self, n: SimpleNamespace) -> float | None:
-        """What the weighted sum has to be; as drawn if None."""
+        """Return the required value of the weighted sum; None: that of the reference configuration."""
         return None
 
     def examine(self, model: Model) -> None:
@@ -233,7 +237,7 @@ class Coupling(Element):
 
 
 def shared_body(e: Coupling, model: Model, first: str, second: str, remedy: str) -> str:
-    """The body that both joints are on.
+    """Return the body that both joints share.
 
     Raises
     ------
@@ -251,5 +255,5 @@ def shared_body(e: Coupling, model: Model, first: str, second: str, remedy: str)
 
 
 def sense(model: Model, e: Coupling, joint: str, carrier: str) -> float:
-    """+1 if the joint's coordinate is that of the other body seen from the carrier, -1 if the reverse."""
+    """Return +1 if the joint's coordinate is that of the other body relative to the carrier, -1 if reversed."""
     return -1.0 if model.carrier(model[joint].body_j, e) == carrier else 1.0

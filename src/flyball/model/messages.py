@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def suggest(name: object, known: Iterable[str]) -> str:
-    """' (did you mean ...?)' where something close is known; what is no text is close to nothing."""
+    """Return ' (did you mean ...?)' if a similar name is known; nothing for non-strings."""
     if not isinstance(name, str):
         return ""
     names = list(known)
@@ -21,7 +21,7 @@ def suggest(name: object, known: Iterable[str]) -> str:
 
 
 def listing(names: list[str]) -> str:
-    """What there is, for messages."""
+    """List existing names, for messages."""
     if not names:
         return "there is none yet; add it first"
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
@@ -29,7 +29,7 @@ def listing(names: list[str]) -> str:
 
 
 def shortened_list(names: Iterable[str], most: int = 60) -> str:
-    """Names with commas between them, in about so many letters: the last one too where three or more are left out."""
+    """Join names with commas, in about ``most`` characters; the last name is kept if three or more are left out."""
     every = list(names)
     if len(", ".join(every)) <= most or len(every) < 4:
         return ", ".join(every)
@@ -44,15 +44,15 @@ def shortened_list(names: Iterable[str], most: int = 60) -> str:
 
 
 def abbreviated(text: str, most: int = 200) -> str:
-    """A text, of a long one the beginning and the end."""
+    """Return a text, shortened in the middle if it is long."""
     return text if len(text) <= most else f"{text[: 2 * most // 3]} ... {text[-most // 4 :]}"
 
 
-LINE_WIDTH = 100  # letters of a line
+LINE_WIDTH = 100  # characters per line
 
 
 def summary_lines(model: Model) -> list[tuple[str, str]]:
-    """Labels and texts for people: how many parts of each kind there are, and their names."""
+    """Return labels and texts: the number of parts of each kind, and their names."""
     gravity = ", ".join(str(x) for x in model.gravity)
     head = ("planar" if model.planar else "spatial") + (f", gravity ({gravity})" if model.gravity_told else "")
     out = [("mechanism", f"{model.name!r}, {head}")]
@@ -77,12 +77,12 @@ def summary_lines(model: Model) -> list[tuple[str, str]]:
 
 
 def _line(label: str, texts: Iterable[str], count: int | None = None) -> list[tuple[str, str]]:
-    """One line, cut where it gets long; nothing where there is nothing."""
+    """Return one line, shortened if it is long; empty if there is nothing."""
     every = list(texts)
     text = "; ".join(every) if count is not None else shortened_list(every, LINE_WIDTH)
     return [(label, f"{len(every) if count is None else count}: {text}")] if every else []
 
 
 def summary(model: Model) -> str:
-    """The lines as a text."""
+    """Return the lines as a text."""
     return "\n".join(f"{label:<10} {text}" for label, text in summary_lines(model))

@@ -40,7 +40,7 @@ from .validation import check_kind, check_name, check_references, check_vectors,
 
 
 class Model:
-    """A mechanism as described.
+    """The description of a mechanism.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ class Model:
     """
 
     frozen: ClassVar[bool] = False  # whether it is a snapshot
-    kept: ResultCache  # of a snapshot: what was worked out of it
-    aside: frozenset[str] = frozenset()  # parts of a copy that stand for something else: in no energy and no work
+    kept: ResultCache  # of a snapshot: cached results
+    aside: frozenset[str] = frozenset()  # parts of a copy that replace others; left out of energies and works
 
     def __init__(
         self,
@@ -102,12 +102,12 @@ class Model:
         self.by_name: dict[str, Element] = {}
 
     def environment(self, changed: Mapping[str, Number | complex] | None = None) -> dict[str, float]:
-        """Values of the parameters in SI units, with some of them changed.
+        """Return the values of the parameters in SI units, with some of them changed.
 
         Raises
         ------
         ModelError
-            If a changed parameter does not exist, or has a unit of another kind.
+            If a changed parameter does not exist, or has an incompatible unit.
         """
         for name in changed or {}:
             if name not in self.parameters:
@@ -122,27 +122,27 @@ class Model:
         if self._resolved is None or not same_values(self._resolved[0], self.parameters):
             try:
                 values = resolve_parameters(self.parameters)
-            except ModelError:  # what is changed may be what is wrong
+            except ModelError:  # the changed value may be the invalid one
                 return resolve_parameters({**self.parameters, **(changed or {})})
             vars(self)["_resolved"] = dict(self.parameters), values, parameter_formulas(self.parameters)
         _, values, formulas = self._resolved  # type: ignore[misc]
         return resolve_changed(values, formulas, changed or {})
 
     def copy(self) -> Any:
-        """A mechanism of the same parts, to be changed without changing this one."""
+        """Return a mechanism of the same parts that can be changed independently."""
         return model_copy(self)
 
     __copy__ = copy
 
     def snapshot(self) -> Any:
-        """This mechanism as it is now, for good; the same object again as long as nothing was changed.
+        """Return an immutable copy; the same object again as long as nothing was changed.
 
-        What analyses work out of it hangs on it (`kept`), so that it is worked out once.
+        Results that analyses compute from it are cached on it (`snapshot.ResultCache`), so that they are computed once.
         """
         return snapshot(self)
 
     def changed(self, parts: Mapping[str, Element | None]) -> Any:
-        """A copy with other parts under these names, or (None) without them; nothing is checked."""
+        """Return a copy with other parts under these names, or without them (None); nothing is checked."""
         return changed_copy(self, parts)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -150,7 +150,7 @@ class Model:
 
     def __setattr__(self, name: str, value: Any) -> None:
         refuse_changes(self, f"{name!r} cannot be set")
-        if name == "gravity":  # the caller's list stays the caller's
+        if name == "gravity":  # copy of the caller's list
             value = gravity_as_written(self, value)
         super().__setattr__(name, value)
 
@@ -161,16 +161,16 @@ class Model:
         return vector([number(x, env, "m/s^2", what) for x in self.gravity], self.planar, what)
 
     def elements(self) -> Iterator[Element]:
-        """Every part, category by category, in the order they were added."""
+        """Return all parts, category by category, in the order they were added."""
         for category in CATEGORIES:
             yield from getattr(self, category)
 
     def acting(self) -> list[Force]:
-        """All that acts by a formula: forces, and limits that are elastic."""
+        """Return all elements that act by a formula: forces, and elastic limits."""
         return [e for e in (*self.forces, *self.limits) if isinstance(e, Force) and e.acts()]
 
     def __eq__(self, other: object) -> bool:
-        """Equal if every part, parameter and setting is."""
+        """Return whether every part, parameter and setting is equal."""
         if not isinstance(other, Model):
             return NotImplemented
         same = ("name", "planar", "gravity", "parameters", *CATEGORIES)
@@ -183,27 +183,27 @@ class Model:
         return summary(self)
 
     def find(self, name: str) -> Element | None:
-        """The part with that name, if there is one."""
+        """Return the part with that name, or None."""
         return self.by_name.get(name)
 
     def names(self) -> list[str]:
-        """Names of all parts, in the order they were added."""
+        """Return the names of all parts, in the order they were added."""
         return list(self.by_name)
 
     def __getitem__(self, name: str) -> Any:
-        """The part with that name."""
+        """Return the part with that name."""
         if name not in self.by_name:
             known = self.names()
             raise ModelError(f"{self.name!r} has no part named {name!r}{suggest(str(name), known)}; {listing(known)}")
         return self.by_name[name]
 
     def add(self, *elements: Element) -> Any:
-        """Add parts and check them against what is there. Returns the (last) part added.
+        """Add parts and check them against the existing ones. Return the (last) part added.
 
         Raises
         ------
         ModelError
-            If a name is taken, a body or joint it refers to is unknown, or a number makes no sense.
+            If a name is taken, a body or joint it refers to is unknown, or a number is invalid.
         """
         refuse_changes(self, "nothing can be added")
         vars(self)["_adding"] = tuple(e for e in elements if isinstance(e, Controller))
@@ -231,12 +231,12 @@ class Model:
         return last
 
     def replace(self, e: Element) -> Any:
-        """Put a part in place of the one of its name and kind, and check it. Returns the new part.
+        """Replace the part of the same name and kind, and check the new one. Return the new part.
 
         Raises
         ------
         ModelError
-            If there is no such part, or a number makes no sense.
+            If there is no such part, or a number is invalid.
         """
         refuse_changes(self, f"{e.title} cannot be put in")
         old = self[e.name]
@@ -253,7 +253,7 @@ class Model:
         return e
 
     def body(self, name: str, e: Element) -> Body:
-        """The body of that name, as asked for by e."""
+        """Return the body of that name, which e refers to."""
         found = self.by_name.get(name)
         if not isinstance(found, Body):
             names = [b.name for b in self.bodies]
@@ -264,7 +264,7 @@ class Model:
         return found
 
     def carrier(self, name: str, e: Element) -> str:
-        """Name of the body (or ground) that carries what e attaches to."""
+        """Return the body (or ground) that carries the point to which e attaches."""
         found = self.by_name.get(name)
         if isinstance(found, Frame):
             return found.body
@@ -278,7 +278,7 @@ class Model:
         return name
 
     def joint(self, name: str, e: Element, coordinate: str) -> Joint:
-        """The joint of that name, which must have the coordinate, as asked for by e."""
+        """Return the joint of that name, which e refers to and which must have the coordinate."""
         found = self.by_name.get(name)
         if not isinstance(found, Joint):
             names = [j.name for j in self.joints]
@@ -295,7 +295,7 @@ class Model:
         return found
 
     def coordinate(self, text: str, e: Element) -> tuple[Any, str]:
-        """(joint, coordinate name) or (body or frame, axis) for ``"A.angle"`` or ``"slider.x"``."""
+        """Return (joint, coordinate name) or (body or frame, axis) for ``"A.angle"`` or ``"slider.x"``."""
         owner, _, what = text.partition(".")
         found = self.by_name.get(owner)
         if isinstance(found, (Body, Frame)):
@@ -313,9 +313,9 @@ class Model:
         return self.joint(owner, e, what), what
 
     def measured(self, e: Sensor) -> tuple[str, str, int] | None:
-        """What a sensor measures, as (kind, coordinate or name, order): order 0 the value, 1 its rate.
+        """Return what a sensor measures, as (kind, coordinate or name, order): order 0 the value, 1 its rate.
 
-        The kind is ``"coordinate"``, ``"force"`` (the quantity that a force acts along), ``"spin"`` (angular velocity
+        The kind is ``"coordinate"``, ``"force"`` (the quantity along which a force acts), ``"spin"`` (angular velocity
         in space), or None for an output that laws cannot use.
 
         Raises
@@ -326,7 +326,7 @@ class Model:
         return measured_quantity(self, e)
 
     def validate(self, e: Element, env: dict[str, float]) -> None:
-        """Resolve the element's numbers and refuse those that make no sense."""
+        """Convert the element's numbers to SI units and refuse invalid ones."""
         n = resolve(e, env)
         e.check(n)
         check_vectors(e, n, self.planar)
@@ -351,20 +351,20 @@ class Model:
             self.law(e.law, LawOf(self.unit(e.coordinate, e)), f"law of {e.title}", driver=True)
 
     def unit(self, text: str, e: Element) -> str:
-        """Unit of a coordinate."""
+        """Return the unit of a coordinate."""
         owner, what = self.coordinate(text, e)
         if isinstance(owner, Joint):
             return owner.coordinates[what].unit
         return "rad" if what == "angle" else "m"
 
     def law(self, value: Any, of: LawOf, where: str, driver: bool = False, whole: bool = True) -> Any:
-        """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names.
+        """Return a law as an expression of t, its inputs, sensors, tables and parameters; refuse other names.
 
-        Formulas of controllers' signals stand in the places of their names, if ``whole``.
+        If ``whole``, signals of controllers are replaced by their formulas.
         """
         return checked_law(self, value, of, where, driver, whole)
 
     def names_in_laws(self, of: LawOf) -> set[str]:
-        """All names that such a law may use; curves besides, where it may."""
+        """Return all names that such a law may use; also curves, if it may use these."""
         sensors = (x.name for x in self.sensors if isinstance(x, Sensor))
         return {"t", *of.inputs, *self.parameters, *sensors, *controller_signals.signal_names(self)}

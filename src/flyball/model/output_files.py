@@ -14,16 +14,16 @@ from ..errors import ModelError, cannot_write
 RESULT, TABLE, PAGE, LATEX = (".nc", ".nc4", ".h5", ".hdf5"), (".csv", ".txt"), (".html", ".htm"), (".tex",)
 PICTURE, DESCRIPTION = (".png", ".svg", ".pdf"), (".toml",)
 OTHER_METHODS = {RESULT: "save", TABLE: "to_csv", PAGE: "to_html", LATEX: "to_latex", PICTURE: "plot(path=...)"}
-"""Which method writes files of other endings."""
+"""The methods that write files with other extensions."""
 
 
 def file_extension(path: str | os.PathLike, known: Sequence[str]) -> str:
-    """The ending of a path in small letters, which must be a known one; "" for a device, which needs none.
+    """Return the extension of a path in lower case, which must be known; "" for a device, which needs none.
 
     Raises
     ------
     ModelError
-        If it is another, or the path is none.
+        If it is unknown, or the path is invalid.
     """
     at = _path(path)
     found = at.suffix.lower()
@@ -39,7 +39,7 @@ def file_extension(path: str | os.PathLike, known: Sequence[str]) -> str:
 
 
 def _path(path: str | os.PathLike) -> Path:
-    """A path that files can have."""
+    """Return a valid file path."""
     try:
         os.fsencode(path)
         if "\0" in os.fspath(path):
@@ -50,12 +50,12 @@ def _path(path: str | os.PathLike) -> Path:
 
 
 def make_folder(path: str | os.PathLike) -> Path:
-    """A folder, made with its parents where it is not there.
+    """Create a folder and its parents.
 
     Raises
     ------
     ModelError
-        If that cannot be done.
+        If that is not possible.
     """
     folder = _path(path)
     try:
@@ -66,20 +66,20 @@ def make_folder(path: str | os.PathLike) -> Path:
 
 
 def _device(path: Path) -> bool:
-    """Whether something is there that is neither a file nor a folder, as /dev/stdout."""
+    """Return whether the path is neither a file nor a folder, such as /dev/stdout."""
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
 @contextmanager
 def replacing_file(path: str | os.PathLike, known: Sequence[str] = ()) -> Iterator[BinaryIO]:
-    """A file to write to, beside its place: put there once all is written, removed if anything fails.
+    """Context manager for a temporary file beside the target, which it replaces once complete; removed on failure.
 
-    What stood there before stays until then. ``known``: endings that the name may have; any if not given.
+    A previous file stays until then. ``known``: permitted extensions; any if not given.
 
     Raises
     ------
     ModelError
-        If the file cannot be written (no such folder, no space left, ...), or has another ending.
+        If the file cannot be written (no such folder, no space left, ...), or has another extension.
     """
     if known:
         file_extension(path, known)

@@ -16,9 +16,9 @@ M = TypeVar("M", bound=Model)
 
 
 def load_python(path: Path, cls: type[M]) -> M:
-    """The mechanism of class ``cls`` that a Python file defines as ``m``, ``mechanism`` or ``mechanism()``; it is run.
+    """Execute a Python file; return its ``m``, ``mechanism`` or ``mechanism()``, a mechanism of class ``cls``.
 
-    What it prints goes to stderr.
+    Its output is redirected to stderr.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def load_python(path: Path, cls: type[M]) -> M:
 
 
 def _line_in(path: Path, error: BaseException) -> str:
-    """', line n' of the last line of that file that had a part in the error."""
+    """Return ', line n' of the last line of that file in the error's traceback."""
     if isinstance(error, SyntaxError) and error.lineno:
         return f", line {error.lineno}"
     line = ""

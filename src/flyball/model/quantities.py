@@ -1,8 +1,8 @@
-"""What a result contains for each part: names, units and components. The one table of such names.
+"""The quantities of a result for each part: names, units and components, in one table.
 
-A name is known before anything is computed, so that a wrong one is refused when a part is described. Results,
-their curves, data sets, sensors and outputs of analyses all read this table. Forces that joints, force elements
-and drivers transmit are known only with the accelerations: events may name them, laws may not.
+Names are known before anything is computed, so that a wrong one is refused when a part is added. Results, their curves,
+data sets, sensors and outputs of analyses all read this table. Forces that joints, force elements and drivers transmit
+are known only with the accelerations: events may name them, laws may not.
 """
 
 from __future__ import annotations
@@ -28,27 +28,27 @@ if TYPE_CHECKING:
     from .model import Model
 
 
-ENERGY = "energy"  # the name under which a result has the energies of all
-MOST = 256  # parts whose tables are kept
-MEMBER = re.compile(r"(.*)\[(\d+)\]")  # of a set of bodies: "balls[17]"
+ENERGY = "energy"  # the name of the total energies in a result
+MOST = 256  # number of parts whose tables are cached
+MEMBER = re.compile(r"(.*)\[(\d+)\]")  # member of a set of bodies: "balls[17]"
 
 
 class Quantity(NamedTuple):
-    """One thing that a result says of a part, over time.
+    """One quantity of a part, over time.
 
     Attributes
     ----------
     unit : str
     of : str
-        The quantity that this is a component of, or is another name of; itself, if empty.
+        The quantity of which this is a component or another name; itself, if empty.
     component : int or None
-        Which component of that.
+        Index of the component.
     curve : bool
-        Whether it is listed among the curves: columns of tables, plots of a whole part.
+        Whether it is a curve: a column of tables, a line in plots of a whole part.
     array : bool
-        Whether it stands in data sets.
+        Whether datasets contain it.
     width : int
-        How many numbers it has at one time; 0 for one plain number.
+        Number of components at one time; 0 for a scalar.
     """
 
     unit: str
@@ -63,7 +63,7 @@ Table = dict[str, Quantity]
 
 
 def quantities(model: Model, name: str) -> Table:
-    """Everything that a result says of a part (or of ``"energy"``), by name; not to be changed."""
+    """Return all quantities of a part (or of ``"energy"``) by name; not to be changed."""
     kept = getattr(model, "kept", None)  # of a snapshot
     return (
         _quantity_table(model, name)
@@ -105,7 +105,7 @@ def _quantity_table(model: Model, name: str) -> Table:
 
 
 def unknown_quantity(owner: str, what: str, table: Mapping[str, Quantity]) -> str:
-    """What to say of a name that a part has not."""
+    """Return the message on an unknown quantity of a part."""
     curves = [k for k, x in table.items() if x.curve]
     rest = [k for k, x in table.items() if not x.curve]
     has = ", ".join(curves) + (f"; as wholes or by other names: {', '.join(rest)}" if rest else "")
@@ -119,12 +119,12 @@ def component_names(table: Mapping[str, Quantity], name: str) -> list[str]:
 
 
 def single_quantity(model: Model, name: str) -> Quantity:
-    """The quantity of a name such as ``"slider.x"``, or of a sensor's name: one number at a time.
+    """Return the scalar quantity of a name such as ``"slider.x"``, or of a sensor's name.
 
     Raises
     ------
     ModelError
-        If there is none of that name, or it has several components; the message names what comes near.
+        If there is none of that name, or it has several components; the message names similar ones.
     """
     owner, dot, what = name.partition(".") if isinstance(name, str) else ("", "", "")
     if not owner:
@@ -152,7 +152,7 @@ def _unit_of(model: Model, text: str) -> str:
 
 
 def has_switches(model: Model) -> bool:
-    """Whether there is something that holds at times and lets go at others, or events."""
+    """Return whether there are switching elements or events."""
     return bool(getattr(model, "events", ())) or any(e.switches() for e in model.elements())
 
 
@@ -166,7 +166,7 @@ def _of_energy(touching: bool, switches: bool) -> Table:
 
 
 def _split(names: Iterable[str], unit: str, of: str, curve: bool = True) -> Table:
-    """The components of a vector."""
+    """Return the components of a vector."""
     return {name: Quantity(unit, of, k, curve=curve) for k, name in enumerate(names)}
 
 
@@ -190,7 +190,7 @@ def _of_point(axes: str) -> Table:
 
 
 def _of_locks(model: Model, body: Body) -> Table:
-    """Of a body with coordinates that events lock: what holds them, along each."""
+    """Return the lock efforts of a body with coordinates that events lock, one for each."""
     locked = [a.what for e in model.events for a in e.do if isinstance(a, Lock)]
     own = dict.fromkeys(what for owner, _, what in (x.rpartition(".") for x in locked) if owner == body.name)
     units = {what: _effort("rad" if what == "angle" else "m") for what in own}
@@ -198,19 +198,19 @@ def _of_locks(model: Model, body: Body) -> Table:
 
 
 def _of_contact(axes: str) -> Table:
-    """Of a body that may touch others: the sum of its contact forces."""
+    """Return the contact quantity of a body that may touch others: the sum of its contact forces."""
     out = _split((f"contact_f{a}" for a in axes), "N", "contact_force")
     return out | {"contact_force": Quantity("N", array=True, width=len(axes))}
 
 
 def _of_member(axes: str) -> Table:
-    """Of one of a set of bodies: as of any other, but for accelerations."""
+    """Return the quantities of a member of a set of bodies: those of a body without accelerations."""
     own = {k: x for k, x in _of_point(axes).items() if not x.unit.endswith("/s^2")}
     return own | _of_contact(axes)
 
 
 def body_set_quantities(axes: str) -> Table:
-    """Of a whole set of bodies: arrays over time and bodies."""
+    """Return the quantities of a whole set of bodies: arrays over time and bodies."""
     wholes = ("position", "angle", "velocity", "angular_velocity", "quaternion", "contact_force")
     return {k: x._replace(curve=False) for k, x in _of_member(axes).items() if k in wholes}
 
@@ -232,7 +232,7 @@ def _of_joint(e: Joint, axes: str) -> Table:
 
 
 def _of_wrench(axes: str) -> Table:
-    """Of a force and torque on a body: components, and wholes."""
+    """Return the quantities of a force and torque on a body: components, and vectors."""
     out = _split((f"f{a}" for a in axes), "N", "force")
     if len(axes) == 3:
         out |= _split((f"t{a}" for a in axes), "N*m", "torque")
@@ -252,7 +252,7 @@ def _of_force(model: Model, e: Force, axes: str) -> Table:
 
 
 def _output(model: Model, e: Force, unit: str) -> str:
-    """Unit of one of a force's outputs, where it follows from the coordinate that it acts along."""
+    """Return the unit of a force's output if it follows from the coordinate along which it acts."""
     if not isinstance(e, CoordinateForce) or unit not in ("", "/s", "effort"):
         return unit
     base = model.unit(e.along()[0], e)
@@ -269,23 +269,23 @@ def _of_imu(axes: str) -> Table:
 
 
 WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz", "force", "torque")
-"""What is told of a joint, the last two being sizes."""
+"""Components of a joint's reaction; the last two are magnitudes."""
 EFFORTS = ("effort", "reversed")
-"""What is told of a force along a coordinate, and of a driver: the effort, and that the other way round."""
-SPIN = 5  # in the plane the torque, which has a sign
+"""Quantities of a force along a coordinate, and of a driver: the effort, and its reverse."""
+SPIN = 5  # in the plane the torque is a scalar with sign
 
 
 class TransmittedForce(NamedTuple):
-    """A force or torque by name: whose it is, and which of `WRENCH` or `EFFORTS`."""
+    """A force or torque by name: its part, and which of `WRENCH` or `EFFORTS`."""
 
     element: Element
     column: int
 
 
 def transmitted_force(model: Model, name: str) -> TransmittedForce | None:
-    """What a name such as ``"A.fx"`` or ``"rope.tension"`` says of what a part carries; None if it is something else.
+    """Return the transmitted force of a name such as ``"A.fx"`` or ``"rope.tension"``; None if it is something else.
 
-    ``"A.force"`` is the size of a joint's force; in space ``"A.torque"`` that of its torque.
+    ``"A.force"`` is the magnitude of a joint's force; in space ``"A.torque"`` that of its torque.
     """
     owner, _, what = name.partition(".")
     e = model.find(owner)
@@ -300,14 +300,14 @@ def transmitted_force(model: Model, name: str) -> TransmittedForce | None:
 
 
 class Curve(NamedTuple):
-    """A curve such as A.angle where nobody has given it a name, and what asks for it."""
+    """A curve such as A.angle without a sensor, and the element that uses it."""
 
     title: str
     of: str
 
 
 def measured_quantity(model: Model, e: Sensor | Curve) -> tuple[str, str, int] | None:
-    """What a sensor measures; see `Model.measured`."""
+    """Return what a sensor measures; see `Model.measured`."""
     owner, _, what = e.of.partition(".")
     found = model.find(owner)
     if found is None and owner != ENERGY:
@@ -346,7 +346,7 @@ def measured_quantity(model: Model, e: Sensor | Curve) -> tuple[str, str, int] |
 
 
 def _point_curves(owner: str, whole: str, component: int | None, planar: bool) -> tuple[str, str, int] | None:
-    """What laws may use of a body or frame: places, angles, and their rates."""
+    """Return the curves of a body or frame that laws may use: positions, angles, and their rates."""
     if whole in ("position", "velocity") and component is not None:
         return "coordinate", f"{owner}.{'xyz'[component]}", int(whole == "velocity")
     if planar and whole in ("angle", "angular_velocity"):
@@ -356,18 +356,18 @@ def _point_curves(owner: str, whole: str, component: int | None, planar: bool) -
 
 
 def carrier_names(model: Model) -> list[str]:
-    """Names of what can carry something: bodies, frames, ground."""
+    """Return the names of everything that can carry an element: bodies, frames, ground."""
     return [*(b.name for b in model.bodies), *(f.name for f in model.frames), GROUND]
 
 
 def actual_kind(model: Model, name: str, requested: str) -> str:
-    """'; 'A' is a Revolute' where a name means something else than was wanted."""
+    """Return '; 'A' is a Revolute' if a name means something else than expected."""
     found = model.find(name)
     return "" if found is None else f" ({name!r} is a {type(found).__name__}, no {requested})"
 
 
 def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
-    """Refuse units that do not fit the coordinate that an element acts along or couples, or what it compares."""
+    """Refuse units that do not fit the coordinate or comparison of an element."""
     if isinstance(e, Controller):
         _check_set_point(model, e)
     if isinstance(e, CoordinateForce) and e.along():
@@ -392,7 +392,7 @@ def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
 
 
 def _check_set_point(model: Model, e: Controller) -> None:
-    """Refuse a set point of another kind than the curve that is to follow it; what is no plain curve says no unit."""
+    """Refuse a set point of another kind than the measured curve; expressions have no known unit."""
     given = {k: x for k in e.compared if isinstance(x := getattr(e, k), str)}
     for (name, told), (_, curve) in permutations(given.items(), 2):
         owner, _, what = curve.partition(".")
@@ -402,7 +402,7 @@ def _check_set_point(model: Model, e: Controller) -> None:
 
 
 def _value_in_units(value: Any, kinds: tuple[str, ...], env: Mapping[str, float], where: str) -> None:
-    """The value is in one of these units."""
+    """Require that the value has one of these units."""
     problem: ModelError | None = None
     for kind in kinds if value is not None else ():
         try:

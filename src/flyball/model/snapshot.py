@@ -25,10 +25,10 @@ T = TypeVar("T")
 
 
 class ResultCache:
-    """Results of pure functions of the object that this hangs on, the last few of each kind.
+    """A cache of results of pure functions of its owner, the last few of each kind.
 
-    It belongs to the process: a copy or a pickle of the object begins with an empty one. Two threads that ask for the
-    same at once may both work it out; since the functions are pure, that is all they do.
+    It belongs to the process: a copy or a pickle of the owner starts with an empty cache. Two threads may both compute
+    the same entry; since the functions are pure, this is harmless.
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class ResultCache:
         self._lock = threading.Lock()
 
     def get(self, kind: str, key: Hashable, most: int, make: Callable[[], T]) -> T:
-        """What ``make`` returns, made now or earlier; of each kind the ``most`` used last are kept."""
+        """Return the result of ``make``, new or cached; for each kind the ``most`` last used are kept."""
         with self._lock:
             known = self._found.get(kind)
             if known is not None and key in known:
@@ -52,17 +52,17 @@ class ResultCache:
         return made
 
     def known(self, kind: str, key: Hashable = None) -> Any:
-        """The same if it is there, else None."""
+        """Return the cached result, else None."""
         with self._lock:
             return self._found.get(kind, OrderedDict()).get(key)
 
     def drop(self, kind: str, key: Hashable) -> None:
-        """Forget one of them."""
+        """Remove one of them."""
         with self._lock:
             self._found.get(kind, OrderedDict()).pop(key, None)
 
     def take(self, kind: str, other: ResultCache, convert: Callable[[Any], Any]) -> None:
-        """Begin with what is made of all that another has of a kind."""
+        """Fill the cache with converted results of a kind from another cache."""
         with other._lock:
             found = other._found.get(kind, OrderedDict()).copy()
         self._found[kind] = OrderedDict((key, convert(x)) for key, x in found.items())
@@ -72,7 +72,7 @@ class ResultCache:
 
 
 def exact_key(values: Mapping[str, Any]) -> Hashable:
-    """A key of numbers by name that tells every bit apart, real and complex numbers too."""
+    """Return a key of numbers by name that distinguishes every bit, also for complex numbers."""
     x = np.array(list(values.values()))
     return tuple(values), x.dtype.char, x.tobytes()
 
@@ -100,7 +100,7 @@ SETTINGS = ("name", "planar", "gravity_told")
 
 
 def model_copy(model: Model) -> Any:
-    """A model with lists of its own, that can be changed."""
+    """Return a model with lists of its own that can be changed."""
     out = object.__new__(type(model))
     vars(out).update(vars(model))
     vars(out).pop("kept", None)
@@ -111,17 +111,17 @@ def model_copy(model: Model) -> Any:
 
 
 def snapshot(model: Model) -> Any:
-    """The model as it is, unchangeable; the last one as long as it is still true."""
+    """Return the model as an immutable snapshot; the last one if nothing has changed since."""
     last = vars(model).get("_snapshot")
     if model.frozen or (last is not None and _same(model, last)):
         return model if model.frozen else last
     out = model_copy(model)
     vars(out).update({"_resolved": None, "gravity": _gravity(model)})
-    out.environment()  # worked out now: nothing is stored in it later
+    out.environment()  # computed now: nothing is stored in it later
     vars(out).update({name: tuple(getattr(model, name)) for name in CATEGORIES})
     vars(out).update({"parameters": MappingProxyType(out.parameters), "by_name": MappingProxyType(_by_name(out))})
     vars(out).update({"kept": ResultCache(), "frozen": True})
-    if last is not None and _same_parts(model, last):  # another value of a parameter leaves every structure as it is
+    if last is not None and _same_parts(model, last):  # other parameter values leave every structure unchanged
         out.kept.take("spanning", last.kept, lambda tree: tree)
         out.kept.take("structure", last.kept, lambda s: dataclasses.replace(s, model=out))
     vars(model)["_snapshot"] = out
@@ -129,7 +129,7 @@ def snapshot(model: Model) -> Any:
 
 
 def _by_name(model: Model) -> dict[str, Element]:
-    """The parts that are in the lists, in the order that they were added: lists may be changed by themselves."""
+    """Return the parts in the lists, in the order they were added: users may change the lists directly."""
     there: dict[str, Element] = {}
     for category in CATEGORIES:
         parts = getattr(model, category)
@@ -144,19 +144,19 @@ def _by_name(model: Model) -> dict[str, Element]:
 
 
 def picklable_state(state: Mapping[str, Any]) -> dict[str, Any]:
-    """What is pickled of a model, or copied with all its parts: nothing that was worked out of it."""
+    """Return the pickled state of a model, without cached results."""
     out = {k: v for k, v in state.items() if k not in ("_snapshot", "kept", "frozen", "_resolved")}
     out |= {name: list(state[name]) for name in CATEGORIES if name in state}
     return out | {"_resolved": None, "parameters": dict(state["parameters"]), "by_name": dict(state["by_name"])}
 
 
 def changed_copy(model: Model, parts: Mapping[str, Element | None]) -> Any:
-    """A copy with other parts under these names, or (None) without them."""
+    """Return a copy with other parts under these names, or without them (None)."""
     if not isinstance(parts, Mapping):
         raise ModelError(f"parts maps names to parts, or to None to leave one out: {{'A': None}}; not {parts!r}")
     out = model_copy(model)
     for category in CATEGORIES:
-        if category != Initial.category:  # these bear the names of what they are about
+        if category != Initial.category:  # the names of these parts are derived from what they refer to
             kept = [parts.get(e.name, e) for e in getattr(model, category)]
             setattr(out, category, [e for e in kept if e is not None])
     left = {name: parts.get(name, e) for name, e in model.by_name.items()}
@@ -167,23 +167,23 @@ def changed_copy(model: Model, parts: Mapping[str, Element | None]) -> Any:
 
 
 def refuse_changes(model: Model, what: str) -> None:
-    """Refuse to change a snapshot: results and what is prepared stand on it."""
+    """Refuse to change a snapshot, on which results and prepared data depend."""
     if model.frozen:
         raise ModelError(f"{what}: {model.name!r} is here as a result has it, for good; change a copy of it: m.copy()")
 
 
 def _same(model: Model, last: Model) -> bool:
-    """Whether every part is the same object still, and every parameter and setting the same to the bit."""
+    """Return whether every part is the same object, and every parameter and setting equal to the bit."""
     return _same_parts(model, last) and same_values(model.parameters, last.parameters)
 
 
 def same_values(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
-    """Whether the same names in the same order have the same values, to the bit and of the same kind."""
+    """Return whether the same names in the same order have equal values of equal types, to the bit."""
     return list(a) == list(b) and all(_same_bits(v, b[k]) for k, v in a.items())
 
 
 def _same_parts(model: Model, last: Model) -> bool:
-    """The same but for the values of the parameters."""
+    """Return whether everything but the parameter values is equal."""
     mine, its = vars(model), vars(last)
     for k in CATEGORIES:
         a, b = mine[k], its[k]
@@ -200,10 +200,10 @@ def _same_parts(model: Model, last: Model) -> bool:
 
 
 def _gravity(model: Model) -> tuple[Any, ...]:
-    """Gravity as a tuple: a user may have put a list or an array there, and change it."""
+    """Return gravity as a tuple: users may pass and later change a list or an array."""
     return model.gravity if isinstance(model.gravity, tuple) else tuple(python_data(model.gravity))
 
 
 def _same_bits(a: Any, b: Any) -> bool:
-    """Whether two numbers or texts are the same; 0.0 and -0.0 are not."""
+    """Return whether two numbers or texts are identical; 0.0 and -0.0 are not."""
     return a is b or (type(a) is type(b) and a == b and repr(a) == repr(b))

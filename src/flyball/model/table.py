@@ -32,13 +32,12 @@ class Table(Element):
         The points; x ascends.
     interpolation : ``"cubic"``, ``"monotone"`` or ``"linear"``
         Cubic: the smoothest, with two continuous derivatives (not-a-knot at the ends), good for laws of motion; it may
-        swing beyond the points. Monotone: one continuous derivative and never beyond the points (Fritsch and Butland,
-        A method for constructing local monotone piecewise cubic interpolants, SIAM J. Sci. Stat. Comput. 5, 1984).
-        Linear: straight between the points, with kinks.
+        swing beyond the points. Monotone: one continuous derivative and never beyond the points (Fritsch and Butland, A
+        method for constructing local monotone piecewise cubic interpolants, SIAM J. Sci. Stat. Comput. 5, 1984).
+        Linear: straight lines between the points, with kinks.
     beyond : ``"refuse"``, ``"hold"``, ``"line"`` or ``"repeat"``
-        Beyond the points: nothing is known, and a motion that gets there stops; the value of the end; straight on with
-        the slope of the end; or again and again from the start (the last y must then be the first; cubic is smooth
-        across the seam too).
+        Beyond the points: undefined, and a motion that gets there stops; the value of the end; a straight line with the
+        slope of the end; or periodic (the last y must then equal the first; cubic is smooth across the seam too).
     x_unit, y_unit : str
         Units that x and y are written in, such as ``"mm"`` and ``"kN"``; SI if not given.
     """
@@ -56,7 +55,7 @@ class Table(Element):
     }
 
     def check(self, n: SimpleNamespace) -> None:
-        """Refuse points that make no curve, and a name that no expression could use."""
+        """Refuse invalid points, and a name that expressions could not use."""
         if not self.name.isidentifier() or keyword.iskeyword(self.name):
             raise ModelError(f"{self.title}: expressions call a table by its name; use letters, digits and _ only")
         if self.name in FUNCTIONS or self.name in CONSTANTS or self.name == "t":
@@ -64,7 +63,7 @@ class Table(Element):
         self._points()
 
     def data(self) -> list[float]:
-        """The curve in SI units as the flat list that `flyball.math.spline` reads.
+        """Return the curve in SI units as the flat list that `flyball.math.spline` reads.
 
         Raises
         ------
@@ -76,7 +75,7 @@ class Table(Element):
     def values(self, x: Any) -> tuple[Any, Any, Any]:
         """Value, first and second derivative at ``x`` [SI], a number (real or complex) or an array.
 
-        They are nan beyond the ends of a table that says nothing of what is there.
+        They are nan beyond the ends if ``beyond`` is ``"refuse"``.
         """
         return spline(self._array if isinstance(x, np.ndarray | np.generic) else self._list, 0, x)
 
@@ -94,7 +93,7 @@ class Table(Element):
         return float(self._array[BREAKS]), float(self._array[BREAKS + count - 1])
 
     def out_of_range_message(self, x: float) -> str:
-        """Why it has no value at ``x`` [SI], and what to do."""
+        """Return the message on a missing value at ``x`` [SI], with remedies."""
         unit = f" {self.x_unit}" if self.x_unit else ""
         written = x / (to_si(f"1 {self.x_unit}", None) if self.x_unit else 1.0)
         at = f"for x = {written:.6g}{unit}"
@@ -116,7 +115,7 @@ class Table(Element):
             return pack_spline(x, y, _MAKERS[self.interpolation](x, y, self.beyond == "repeat"), self.beyond)
 
     def _points(self) -> tuple[np.ndarray, np.ndarray]:
-        """The points in SI units, checked."""
+        """Return the points in SI units, checked."""
         if len(self.x) != len(self.y):
             raise ModelError(f"{self.title}: x has {len(self.x)} numbers and y has {len(self.y)}; give pairs")
         if len(self.x) < 2:
@@ -165,7 +164,7 @@ def _monotone(x: np.ndarray, y: np.ndarray, periodic: bool) -> np.ndarray:
 
     if not periodic:
         return PchipInterpolator(x, y).c[::-1].T
-    n, period = len(x) - 1, x[-1] - x[0]  # with a period before and behind, the seam is a point like the others
+    n, period = len(x) - 1, x[-1] - x[0]  # with a period before and after, the seam is an ordinary point
     x, y = np.r_[x[:-1] - period, x, x[1:] + period], np.r_[y[:-1], y, y[1:]]
     return PchipInterpolator(x, y).c[::-1].T[n : 2 * n]
 

@@ -1,7 +1,7 @@
-"""Model files: a mechanism as TOML, written to be read and compared by people, and read back exactly.
+"""Model files: a mechanism as readable TOML, which is read back exactly.
 
-Numbers are written so that they are read back bit for bit, and strings ("60 rpm", "2*k") as the user wrote them.
-An unknown table, type or field is refused with the line, the nearest known names and the rule.
+Numbers are written so that reading restores every bit, and strings ("60 rpm", "2*k") as the user wrote them. An unknown
+table, type or field is refused with the line, the nearest known names and the rule.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ ONE_KIND = {
     "contacts": Contact,
     "events": Event,
 }
-MUTUAL = "controllers"  # which may need each other
-AFTER_OTHERS = ("sensors", "controllers", "forces", "drivers")  # which alone may name one another
-SELF_NAMED = ("material_pairs", "contacts")  # that have a name of their own accord
+MUTUAL = "controllers"  # categories whose elements may refer to each other
+AFTER_OTHERS = ("sensors", "controllers", "forces", "drivers")  # the only ones whose elements may refer to elements of the same category
+SELF_NAMED = ("material_pairs", "contacts")  # categories with automatic names
 MANY_KINDS = {
     "joints": (Joint, "joints"),
     "couplings": (Coupling, "joints"),
@@ -56,9 +56,9 @@ MANY_KINDS = {
     "forces": (Force, "forces"),
     "limits": (Unilateral, "forces"),
 }
-DEFAULT_KINDS = {"sensors": "Sensor", "limits": "Limit"}  # where no type is said
+DEFAULT_KINDS = {"sensors": "Sensor", "limits": "Limit"}  # default types
 SENSORS = {"Sensor": Sensor, "IMU": IMU}
-WIDTH = 100  # a list of shapes longer than this is written one shape a line
+WIDTH = 100  # longer lists of shapes are written with one shape per line
 _HEADER = re.compile(r"^\s*\[\[\s*\"?(\w+)\"?\s*\]\]")
 _PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
@@ -69,14 +69,14 @@ def save(model: Model, path: str | os.PathLike) -> None:
     Raises
     ------
     ModelError
-        If the file cannot be written, or a value of the mechanism has no place in a file.
+        If the file cannot be written, or a value of the mechanism cannot be written to a file.
     """
     file_extension(path, DESCRIPTION)
     write_file(path, dumps(model, Path(path).parent))
 
 
 def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:
-    """The text of the mechanism's TOML file; relative paths in it as seen from ``folder``, else as they were given."""
+    """Return the text of the mechanism's TOML file; relative paths are as seen from ``folder``, else as given."""
     lines = [f"name = {_text(model.name)}", f"planar = {_value(model.planar)}", f"gravity = {_value(model.gravity)}"]
     if model.parameters:
         lines += ["", "[parameters]"]
@@ -98,7 +98,7 @@ def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:
 
 
 def _written(e: Element, folder: str | os.PathLike | None) -> dict[str, Any]:
-    """The element's fields as plain data, paths of meshes as seen from the folder."""
+    """Return the element's fields as plain data, with paths of meshes as seen from the folder."""
     data = written_fields(e)
     if folder is not None and isinstance(e, (Body, Bodies, Ground)) and "shape" in data:
         tables = data["shape"] if isinstance(data["shape"], list) else [data["shape"]]
@@ -119,7 +119,7 @@ def _refuse_functions(e: Element, fields: Mapping[str, Any]) -> None:
 
 
 def _value(value: Any) -> str:
-    """A value in TOML; numbers by ``repr``, which is exact."""
+    """Return a value in TOML syntax; numbers by ``repr``, which is exact."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, (int, float)):
@@ -154,8 +154,8 @@ def load(path: str | os.PathLike, cls: type[M]) -> M:
     Raises
     ------
     ModelError
-        If there is no such file, it is no TOML, or it describes no valid mechanism; the message names the file, the
-        line, and the element.
+        If there is no such file, it is not TOML, or it does not describe a valid mechanism; the message names the file,
+        the line, and the element.
     """
     path = Path(path)
     try:
@@ -188,7 +188,7 @@ Entry = tuple[str, Mapping[str, Any], str]
 
 
 def _entries(data: Mapping[str, Any], text: str, source: str) -> list[Entry]:
-    """(category, fields, place in the file) of every element."""
+    """Return (category, fields, location in the file) of every element."""
     lines = _header_lines(text)
     out = []
     for category in CATEGORIES:
@@ -204,7 +204,7 @@ def _entries(data: Mapping[str, Any], text: str, source: str) -> list[Entry]:
 
 
 def _add_all(model: Model, entries: list[Entry]) -> None:
-    """Add every element; those that name others further down in the file come after them."""
+    """Add every element; elements that refer to others further down in the file are added after them."""
     waiting = entries
     while waiting:
         failed: list[Entry] = []
@@ -220,7 +220,7 @@ def _add_all(model: Model, entries: list[Entry]) -> None:
                 raise errors[0]
             failed = [entry for entry in failed if entry[0] != MUTUAL]
         if failed and all(category not in AFTER_OTHERS for category, _, _ in failed):
-            raise errors[0]  # only these can name one another
+            raise errors[0]  # only these can refer to one another
         waiting = failed
     place = {str(fields.get("name")): k for k, (_, fields, _) in enumerate(entries)}
     for category in AFTER_OTHERS:
@@ -228,12 +228,13 @@ def _add_all(model: Model, entries: list[Entry]) -> None:
 
 
 def _together(model: Model, entries: list[Entry]) -> bool:
-    """Add controllers that name one another all at once, if there are any; whether there were.
+    """Add controllers that refer to one another together; return whether there were any.
 
     Raises
     ------
     ModelError
-        If one of them is wrong with the others there, too: a name that nothing has, or a ring at one instant.
+        If one of them is invalid even with the others: an unknown name, or an algebraic loop between sampled
+        controllers.
     """
     twins = [entry for entry in entries if entry[0] == MUTUAL]
     before = len(model.controllers)
@@ -250,7 +251,7 @@ def _together(model: Model, entries: list[Entry]) -> bool:
 
 
 def _parsed(text: str, source: str) -> dict[str, Any]:
-    """The file's tables, or an error that shows the faulty line with a caret."""
+    """Return the file's tables, or raise an error that shows the faulty line with a caret."""
     try:
         return tomllib.loads(text)
     except RecursionError:
@@ -272,7 +273,7 @@ def _parsed(text: str, source: str) -> dict[str, Any]:
 
 
 def _settings(data: Mapping[str, Any], cls: type[M], source: str) -> M:
-    """The empty mechanism with its name, plane, gravity and parameters."""
+    """Return the empty mechanism with its name, plane, gravity and parameters."""
     given = {k: data[k] for k in SETTINGS if k in data}
     for key, kind, what in (("planar", bool, "true or false"), ("parameters", Mapping, "a table of named numbers")):
         if key in given and not isinstance(given[key], kind):
@@ -287,7 +288,7 @@ def _settings(data: Mapping[str, Any], cls: type[M], source: str) -> M:
 
 
 def _header_lines(text: str) -> dict[str, list[int]]:
-    """Line numbers of the ``[[...]]`` headers, by category."""
+    """Return the line numbers of the ``[[...]]`` headers, by category."""
     out: dict[str, list[int]] = {}
     for k, line in enumerate(text.split("\n"), 1):
         if match := _HEADER.match(line):
@@ -304,7 +305,7 @@ def _add(model: Model, category: str, table: Mapping[str, Any], where: str) -> N
 
 
 def _make_element(category: str, table: Mapping[str, Any], where: str) -> Element:
-    """The element that a table describes."""
+    """Return the element that a table describes."""
     fields = dict(table)
     cls = ONE_KIND[category] if category in ONE_KIND else _kind(category, fields, where)
     if "name" not in fields and category not in SELF_NAMED:
@@ -316,7 +317,7 @@ def _make_element(category: str, table: Mapping[str, Any], where: str) -> Elemen
 
 
 def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
-    """The class that the table's ``type`` names."""
+    """Return the class named by the table's ``type``."""
     if category in DEFAULT_KINDS:
         fields.setdefault("type", DEFAULT_KINDS[category])
     if category == "sensors":
@@ -328,7 +329,7 @@ def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
         own = [k for k, c in kinds.items() if not c.__module__.startswith("flyball.")]
         known = [*sorted(k for k, c in kinds.items() if c.__module__.count(f".{room}.")), *sorted(own)]
     name = fields.pop("type", None)
-    if category == "forces" and name == Touch.__name__:  # of a motion with contact, in its result file
+    if category == "forces" and name == Touch.__name__:  # contact points of a motion, in its result file
         return Touch
     if name not in known:
         problem = "it has no type" if name is None else f"unknown type {name!r}{suggest(str(name), known)}"
@@ -338,7 +339,7 @@ def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
 
 
 def _elsewhere(name: Any) -> str:
-    """In which table a type stands, if there is one for it."""
+    """Return the table to which a type belongs, if there is one."""
     for _, room in MANY_KINDS.values():
         importlib.import_module(f"..{room}", __package__)
     kind = Element.registry.get(str(name))
@@ -346,6 +347,6 @@ def _elsewhere(name: Any) -> str:
 
 
 def _refuse(error: Exception, where: str) -> NoReturn:
-    """The error with the place in the file before it; whatever it was, it becomes a ``ModelError``."""
+    """Return the error as a ``ModelError`` with the location in the file in front."""
     kind = type(error) if isinstance(error, ModelError) else ModelError
     raise kind(f"{where}: {error}") from None

@@ -1,14 +1,13 @@
-"""Text with units ("30 deg", "60 rpm", "2 kN/m") to numbers in SI units.
+"""Conversion of quantities ("30 deg", "60 rpm", "2 kN/m") to numbers in SI units.
 
 Common units are in a table; others are looked up in pint.
 
-Angles are distinguished from plain numbers, which pint does not do: "5 deg" is no length, and "50 Hz" (1/s) is no
-angular speed (rad/s), an error of 2 pi that is easily overlooked.
+Angles are distinguished from plain numbers, which pint does not do: "5 deg" is not a length, and "50 Hz" (1/s) is not
+an angular speed (rad/s), an error of 2 pi that is easily overlooked.
 
-A symbol of a unit that is also a name where it is written is refused. In the law ``"2 m/s^2*t"`` the t is time,
-and also the symbol of the tonne; read as a unit it would make a constant force of 2000 N. Such a symbol is a unit
-only where the usual way of writing the quantity contains it: "250 g" and "5 N*m" remain quantities beside
-parameters g and m.
+A unit symbol that is also a valid name in its context is refused. In the law ``"2 m/s^2*t"`` the t means time, but is
+also the symbol of the tonne; as a unit it would make a constant force of 2000 N. Such a symbol is taken as a unit only
+if the usual unit of the quantity contains it: "250 g" and "5 N*m" remain quantities beside parameters g and m.
 """
 
 from __future__ import annotations
@@ -64,12 +63,12 @@ _PIECE = re.compile(r"([*/]?)\s*([A-Za-z]+)(?:(?:\^|\*\*)(-?\d))?")
 
 
 class CommonUnit(NamedTuple):
-    """A unit made of those of the table.
+    """A unit composed of those of the table.
 
     Attributes
     ----------
     factor : float
-        To SI.
+        Factor to SI.
     powers : tuple
         Base unit and its power, sorted by name.
     written : dict
@@ -83,7 +82,7 @@ class CommonUnit(NamedTuple):
 
 @lru_cache(maxsize=512)
 def common_unit(text: str) -> CommonUnit | None:
-    """The unit of a text such as "kN/m" or "kg*m^2", or None if there is another symbol or another spelling in it."""
+    """Return the unit of a text such as "kN/m" or "kg*m^2"; None if it contains other symbols or another spelling."""
     text = text.strip()
     if not _PRODUCT.fullmatch(text):
         return None
@@ -102,14 +101,14 @@ def common_unit(text: str) -> CommonUnit | None:
 
 
 _NUMBER = r"[+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_QUANTITY = re.compile(  # a number keeps its exponent: "1e6*t" is a formula, not 1 of a unit "e6*t"
+_QUANTITY = re.compile(  # the exponent belongs to the number: "1e6*t" is a formula, not 1 of a unit "e6*t"
     rf"\s*(?P<number>{_NUMBER})(?![eE][+-]?\d)\s*(?P<unit>(?:1\s*/\s*)?[^\W\d_].*|[°%µ].*|)\s*", re.DOTALL
 )
 _UNIT = re.compile(r"[\w\s°%µ²³·*/^().-]{1,60}")
 _NO_UNITS = ("speed_of_light", "elementary_charge", "pi", "e")
 _TOWER = re.compile(r"\d{3,}|(?:\*\*|\^)[\s(+-]*[\d.]+[\s)]*(?:\*\*|\^)")
 
-# For each SI unit: what the quantity is called, and a value as a user would write it.
+# For each SI unit: the name of the quantity, and an example as a user would write it.
 KINDS = {
     "1": ("a plain number", "0.5"),
     "m": ("a length", "5 mm"),
@@ -138,14 +137,14 @@ SYMBOLS = frozenset(_SYMBOLS.split())
 
 
 def split_quantity(text: str) -> tuple[str, str] | None:
-    """Number and unit of a text such as "30 deg" (unit "" for a plain number), or None if it is something else."""
+    """Split a text such as "30 deg" into number and unit (unit "" for a plain number); None if it is something else."""
     match = _QUANTITY.fullmatch(text)
     return (match["number"].replace(" ", ""), match["unit"].strip()) if match else None
 
 
 @lru_cache(maxsize=4096)
 def to_si(text: str, dimension: str | None) -> float:
-    """Value of a quantity in SI units.
+    """Return the value of a quantity in SI units.
 
     Parameters
     ----------
@@ -177,7 +176,7 @@ def to_si(text: str, dimension: str | None) -> float:
 
 
 def same_kind(old: str, new: str, where: str) -> None:
-    """Refuse a quantity in place of one of another kind; what has no unit is in SI and says nothing.
+    """Refuse to replace a quantity by one of another kind; a number without unit is in SI and always accepted.
 
     Raises
     ------
@@ -193,7 +192,7 @@ def same_kind(old: str, new: str, where: str) -> None:
 
 
 def is_unit(text: str) -> bool:
-    """Whether the text is a unit that is known ("mm", "kN/m")."""
+    """Return whether the text is a known unit ("mm", "kN/m")."""
     try:
         _unit(text, text, None)
     except UnitError:
@@ -202,7 +201,7 @@ def is_unit(text: str) -> bool:
 
 
 def powers_as_written(unit: str) -> dict[str, float]:
-    """Long name of each symbol of a unit -> its power: "N/mm" is newton 1, millimeter -1; `UnitError` if unknown."""
+    """Return long unit names -> powers: "N/mm" is newton 1, millimeter -1; `UnitError` if unknown."""
     if (common := common_unit(unit)) is not None:
         return dict(common.written)
     _unit(unit, unit, None)
@@ -210,12 +209,12 @@ def powers_as_written(unit: str) -> dict[str, float]:
 
 
 def powers_in_si(unit: str) -> dict[str, float]:
-    """Base unit -> its power; `UnitError` if the unit is unknown."""
+    """Return base units -> powers; `UnitError` if the unit is unknown."""
     return dict(_unit(unit, unit, None)[1])
 
 
 def unit_name(symbol: str) -> str:
-    """Long name of a single unit ("mm": "millimeter"), or nothing if it is unknown."""
+    """Return the long name of a single unit ("mm": "millimeter"); empty if it is unknown."""
     if symbol in COMMON:
         return COMMON[symbol][0]
     return str(_registry().get_name(symbol)) if is_unit(symbol) else ""
@@ -228,14 +227,14 @@ def _registry() -> Any:
     registry: Any = pint.UnitRegistry(autoconvert_offset_to_baseunit=True, on_redefinition="ignore")
     registry.define("@alias turn = rev")
     registry.define("@alias ohm = Ohm")
-    # pint reads Nm as "number of ... metre"; everyone who writes it means a torque.
+    # pint reads Nm as nanometre-like text; users mean a torque
     registry.define("newton_meter = newton * meter = Nm")
     return registry
 
 
 @lru_cache(maxsize=512)
 def _unit(text: str, unit: str, dimension: str | None) -> tuple[float, tuple[tuple[str, float], ...]]:
-    """SI factor of a unit and the powers of its base units, sorted."""
+    """Return the SI factor of a unit and the sorted powers of its base units."""
     if (common := common_unit(unit)) is not None:
         return common.factor, common.powers
     import pint
@@ -248,12 +247,12 @@ def _unit(text: str, unit: str, dimension: str | None) -> tuple[float, tuple[tup
         if any(
             name.endswith("_constant") or name in _NO_UNITS for name, _ in registry.Quantity(1.0, parsed).unit_items()
         ):
-            raise pint.UndefinedUnitError(unit)  # "2 k" is no multiple of Boltzmann's constant
+            raise pint.UndefinedUnitError(unit)  # "2 k" must not be a multiple of Boltzmann's constant
         zero = registry.Quantity(0.0, parsed).to_base_units().magnitude
         base = registry.Quantity(1.0, parsed).to_base_units()
     except pint.UndefinedUnitError:
         raise UnitError(f"'{text}': unknown unit '{unit}'{_hint(unit)}; write {_example(dimension)}") from None
-    except Exception as error:  # pint's own parser fails with many kinds of error on text that is no unit
+    except Exception as error:  # pint's parser raises many kinds of errors for text that is not a unit
         raise UnitError(f"'{text}': cannot read the unit '{unit}' ({error}); write {_example(dimension)}") from None
     if zero != 0.0:
         raise UnitError(
@@ -291,27 +290,28 @@ def _example(dimension: str | None) -> str:
 
 
 def _hint(unit: str) -> str:
-    """Suggestion for a unit whose only fault is its capitals ("KG", "RPM")."""
+    """Return a suggestion for a unit whose only fault is its capitals ("KG", "RPM")."""
     right = {symbol.lower(): symbol for symbol in SYMBOLS}
     words = [right[w.lower()] for w in re.findall(r"[^\W\d]+", unit) if right.get(w.lower(), w) != w]
     return f" (did you mean {', '.join(repr(w) for w in words)}?)" if words else ""
 
 
 _SYMBOL = re.compile(r"[^\W\d]\w*")
-_FORMULA = re.compile(r"[*/+-]\s*[\d(]")  # what no unit has in it
+_FORMULA = re.compile(r"[*/+-]\s*[\d(]")  # characters that no unit contains
 _JOIN = re.compile(r"[\s*/·+-]*\(*$")
 
 
 def refuse_attached(number: str, unit: str, names: Collection[str], dimension: str | None) -> None:
-    """Raise `UnitError` if a symbol of a unit could be meant as one of these names, or is called like a function.
+    """Raise `UnitError` if a unit symbol could be meant as one of these names, or is followed by a function call.
 
-    Where time is no name, "t" behind a unit is refused too: "60 rpm*t" is meant as a law, and would be read in tonnes.
+    If time is not among the names, "t" behind a unit is refused too: "60 rpm*t" is meant as a law, and would be read in
+    tonnes.
     """
     found = _doubtful(unit, names, dimension)
     if not found:
         return
     match = found[0]
-    for later in found:  # as much of the text as can be is left to the quantity
+    for later in found:  # as much of the text as possible belongs to the quantity
         if not _doubtful(_head(unit, later.start()), names, None):
             match = later
     symbol, long = match[0], unit_name(match[0])
@@ -329,7 +329,7 @@ def refuse_attached(number: str, unit: str, names: Collection[str], dimension: s
 
 
 def _fits(text: str, dimension: str | None) -> bool:
-    """Whether a text is a quantity of this dimension."""
+    """Return whether a text is a quantity of this dimension."""
     try:
         to_si(text, dimension)
     except UnitError:
@@ -354,7 +354,7 @@ def _doubtful(unit: str, names: Collection[str], dimension: str | None) -> list[
 
 
 def quantity_remedy(number: str, unit: str) -> str:
-    """How to write a text that is no unit as a whole, if it is a product or a sum that begins with a quantity."""
+    """Return how to write a text that is not a unit as a whole, if it is a product or sum starting with a quantity."""
     for match in _SYMBOL.finditer(unit):
         if not unit_name(match[0]) and match.start() > 0:
             return f"; if you mean a product, write '{product_text(number, unit, match.start())}'"
@@ -362,7 +362,7 @@ def quantity_remedy(number: str, unit: str) -> str:
 
 
 def product_text(number: str, unit: str, start: int) -> str:
-    """The text as a product: the quantity that ends before ``start`` in parentheses, then the rest."""
+    """Return the text as a product: the quantity before ``start`` in parentheses, then the rest."""
     head = _head(unit, start)
     if not head:
         return f"{number}*{unit}"
@@ -371,12 +371,12 @@ def product_text(number: str, unit: str, start: int) -> str:
 
 
 def _head(unit: str, start: int) -> str:
-    """What stands before a place in a unit, without the operator between."""
+    """Return the text before a position in a unit, without the operator in between."""
     return _JOIN.sub("", unit[:start])
 
 
 def _of_known_kind(unit: str, dimension: str | None) -> bool:
-    """Whether a unit measures what is wanted, or something that has a name: "t" a mass, "t/m^3" a density."""
+    """Return whether a unit measures the required or another named quantity: "t" a mass, "t/m^3" a density."""
     try:
         return powers_in_si(unit) in [powers_in_si(k) for k in (*KINDS, dimension or "1") if k not in ("", "1")]
     except UnitError:
@@ -384,7 +384,7 @@ def _of_known_kind(unit: str, dimension: str | None) -> bool:
 
 
 def _customary(symbol: str, unit: str, dimension: str | None, single: bool) -> bool:
-    """Whether a symbol belongs to the usual way of writing a quantity: behind the number, or as in its SI unit."""
+    """Return whether a symbol belongs to the usual unit of the quantity: after the number, or as in its SI unit."""
     if single and symbol in SYMBOLS:
         return True
     try:

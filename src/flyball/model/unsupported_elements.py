@@ -1,8 +1,7 @@
 """Elements that an analysis does not support (contacts, events, controllers, locks): refused by name.
 
-Each analysis names the kinds that it knows: it answers for what holds at the place that it is asked about, or
-refuses the element (`docs/events.md` has the table; `tests/events/test_every_analysis.py` asks every one of every
-element).
+Each analysis lists the kinds that it supports, in their state at the operating point; it refuses other elements
+(`docs/events.md` has the table; `tests/events/test_every_analysis.py` tests every analysis with every element).
 """
 
 from __future__ import annotations
@@ -15,16 +14,16 @@ from .element import Element
 from .model import Model
 
 SLIDING = frozenset({FRICTION})
-"""Kinds that are forces while they slide: what has no modes takes them for sliding, by the sign of the rate."""
+"""Kinds that are forces while they slide; without modes they are treated as sliding, by the sign of the rate."""
 CONTACT_CATEGORIES = ("contacts", "limits", "bulk")
 REPLACEMENT_OPTIONS = {"stick_speed": "regularised", "stiffness": "elastic"}
-"""Numbers that make a part a plain force if they are given, and what it is then called."""
+"""Fields that turn an element into a plain force, and the description of that force."""
 
 
 def unsupported_elements(model: Model, knows: Collection[int] = ()) -> Iterator[Element]:
-    """Parts that only a motion knows: contacts, many bodies, events, and what holds at times.
+    """Return parts that only motions support: contacts, sets of bodies, events, and switching elements.
 
-    What is elastic is a force anywhere; ``knows`` are other kinds (`constraints.modes`) that are left out.
+    Elastic elements are forces in every analysis; ``knows`` are further supported kinds (`constraints.switch_kinds`).
     """
     known = {ELASTIC, *knows}
     yield from (*model.contacts, *model.bulk)
@@ -34,13 +33,13 @@ def unsupported_elements(model: Model, knows: Collection[int] = ()) -> Iterator[
 
 
 def refuse_unsupported(model: Model, analysis: str, knows: Collection[int] = (), *, controlled: bool = False) -> None:
-    """Refuse to answer as if parts were not there.
+    """Refuse a mechanism with unsupported parts, rather than ignore them.
 
     Raises
     ------
     ModelError
-        If the mechanism has a contact, many bodies, an event, or another part that holds at times, of no kind that the
-        analysis ``knows``; or a controller, unless it knows those or they do not matter to it (``controlled``).
+        If the mechanism has a contact, a set of bodies, an event, or a switching element of a kind not in ``knows``; or
+        a controller, unless ``controlled`` says that the analysis supports or may ignore controllers.
     """
     if not controlled:
         refuse_controllers(model, analysis)
@@ -55,7 +54,7 @@ def refuse_unsupported(model: Model, analysis: str, knows: Collection[int] = (),
 
 
 def refuse_controllers(model: Model, analysis: str) -> None:
-    """Refuse to answer as if controllers had no states.
+    """Refuse a mechanism with controllers, whose states the analysis does not support.
 
     Raises
     ------
@@ -71,7 +70,7 @@ def refuse_controllers(model: Model, analysis: str) -> None:
 
 
 def _unsupported_in_words(parts: list[Element]) -> str:
-    """What is not known, in words."""
+    """Describe the unsupported parts."""
     kinds = {e.category for e in parts}
     said = ["no contact, limits or Bodies"] if kinds & set(CONTACT_CATEGORIES) else []
     said += ["nothing that sticks, locks or goes taut"] if kinds - {*CONTACT_CATEGORIES, "events"} else []
@@ -80,7 +79,7 @@ def _unsupported_in_words(parts: list[Element]) -> str:
 
 
 def _replacement_hint(parts: list[Element]) -> str:
-    """What could be given in its place."""
+    """Describe possible replacements."""
     out = []
     for name, becomes in REPLACEMENT_OPTIONS.items():
         able = [e.title for e in parts if hasattr(e, name)]
@@ -91,7 +90,7 @@ def _replacement_hint(parts: list[Element]) -> str:
 
 
 def ignored_elements(model: Model) -> str:
-    """What freedoms are counted without, as a sentence; empty if that is nothing."""
+    """Describe the elements that the count of degrees of freedom ignores; empty if there are none."""
     parts = [e.title for e in unsupported_elements(model) if e.category != "bulk"]
     out = f"{', '.join(parts)}: freedoms and the start are those without" if parts else ""
     bulk = [f"the {e.count} bodies of {e.title}" for e in model.bulk]

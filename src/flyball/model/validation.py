@@ -35,8 +35,9 @@ RESERVED = (GROUND, "energy", "t", "time")
 def check_name(model: Model, e: Element) -> None:
     """Refuse a name that is taken, or that results or laws could not use.
 
-    Laws read sensors, tables and controllers by their bare names; of a sensor whose name is no plain word, such as
-    ``"front wheel"``, only results speak. All else they read with a dot behind it, which no constant has.
+    Laws refer to sensors, tables and controllers by their bare names; a sensor whose name is not a plain word, such as
+    ``"front wheel"``, exists in results only. Other parts are followed by a dot in laws, so they cannot be confused
+    with constants.
     """
     if isinstance(e, Initial):
         if any(i.name == e.name for i in model.initial):
@@ -55,7 +56,7 @@ def check_name(model: Model, e: Element) -> None:
 
 
 def _check_read(e: Element) -> None:
-    """Refuse names that laws would read as something else, or, of a controller, not at all."""
+    """Refuse names that laws would read as something else, or, for a controller, could not read at all."""
     other = f"{type(e).__name__.lower()}_{e.name}"
     if e.name in FUNCTIONS or e.name in CONSTANTS:
         what = f"the function {e.name}" if e.name in FUNCTIONS else f"the number {CONSTANTS[e.name]:.6g}"
@@ -80,7 +81,7 @@ def check_vectors(e: Element, n: Any, planar: bool) -> None:
 
 
 def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
-    """What parts of its kind must fulfil."""
+    """Check the requirements of each kind of part."""
     if isinstance(e, Body):
         check_body(model, e, n, env)
     elif isinstance(e, (Bodies, Ground)):
@@ -101,12 +102,12 @@ def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
 
 
 def resolved_fields(e: Element, env: Mapping[str, float], units: Mapping[str, str]) -> list[Any]:
-    """SI numbers of fields whose units depend on what the element is about."""
+    """Return SI numbers of fields whose units depend on the element's coordinate."""
     return [si_numbers(getattr(e, k), env, unit, f"{k} of {e.title}") for k, unit in units.items()]
 
 
 def check_frame(model: Model, e: Any, n: Any) -> None:
-    """How a body's or a frame's axes are told: by an angle in the plane, by an orientation in space."""
+    """Check the field for a body's or a frame's axes: an angle in the plane, an orientation in space."""
     if model.planar and n.orientation is not None:
         raise ModelError(f"{e.title}: in a planar mechanism give angle=, not orientation=")
     if not model.planar and n.angle != 0.0:
@@ -115,7 +116,7 @@ def check_frame(model: Model, e: Any, n: Any) -> None:
 
 
 def check_body(model: Model, e: Body, n: Any, env: dict[str, float]) -> None:
-    """Mass properties, pose and velocities of a body."""
+    """Check mass properties, pose and velocities of a body."""
     mass_properties(e, n, env, model.planar)
     vector(n.position, model.planar, f"position of {e.title}")
     if n.velocity is not None:
@@ -128,7 +129,7 @@ def check_body(model: Model, e: Body, n: Any, env: dict[str, float]) -> None:
 
 
 def check_unmoved(model: Model, e: Bodies | Ground, n: Any, env: dict[str, float]) -> None:
-    """Many bodies, or what stands on ground: shapes, poses and velocities."""
+    """Check shapes, poses and velocities of a set of bodies, or of ground."""
     if isinstance(e, Bodies):
         e.weight(n, env, model.planar)
         e.start(model.planar)
@@ -140,7 +141,7 @@ def check_unmoved(model: Model, e: Bodies | Ground, n: Any, env: dict[str, float
 
 
 def check_joint(model: Model, e: Joint, n: Any) -> None:
-    """A joint has a meaning here, and its frames can be made."""
+    """Check that a joint is possible in the plane or in space, and that its frames can be created."""
     if model.planar and not e.planar_normal:
         raise ModelError(
             f"{e.title}: {type(e).__name__} has no meaning in a planar mechanism; use a joint of the plane, such as "
@@ -159,7 +160,7 @@ def check_joint(model: Model, e: Joint, n: Any) -> None:
 
 
 def check_by_frames(model: Model, e: Joint | TwoFrameForce) -> None:
-    """What is not placed by ``at`` names frames."""
+    """Require frames for an element without ``at``."""
     if all(name == GROUND or isinstance(model[name], Body) for name in (e.body_i, e.body_j)):
         raise ModelError(f"{e.title}: say where it is: at=... in world coordinates, or name frames of the bodies")
 
@@ -179,7 +180,9 @@ def refuse_ambiguous_names(
 
 
 def gravity_as_written(model: Model, value: Any) -> tuple | list:
-    """A vector of numbers and texts, not yet in SI units, of the model's own: a list if it may be changed in place."""
+    """Return a vector of numbers and texts, not yet in SI units, owned by the model: a list if it may be changed in
+    place.
+    """
     try:
         found = python_data(value)
     except (ValueError, TypeError, AttributeError) as error:
@@ -191,7 +194,7 @@ def gravity_as_written(model: Model, value: Any) -> tuple | list:
 
 
 def check_references(model: Model, e: Element) -> None:
-    """Refuse what names parts that are not there, or both times the same one."""
+    """Refuse references to unknown parts, or twice to the same one."""
     if isinstance(e, (Body, Bodies, Ground, Contact, MaterialPair)):
         check_touching(model, e)
     if isinstance(e, (Joint, TwoPointForce, TwoFrameForce)):
@@ -223,7 +226,7 @@ def check_references(model: Model, e: Element) -> None:
 
 
 def _check_path(model: Model, e: CoordinateForce) -> None:
-    """What it acts along exists, and can move."""
+    """Require that the coordinate along which it acts exists and can move."""
     for text in e.along() or ((e.coordinate,) if hasattr(e, "coordinate") else ()):
         model.coordinate(text, e)
     carriers = [model.carrier(name, e) for name in e.ends().values()]
@@ -236,9 +239,9 @@ def _check_path(model: Model, e: CoordinateForce) -> None:
 def checked_law(
     model: Model, value: Any, of: LawOf, where: str, driver: bool = False, whole: bool = True
 ) -> Expression | None:
-    """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names.
+    """Return a law as an expression of t, its inputs, sensors, tables and parameters; refuse other names.
 
-    Formulas of controllers' signals stand in the places of their names, if ``whole``.
+    If ``whole``, signals of controllers are replaced by their formulas.
     """
     if value is None:
         return None
@@ -254,7 +257,7 @@ def checked_law(
         expression = law_expression(value, of.dimension, where, tables, names, of.curves or bool(signals))
         if not of.curves and any("." in k and k not in signals for k in expression.names - set(names)):
             controller_signals.refuse_unknown(model, expression)
-            law_expression(value, of.dimension, where, tables, names)  # which refuses curves of other parts
+            law_expression(value, of.dimension, where, tables, names)  # parsing refuses curves of other parts
         expression = dataclasses.replace(expression, where=where)
         if expression.tree.kind == "number":
             checked_size(expression.tree.value, of.dimension, where)
@@ -285,7 +288,7 @@ def checked_law(
 
 
 def _check_sensed(model: Model, e: Sensor, where: str, driver: bool) -> None:
-    """Whether a law may use a sensor."""
+    """Refuse sensors that the law may not use."""
     found = model.measured(e)
     if found is None:
         raise ModelError(
@@ -300,7 +303,7 @@ def _check_sensed(model: Model, e: Sensor, where: str, driver: bool) -> None:
 
 
 def _check_curve(model: Model, name: str, where: str, of: LawOf) -> None:
-    """Whether a curve is one of positions or velocities, or, for an event, what a part carries."""
+    """Require that a curve is one of positions or velocities, or, for an event, a force of a part."""
     if of.forces and transmitted_force(model, name):
         return
     if measured_quantity(model, Curve(where, name)) is None:

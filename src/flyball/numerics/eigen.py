@@ -1,8 +1,8 @@
 """Eigenvalues: the largest of an operator, and a few of a constrained quadratic pencil.
 
 `dominant_eigenvalue` is Arnoldi's method (Y. Saad, *Numerical Methods for Large Eigenvalue Problems*, 2nd
-edition, 2011, section 6.2) for a matrix of which only products are known. It finds complex pairs, on which the
-power method oscillates.
+edition, 2011, section 6.2) for a matrix that is available only through products. Unlike the power method, which
+oscillates on them, it finds complex pairs.
 
 `QuadraticPencil` finds a few eigenvalues of M x'' + D x' + K x = G^T l, G x = 0 with sparse matrices and
 without reduction to independent coordinates. With x = X exp(s t) and a shift z one solve with [K + z D + z^2 M,
@@ -24,25 +24,25 @@ import numpy as np
 from ..errors import AnalysisError
 from .sparse_rank import null_basis, saddle_point_solver
 
-BREAKDOWN_TOLERANCE = 1e-10  # part of a product that is not in the space already: it is invariant
+BREAKDOWN_TOLERANCE = 1e-10  # relative norm of the new direction below which the Krylov space counts as invariant
 
 
 def dominant_eigenvalue(product: Callable[[np.ndarray], np.ndarray], start: np.ndarray, most: int) -> complex:
-    """The Ritz value of largest modulus.
+    """Compute the Ritz value of largest modulus.
 
     Parameters
     ----------
     product : callable
-        The matrix times a vector.
+        Product of the matrix with a vector.
     start : numpy.ndarray
-        A vector rich in what belongs to that eigenvalue; not zero.
+        Start vector with a large component along the wanted eigenvector; not zero.
     most : int
-        Products.
+        Maximum number of products.
 
     Returns
     -------
     complex
-        Of a pair, either; zero if a product is not finite.
+        Either one of a complex pair; zero if a product is not finite.
     """
     most = min(most, len(start))
     space, H = np.zeros((most + 1, len(start))), np.zeros((most + 1, most))
@@ -52,7 +52,7 @@ def dominant_eigenvalue(product: Callable[[np.ndarray], np.ndarray], start: np.n
         if not np.isfinite(out).all():
             return 0j
         size = np.linalg.norm(out)
-        for _ in range(2):  # once more, for what rounding has left
+        for _ in range(2):  # repeated to remove what rounding leaves
             part = space[: k + 1] @ out
             H[: k + 1, k] += part
             out = out - part @ space[: k + 1]
@@ -65,22 +65,22 @@ def dominant_eigenvalue(product: Callable[[np.ndarray], np.ndarray], start: np.n
     return complex(values[np.argmax(np.abs(values))])
 
 
-RELATIVE_SHIFT = 1e-3  # of the size of the fastest motion: where eigenvalues next to 0 are sought from, on the left
-DAMPING_TOLERANCE, SYMMETRY_TOLERANCE = 1e-12, 1e-8  # parts of a matrix that are none
-DENSE_FREEDOMS = 40  # freedoms up to which all eigenvalues are found
-DISCRIMINANT_ROUNDING = 1e-14  # of the terms of a discriminant
-START_SOLVES = 3  # solves that leave nothing of what constraints forbid
-EIGENVALUE_TOLERANCE = 1e-6  # part of an eigenvalue's distance that rounding may have moved it by
+RELATIVE_SHIFT = 1e-3  # shift to the left of the target, relative to `QuadraticPencil.fastest`
+DAMPING_TOLERANCE, SYMMETRY_TOLERANCE = 1e-12, 1e-8  # relative size below which a matrix counts as zero
+DENSE_FREEDOMS = 40  # number of freedoms up to which all eigenvalues are computed densely
+DISCRIMINANT_ROUNDING = 1e-14  # relative to the terms of the discriminant
+START_SOLVES = 3  # solves that remove from the start vector the components forbidden by constraints
+EIGENVALUE_TOLERANCE = 1e-6  # largest change by refinement, relative to the distance from the shift
 
 
 @dataclass
 class QuadraticPencil:
-    """Sparse matrices of linear equations at rest.
+    """Matrices M, D, K, G of the linear equations M x'' + D x' + K x = G^T l, G x = 0 about a rest position.
 
     Attributes
     ----------
     M, D, K : sparse (n, n)
-        In units in which the unknowns compare.
+        Scaled so that the unknowns are of comparable size.
     G : sparse (m, n)
         Independent rows of unit size.
     """
@@ -92,49 +92,49 @@ class QuadraticPencil:
 
     @property
     def freedoms(self) -> int:
-        """What the rows leave."""
+        """Number of degrees of freedom: unknowns minus constraint rows."""
         return self.M.shape[0] - self.G.shape[0]
 
     @cached_property
     def fastest(self) -> float:
-        """Size of the fastest motions [1/s], roughly."""
+        """Rough estimate of the largest characteristic rate [1/s]."""
         stiff, slow = (float(abs(X).max()) if X.nnz else 0.0 for X in (self.K, self.D))
         mass = float(abs(self.M).max())
         return max(np.sqrt(stiff / mass), slow / mass) or 1.0
 
     @cached_property
     def conservative(self) -> bool:
-        """Whether nothing damps or turns, and the stiffness is that of a potential."""
+        """Whether damping and gyroscopic terms vanish and the stiffness matrix is symmetric."""
         size = abs(self.K).max() if self.K.nnz else 0.0
         still = abs(self.D).max() * self.fastest <= DAMPING_TOLERANCE * max(size, 1e-300) if self.D.nnz else True
         return bool(still and (not self.K.nnz or abs(self.K - self.K.T).max() <= SYMMETRY_TOLERANCE * size))
 
     def solver(self, s: complex) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        """What gives x of (K + s D + s^2 M) x - G^T l = f, G x = g; errors as `saddle_point_solver`."""
+        """Return a solver for x of (K + s D + s^2 M) x - G^T l = f, G x = g; raises as `saddle_point_solver`."""
         solve = saddle_point_solver(self.K + s * self.D + s * s * self.M, self.G)
         return lambda f, g: solve(f, g)[0]
 
     def nearest(self, count: int, near: complex = 0.0) -> tuple[np.ndarray, np.ndarray, float]:
-        """Eigenvalues next to a number, their shapes, and what is left of these.
+        """Find the eigenvalues nearest to a number, with mode shapes and the largest residual.
 
         Parameters
         ----------
         count : int
-            How many at least: of a pair next to a real number both are there.
+            Minimum number. Both eigenvalues of a complex pair next to a real ``near`` are returned.
         near : complex [1/s]
 
         Returns
         -------
         w : ndarray (k,) complex
-            By distance.
+            Sorted by distance from ``near``.
         X : ndarray (n, k) complex
         residual : float
-            The largest part by which an eigenvector differs from what solving makes of it.
+            Largest relative difference between an eigenvector and its image under the inverse iteration.
 
         Raises
         ------
         AnalysisError
-            If they are not found.
+            If the eigenvalues cannot be found.
         """
         if not self.freedoms:
             return np.zeros(0, complex), np.zeros((self.M.shape[0], 0), complex), 0.0
@@ -191,7 +191,7 @@ class QuadraticPencil:
         return shift + 1.0 / values, V[:n]
 
     def _inverse(self, near: complex) -> tuple[Callable[[np.ndarray], np.ndarray], complex]:
-        """(A - z E)^-1 E on (x, x'), and z: next to ``near``, on the left where that is real."""
+        """Return the operator (A - z E)^-1 E on (x, x') and the shift z, slightly to the left of ``near``."""
         n = self.M.shape[0]
         z = near - RELATIVE_SHIFT * self.fastest
         z = float(np.real(z)) if np.imag(z) == 0.0 else z
@@ -206,7 +206,10 @@ class QuadraticPencil:
         return apply, z
 
     def _refined(self, w: np.ndarray, X: np.ndarray, near: complex) -> tuple[np.ndarray, np.ndarray, float]:
-        """By two solves each, which rounding at the fastest motions does not reach; and what solving leaves of them."""
+        """Refine eigenpairs by two inverse iterations each; returns them and the largest residual.
+
+        The solves are not affected by rounding at the scale of the fastest motions.
+        """
         w, X, worst = w.astype(complex), X.astype(complex), 0.0
         apply, z = self._inverse(near)
         for k in range(len(w)):
@@ -226,13 +229,13 @@ class QuadraticPencil:
 
 
 def _eigenvalue_pairs(squares: np.ndarray, V: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues +-w and shapes from -w^2."""
+    """Return the eigenvalues +-w and their shapes from -w^2."""
     w = np.sqrt(-squares.astype(complex))
     return np.concatenate([w, -w]), np.hstack([V, V]).astype(complex)
 
 
 def _nearest_quadratic_root(a: list[complex], near: complex) -> complex:
-    """The root of a[0] s^2 + a[1] s + a[2] next to a number; of two that rounding parts the mean."""
+    """Return the root of a[0] s^2 + a[1] s + a[2] nearest to a number; the mean of a root split by rounding."""
     if abs(a[1] ** 2 - 4.0 * a[0] * a[2]) <= DISCRIMINANT_ROUNDING * abs(a[1]) ** 2:
         return -0.5 * a[1] / a[0]
     roots = np.roots(a)

@@ -1,12 +1,12 @@
-"""Graph algorithms: connected sets by union-find, and elimination orders of small fill.
+"""Graph algorithms: connected components by union-find, and elimination orders with little fill.
 
 Union-find with path halving (Tarjan 1975) runs in linear time and is compiled.
 
 Minimum degree and nested dissection (George, *Nested dissection of a regular finite element mesh*, 1973; fill n
-log n, work n^1.5) order the unknowns of sparse matrices. A small separator, whose removal leaves two halves, is
-eliminated last, recursively. Graph distances from a few reference vertices and their differences serve as
-coordinates; the cut is placed where the graph is narrow along one of them and both sides are large. The edges
-cut are covered by the fewest vertices (Koenig 1931: as many as the largest matching has).
+log n, work n^1.5) order the unknowns of sparse matrices. Nested dissection eliminates a small separator last, whose
+removal leaves two halves, and treats the halves recursively. Graph distances from a few reference vertices and their
+differences serve as coordinates; the cut is placed where the graph is narrow along one of them and both sides are
+large. The cut edges are covered by the fewest vertices (Koenig 1931: as many as the largest matching has).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..compiler.formulas import formula
 
 @formula
 def find_root(parent, i):
-    """The root of i; paths are halved on the way."""
+    """Find the root of i, with path halving."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -29,7 +29,7 @@ def find_root(parent, i):
 
 @formula
 def unite(parent, i, j):
-    """Two become one; the smaller number leads, so that nothing depends on the order of what unites them."""
+    """Unite the sets of i and j; the smaller root becomes the root, so the result is independent of the order."""
     i, j = find_root(parent, i), find_root(parent, j)
     if i < j:
         parent[j] = i
@@ -37,14 +37,17 @@ def unite(parent, i, j):
         parent[i] = j
 
 
-LEAF_SIZE = 60  # parts up to this size are left to minimum degree
+LEAF_SIZE = 60  # subgraphs up to this size are ordered by minimum degree
 REFERENCE_VERTICES = 4
-SMALL_ORDER = 60  # orders up to this one need no SciPy
-MIN_BALANCE = 0.2  # least product of the parts that two halves are of the whole
+SMALL_ORDER = 60  # orders up to which minimum degree runs in plain Python, without SciPy
+MIN_BALANCE = 0.2  # smallest product of the weight fractions of the two halves
 
 
 def nested_dissection(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """Place (n,) of every vertex in an order of elimination by nested dissection; entries (i, j) as for `analyse`."""
+    """Order vertices by nested dissection; returns the place (n,) of each in the order of elimination.
+
+    Entries (i, j) as for `sparse_factorisation.analyse_ldl`.
+    """
     import scipy.sparse as sp
 
     own = np.arange(n)
@@ -65,9 +68,9 @@ def nested_dissection(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
 
 
 def _merge_equal_neighbours(A: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices with the same neighbours and themselves are one (rows of one joint): a first of each, group of each.
+    """Merge vertices with equal closed neighbourhoods (rows of one joint): first vertex and group number of each.
 
-    By sums of random numbers over neighbours; two groups taken for one would cost fill and nothing else.
+    Neighbourhoods are compared by sums of random numbers. Two groups merged by coincidence only cost fill.
     """
     keys = np.random.default_rng(1).integers(1, 2**40, A.shape[0])
     sums = np.add.reduceat(keys[A.indices], A.indptr[:-1])
@@ -76,7 +79,7 @@ def _merge_equal_neighbours(A: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _append_elimination(A: Any, weight: np.ndarray, names: np.ndarray, order: list[np.ndarray]) -> None:
-    """Append the vertices of a graph, known outside as ``names``, in the order of elimination."""
+    """Append the vertices of a graph, numbered ``names`` in the whole graph, in the order of elimination."""
     from scipy.sparse.csgraph import connected_components
 
     if len(names) > LEAF_SIZE:
@@ -97,7 +100,7 @@ def _append_elimination(A: Any, weight: np.ndarray, names: np.ndarray, order: li
 
 
 def _find_separator(A: Any, weight: np.ndarray) -> np.ndarray | None:
-    """Each vertex's half, 0 or 1, or 2 for those between them; none if no cut leaves two halves."""
+    """Return for each vertex its half, 0 or 1, or 2 in the separator; None if no cut leaves two halves."""
     rows = np.repeat(np.arange(len(weight)), np.diff(A.indptr))
     total = weight.sum()
     best, found = np.inf, None
@@ -122,7 +125,7 @@ def _find_separator(A: Any, weight: np.ndarray) -> np.ndarray | None:
 
 
 def _cut_width(A: Any, rows: np.ndarray, by: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Weight of the vertices among the first k + 1 that have neighbours beyond, for every k."""
+    """Weight of the vertices among the first k + 1 that have neighbours beyond them, for every k."""
     place = np.empty(len(by), np.int64)
     place[by] = np.arange(len(by))
     last = np.maximum.reduceat(place[A.indices], A.indptr[:-1])
@@ -132,7 +135,7 @@ def _cut_width(A: Any, rows: np.ndarray, by: np.ndarray, weight: np.ndarray) -> 
 
 
 def _distance_coordinates(A: Any) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Distances from corners and their differences, each with another that orders what is equal by it."""
+    """Distances from reference vertices and their differences, each with a second coordinate that breaks ties."""
     from scipy.sparse.csgraph import dijkstra
 
     def distances(root: int) -> np.ndarray:
@@ -148,7 +151,7 @@ def _distance_coordinates(A: Any) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def _vertex_cover(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """The least set of vertices that touches every edge (left, right) of a bipartite graph."""
+    """Find the smallest set of vertices that touches every edge (left, right) of a bipartite graph."""
     import scipy.sparse as sp
     from scipy.sparse.csgraph import maximum_bipartite_matching
 
@@ -158,7 +161,7 @@ def _vertex_cover(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     of_left = maximum_bipartite_matching(B, perm_type="column")
     of_right = np.full(len(vs), -1)
     of_right[of_left[of_left >= 0]] = np.flatnonzero(of_left >= 0)
-    reached = of_left < 0  # by ways that alternate between edges outside and inside the matching, from the unmatched
+    reached = of_left < 0  # by alternating paths from unmatched vertices
     seen = np.zeros(len(vs), bool)
     new = np.flatnonzero(reached)
     while len(new):
@@ -172,7 +175,7 @@ def _vertex_cover(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def minimum_degree(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """Place (n,) of every unknown in an order by minimum degree: of large matrices Liu's (1985), from SuperLU."""
+    """Order unknowns by minimum degree; returns the place (n,) of each. Large matrices: Liu (1985), from SuperLU."""
     if n < SMALL_ORDER:
         return _plain_minimum_degree(n, i, j)
     import scipy.sparse as sp
@@ -186,7 +189,7 @@ def minimum_degree(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
 
 
 def _plain_minimum_degree(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """Always the unknown with the fewest neighbours next, which then are neighbours of each other."""
+    """Eliminate the unknown with the fewest neighbours next; its neighbours become neighbours of each other."""
     near: list[set[int]] = [set() for _ in range(n)]
     for a, b in zip(i.tolist(), j.tolist(), strict=True):
         if a != b:

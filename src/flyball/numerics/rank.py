@@ -1,4 +1,4 @@
-"""Rank of a matrix and what goes with it, by singular values: the one place where it is decided what counts as zero."""
+"""Rank and fundamental subspaces by singular values; defines which singular values count as zero."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-RANK_TOLERANCE = 1e-8  # singular values below this part of the largest count as zero; rows scaled to unit length
+RANK_TOLERANCE = 1e-8  # relative to the largest singular value; rows are scaled to unit length
 
 
 def svd(A: np.ndarray, full: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Singular values and vectors: U, d, V^T of A = U diag(d) V^T.
 
     NumPy's algorithm, divide and conquer (LAPACK's ``gesdd``), does not converge for some finite matrices with many
-    equal singular values beside rounding; the implicit QR iteration (``gesvd``), which is slower, does.
+    singular values that are equal up to rounding. The slower implicit QR iteration (``gesvd``) does.
     """
     try:
         return np.linalg.svd(A, full_matrices=full)
@@ -24,32 +24,32 @@ def svd(A: np.ndarray, full: bool = False) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 class FundamentalSubspaces(NamedTuple):
-    """Orthonormal bases of the four spaces of a matrix A (n, m) of rank r."""
+    """Orthonormal bases of the four fundamental subspaces of a matrix A (n, m) of rank r."""
 
-    span: np.ndarray  # (n, r): what A makes of vectors
+    span: np.ndarray  # (n, r): column space
     dependencies: np.ndarray  # (n, n - r): y with y A = 0
-    seen: np.ndarray  # (m, r): what its rows span
+    seen: np.ndarray  # (m, r): row space
     null: np.ndarray  # (m, m - r): x with A x = 0
-    values: np.ndarray  # the singular values that count, (r,)
+    values: np.ndarray  # (r,): nonzero singular values
 
     @property
     def rank(self) -> int:
-        """How many rows are independent."""
+        """Number of independent rows."""
         return len(self.values)
 
 
 def fundamental_subspaces(
     A: np.ndarray, tolerance: float = RANK_TOLERANCE, size: float | None = None
 ) -> FundamentalSubspaces:
-    """A matrix taken apart.
+    """Compute the four fundamental subspaces by singular value decomposition.
 
     Parameters
     ----------
     A : ndarray (n, m)
     tolerance : float
-        Singular values below this part of ``size`` count as zero.
+        Singular values below ``tolerance * size`` count as zero.
     size : float, optional
-        The largest singular value if not given.
+        Default: the largest singular value.
     """
     n, m = A.shape
     if not A.size:
@@ -60,12 +60,12 @@ def fundamental_subspaces(
 
 
 def rank(A: np.ndarray, tolerance: float = RANK_TOLERANCE, size: float | None = None) -> int:
-    """How many rows (and columns) are independent; as for `fundamental_subspaces`."""
+    """Number of independent rows (and columns); parameters as for `fundamental_subspaces`."""
     return _count_nonzero(np.linalg.svd(A, compute_uv=False), tolerance, size) if A.size else 0
 
 
 def column_space(A: np.ndarray, tolerance: float = RANK_TOLERANCE, size: float | None = None) -> np.ndarray:
-    """An orthonormal basis (n, r) of what the columns span; as for `fundamental_subspaces`, for few columns."""
+    """Orthonormal basis (n, r) of the column space; efficient for few columns. As for `fundamental_subspaces`."""
     if not A.size:
         return A[:, :0]
     U, d, _ = svd(A)
@@ -73,7 +73,7 @@ def column_space(A: np.ndarray, tolerance: float = RANK_TOLERANCE, size: float |
 
 
 def null_space(A: np.ndarray, tolerance: float = RANK_TOLERANCE, size: float | None = None) -> np.ndarray:
-    """An orthonormal basis (m, m - r) of the vectors that A takes to nothing; as for `fundamental_subspaces`."""
+    """Orthonormal basis (m, m - r) of the vectors x with A x = 0; parameters as for `fundamental_subspaces`."""
     return fundamental_subspaces(A, tolerance, size).null
 
 

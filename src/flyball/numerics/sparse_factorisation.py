@@ -7,8 +7,8 @@ L D L^T, for symmetric quasi-definite matrices, is up-looking after Davis, *Algo
 Cholesky factorization package* (2005).
 
 L U, real or complex and without pivoting, is for the matrices of implicit integrators. Their order
-(`constrained_order`) makes the pivots safe; a regularisation on the diagonal keeps them from zero and is
-removed by iterative refinement by the caller. It works row by row (Doolittle), after Davis, *Direct Methods for
+(`constrained_order`) keeps the pivots from zero together with a regularisation on the diagonal, whose effect the
+caller removes by iterative refinement. It works row by row (Doolittle), after Davis, *Direct Methods for
 Sparse Linear Systems* (2006), chapter 6. Rows of U with one pattern, such as those of the coordinates of a
 body, are processed two at a time.
 """
@@ -26,8 +26,8 @@ from ..compiler.struct_layout import Float1, Int1
 from ..math.scalar import nonzero
 from .graphs import minimum_degree, nested_dissection
 
-DISSECTION_ORDER = 300  # unknowns from which on other orders than minimum degree are tried
-DISSECTION_WORK = 100.0  # and products for each unknown
+DISSECTION_ORDER = 300  # number of unknowns above which nested dissection is tried
+DISSECTION_WORK = 100.0  # and multiplications per unknown above which it is tried
 
 
 class LDLPattern(NamedTuple):
@@ -45,7 +45,7 @@ class LDLPattern(NamedTuple):
 
 @formula
 def ldl_factor(P, A, L, D, Y):
-    """Factor A in place of L and D (D holds the inverse diagonal). Returns 0, or 1 + the row of a zero pivot."""
+    """Factor A into L and D (D holds the inverse diagonal). Returns 0, or 1 + the row of a zero pivot."""
     n = P.perm.shape[0]
     for k in range(n):
         last = P.Ap[k + 1] - 1
@@ -86,7 +86,7 @@ def ldl_solve(P, L, D, x):
 
 
 def analyse_ldl(n: int, i: np.ndarray, j: np.ndarray, order: np.ndarray | None = None) -> tuple[LDLPattern, np.ndarray]:
-    """Order of elimination and pattern of L for a symmetric matrix with entries (i, j).
+    """Find an order of elimination and the pattern of L for a symmetric matrix with entries (i, j).
 
     Parameters
     ----------
@@ -95,11 +95,11 @@ def analyse_ldl(n: int, i: np.ndarray, j: np.ndarray, order: np.ndarray | None =
     i, j : ndarray of int
         Rows and columns of the entries, either triangle, repeats allowed.
     order : ndarray of int, optional
-        Place of every unknown in the order of elimination; if not given, one that makes little work.
+        Place of every unknown in the order of elimination; by default an order with little work.
 
     Returns
     -------
-    Pattern
+    LDLPattern
     place : ndarray of int
         Where each given entry goes in ``A``, followed by the places of the n diagonal entries.
     """
@@ -117,7 +117,7 @@ def analyse_ldl(n: int, i: np.ndarray, j: np.ndarray, order: np.ndarray | None =
 
 
 class LowerPattern(NamedTuple):
-    """An order of elimination and the pattern of L that it makes, by columns."""
+    """An order of elimination and the resulting pattern of L, by columns."""
 
     perm: np.ndarray
     Lp: np.ndarray
@@ -125,13 +125,13 @@ class LowerPattern(NamedTuple):
 
     @property
     def work(self) -> float:
-        """Products of a factorisation."""
+        """Number of multiplications of a factorisation."""
         column = np.diff(self.Lp).astype(float)
         return float((column * (column + 3.0)).sum() / 2.0)
 
 
 def _cheapest_order(n: int, i: np.ndarray, j: np.ndarray) -> LowerPattern:
-    """The order that makes less work: minimum degree, or nested dissection where it might pay."""
+    """Choose the cheaper order: minimum degree, or nested dissection for large costly matrices."""
     L = _lower_pattern(n, i, j, minimum_degree(n, i, j))
     if n < DISSECTION_ORDER or L.work < DISSECTION_WORK * n:
         return L
@@ -140,7 +140,7 @@ def _cheapest_order(n: int, i: np.ndarray, j: np.ndarray) -> LowerPattern:
 
 
 def _lower_pattern(n: int, i: np.ndarray, j: np.ndarray, perm: np.ndarray) -> LowerPattern:
-    """Pattern of L: each column has the entries of A and of the columns whose first entry it is (Liu 1986)."""
+    """Pattern of L: a column has the entries of A and of the columns whose first entry is in its row (Liu 1986)."""
     row, column = np.minimum(perm[i], perm[j]), np.maximum(perm[i], perm[j])
     order = np.argsort(row, kind="stable")
     start = np.searchsorted(row[order], np.arange(n + 1)).tolist()
@@ -160,12 +160,12 @@ def _lower_pattern(n: int, i: np.ndarray, j: np.ndarray, perm: np.ndarray) -> Lo
 
 @kernel
 def ldl_factor_kernel(P: LDLPattern, A: Float1, L: Float1, D: Float1, Y: Float1) -> None:
-    """Factor a sparse symmetric matrix; see ``ldl_factor``."""
+    """Factor a sparse symmetric matrix; see `ldl_factor`."""
     return ldl_factor(P, A, L, D, Y)
 
 
 class LUPattern(NamedTuple):
-    """Structure of A, L and U by rows, in the order of elimination; columns ascend, diagonals of L and U left out."""
+    """Structure of A, L and U by rows, in the order of elimination; ascending columns, without diagonals of L, U."""
 
     perm: Int1  # (n,): place of unknown i in the order of elimination
     Ap: Int1  # (n + 1,)
@@ -174,12 +174,12 @@ class LUPattern(NamedTuple):
     Lj: Int1  # (nL,)
     Up: Int1  # (n + 1,)
     Uj: Int1  # (nU,)
-    twin: Int1  # (n,): whether row i of U has i + 1 and then what row i + 1 has
+    twin: Int1  # (n,): 1 if the columns of row i of U are i + 1 and then those of row i + 1
 
 
 @formula
 def lu_factor(P, A, L, U, D, Y):
-    """Factor A in place of L (unit diagonal), U and D (inverse diagonal of U). Returns 0, or 1 + the row that fails.
+    """Factor A into L (unit diagonal), U and D (inverse diagonal of U). Returns 0, or 1 + the row that fails.
 
     ``A`` holds the entries by rows as in ``P.Aj``. ``Y`` is scratch, (n,).
     """
@@ -237,7 +237,7 @@ def lu_solve(P, L, U, D, x):
 
 @formula
 def sparse_product(P, A, x, out):
-    """Out = A x, both in the factored order."""
+    """Write A x to ``out``, both in the factored order."""
     for k in range(P.perm.shape[0]):
         s = 0.0 * x[k]
         for p in range(P.Ap[k], P.Ap[k + 1]):
@@ -246,7 +246,7 @@ def sparse_product(P, A, x, out):
 
 
 def analyse_lu(n: int, i: np.ndarray, j: np.ndarray, order: np.ndarray) -> tuple[LUPattern, np.ndarray]:
-    """Pattern of the factors of a matrix with entries (i, j); where each of these goes in ``A``.
+    """Find the pattern of the factors of a matrix with entries (i, j), and the place of each entry in ``A``.
 
     Parameters
     ----------
@@ -278,13 +278,13 @@ def analyse_lu(n: int, i: np.ndarray, j: np.ndarray, order: np.ndarray) -> tuple
 
 
 def row_pointers(rows: np.ndarray, n: int) -> np.ndarray:
-    """Where each row begins among entries in the order of rows, (n + 1,)."""
+    """First entry of each row, (n + 1,), among entries sorted by row."""
     return np.r_[0, np.cumsum(np.bincount(rows, minlength=n))].astype(np.int64)
 
 
 @kernel
 def lu_pattern(Ap: Int1, Aj: Int1, Lp: Int1, Lj: Int1, Up: Int1, Uj: Int1, marks: Int1) -> int:
-    """Patterns of L and U of rows eliminated in turn. Returns 0, or 1 if there is no room for them."""
+    """Find the patterns of L and U row by row. Returns 0, or 1 if the arrays are too short."""
     n = Ap.shape[0] - 1
     for k in range(n):
         nl, nu = Lp[k], Up[k]
@@ -312,15 +312,15 @@ def lu_pattern(Ap: Int1, Aj: Int1, Lp: Int1, Lj: Int1, Up: Int1, Uj: Int1, marks
 
 
 def constrained_order(groups: np.ndarray, late: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """Place (n,) of every unknown in an order by minimum degree, in which some come late.
+    """Order unknowns by minimum degree, with some groups late; returns the place (n,) of each.
 
     Parameters
     ----------
     groups : (n,) of int
         The group of each unknown; a group is eliminated as a whole, its unknowns in their order.
     late : (groups,) of bool
-        Whether a group has to wait for all its neighbours that are not late: multipliers for the bodies that their
-        rows touch.
+        Whether a group is eliminated only after all its neighbours that are not late: multipliers after the bodies
+        that their constraint rows involve.
     i, j : ndarray of int
         Entries of the matrix.
     """

@@ -24,14 +24,14 @@ from .rank import RANK_TOLERANCE, fundamental_subspaces
 from .rank import rank as rank_of_array
 from .sparse_factorisation import LDLPattern, analyse_ldl, ldl_factor_kernel, ldl_solve
 
-MAX_ITERATIONS, MIN_ITERATIONS = 50, 2  # iterations
-VALUE_TOLERANCE = 1e-4  # change of a singular value, of itself, at which its iteration ends
-DEPENDENCY_REFINEMENTS = 2  # times that a dependency is
+MAX_ITERATIONS, MIN_ITERATIONS = 50, 2  # iterations of singular values
+VALUE_TOLERANCE = 1e-4  # relative change of a singular value at which its iteration ends
+DEPENDENCY_REFINEMENTS = 2  # refinement steps per dependency
 
 
 @formula
 def combine_rows(row_p, col_i, H, x, w):
-    """Leave x H in w; returns its square."""
+    """Write x H to w; returns its squared norm."""
     for d in range(w.shape[0]):
         w[d] = 0.0
     for k in range(x.shape[0]):
@@ -45,7 +45,7 @@ def combine_rows(row_p, col_i, H, x, w):
 
 @formula
 def largest_singular_value(row_p, col_i, H, y, w):
-    """The largest singular value, by multiplications of y with H H^T; y is to go on from one matrix to the next."""
+    """Estimate the largest singular value by power iteration with H H^T from y, which the next call can start from."""
     value = 0.0
     for _ in range(MAX_ITERATIONS):
         size = 0.0
@@ -74,7 +74,7 @@ def row_times_vector(row_p, col_i, H, w, k):
 
 @formula
 def solve_normal_equations(P, L, D, x, z):
-    """x becomes (H H^T)^-1 x; ``z`` is scratch."""
+    """Overwrite x with (H H^T)^-1 x; ``z`` is scratch."""
     for k in range(x.shape[0]):
         z[P.perm[k]] = x[k]
     ldl_solve(P, L, D, z)
@@ -84,7 +84,7 @@ def solve_normal_equations(P, L, D, x, z):
 
 @formula
 def refine_dependency(P, L, D, row_p, col_i, H, x, w, z):
-    """Take off x what its residual x H says that is no dependency."""
+    """Subtract from x the correction given by its residual x H."""
     combine_rows(row_p, col_i, H, x, w)
     for k in range(x.shape[0]):
         z[P.perm[k]] = row_times_vector(row_p, col_i, H, w, k)
@@ -95,7 +95,7 @@ def refine_dependency(P, L, D, row_p, col_i, H, x, w, z):
 
 @formula
 def orthonormalise(X, i):
-    """Make vector i orthogonal to those before it, twice since rounding is magnified, and of unit length."""
+    """Orthogonalise vector i against those before it, twice because rounding is magnified, and normalise it."""
     n = X.shape[1]
     for _ in range(2):
         s = 0.0
@@ -120,9 +120,9 @@ def orthonormalise(X, i):
 
 @formula
 def smallest_singular_values(P, L, D, row_p, col_i, H, X, w, z):
-    """Turn the rows of X to the weakest combinations; ``w`` (m,) and ``z`` (n,) are scratch.
+    """Rotate the rows of X to the row combinations with the smallest singular values; w (m,) and z (n,) are scratch.
 
-    Returns (singular value of the last one, the largest of those of the others, which are to be dependencies).
+    Returns (singular value of the last one, the largest of the others, which are the candidate dependencies).
     """
     last = X.shape[0] - 1
     value = 1e300
@@ -143,27 +143,27 @@ def smallest_singular_values(P, L, D, row_p, col_i, H, X, w, z):
     return value, largest
 
 
-FEW = 150  # rows or columns up to which singular values take no longer than pivots
-DENSE = 1500  # rows or columns up to which they decide where pivots leave a doubt
-CERTAIN_PIVOT = 1e-8  # pivots of unit rows above this are surely some: singular values of 1e-4 and more
+FEW = 150  # rows or columns up to which singular values are as fast as pivots
+DENSE = 1500  # rows or columns up to which singular values decide doubtful pivots
+CERTAIN_PIVOT = 1e-8  # pivots of unit rows above this are certainly nonzero: singular values above 1e-4
 ZERO_PIVOT = 1e-10  # pivots of a large matrix with unit rows below this count as zero
-DOUBTFUL_PIVOT = 1e-5  # up to this one may be nothing but what was added, of a vector whose square is up to 1e8
-DIAGONAL_SHIFT = 1e-13  # to the diagonal of such a matrix
-ROOM = 2**24  # numbers (128 MB) that the vectors of a null space may have, of a matrix that is larger than `DENSE`
+DOUBTFUL_PIVOT = 1e-5  # pivots up to this may come from the diagonal shift (null vectors with |x|^2 < 1e8)
+DIAGONAL_SHIFT = 1e-13  # added to the diagonal of such a matrix
+ROOM = 2**24  # largest number of entries (128 MB) of a null-space basis of a matrix larger than `DENSE`
 
 
 def sparse_matrix_rank(G: Any) -> int:
-    """How many rows are independent, of a sparse matrix or an array."""
+    """Number of independent rows of a sparse matrix or an array."""
     if max(G.shape) > FEW and (found := rank_by_pivots(G)) is not None:
         return found[0]
     return rank_of_array(_as_array(G))
 
 
 def null_spaces(G: Any) -> tuple[int, np.ndarray, np.ndarray | None]:
-    """Rank, basis of the dependencies among rows (n, n - rank), basis of what the rows allow (m, m - rank).
+    """Rank, dependencies among the rows (n, n - rank), and a basis of the null space (m, m - rank).
 
-    G is sparse, or an array. Where pivots decide, the dependencies are no orthonormal basis, and nothing of what is
-    allowed is given; of a matrix larger than `DENSE` as many dependencies are as there is `ROOM` for.
+    G is sparse, or an array. If pivots decide, the basis of dependencies is not orthonormal and the null space is None.
+    For a matrix larger than `DENSE` only as many dependencies are returned as `ROOM` allows.
     """
     if max(G.shape) > FEW and (found := rank_by_pivots(G)) is not None:
         return *found, None
@@ -172,7 +172,7 @@ def null_spaces(G: Any) -> tuple[int, np.ndarray, np.ndarray | None]:
 
 
 def rank_by_pivots(G: Any) -> tuple[int, np.ndarray] | None:
-    """Rank, and a basis of the dependencies among rows; None where pivots leave a doubt that singular values do not."""
+    """Rank and dependencies among the rows; None if pivots are doubtful and singular values must decide."""
     import scipy.sparse as sp
 
     G = sp.csr_matrix(G)
@@ -186,38 +186,38 @@ def _as_array(G: Any) -> np.ndarray:
 
 
 def sparse_null_space(A: Any) -> tuple[int, np.ndarray]:
-    """Dimension of the null space of a sparse positive semidefinite matrix, and its basis as far as there is `ROOM`."""
+    """Dimension and basis of the null space of a sparse semidefinite matrix; as many vectors as `ROOM` allows."""
     weak, vectors = weak_pivots(A)
     return len(weak), vectors
 
 
 def weak_pivots(A: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Unknowns of a sparse positive semidefinite matrix that those eliminated before them leave nothing of.
+    """Unknowns of a sparse positive semidefinite matrix whose pivots are zero, and null-space vectors.
 
     Returns
     -------
     weak : ndarray of int
-        As many as the null space has dimensions. Of G G^T: rows that depend on the others, which do not on each other.
+        As many as the null space has dimensions. For G G^T: rows that depend on the other rows, which are independent.
     vectors : ndarray (n, k)
-        A basis of the null space: as many of its vectors as there is `ROOM` for.
+        Basis of the null space: as many vectors as `ROOM` allows.
     """
     p = SemidefinitePivots(A)
     return np.argsort(p.pattern.perm)[p.weak], p.vectors(p.shown)
 
 
 class SemidefinitePivots:
-    """Pivots of a sparse positive semidefinite matrix, in an order of its own: where they are none.
+    """Zero pivots of a sparse positive semidefinite matrix, in the elimination order chosen here.
 
-    From A = L D L^T: where a pivot is nothing but what was added to the diagonal, L^T x = e_k gives a vector of the
-    null space. Its pivot is x^T A x, so that of a vector with very many entries, or with large ones, is larger by its
-    square: there the quotient of Rayleigh decides.
+    Uses A + shift = L D L^T. If a pivot is no larger than the shift of the diagonal, L^T x = e_k yields a vector of the
+    null space. The pivot equals x^T A x, so for a vector with many or large entries it is larger in proportion to
+    |x|^2; the Rayleigh quotient decides then.
 
     Attributes
     ----------
     weak : ndarray of int
-        Which of them are none, in their order.
+        Indices of zero pivots, in elimination order.
     least : float
-        The least of the others.
+        The smallest of the other pivots.
     """
 
     def __init__(self, A: Any) -> None:
@@ -240,18 +240,18 @@ class SemidefinitePivots:
 
     @property
     def shown(self) -> np.ndarray:
-        """Those weak pivots for whose vectors there is `ROOM`."""
+        """Zero pivots whose null vectors fit into `ROOM`."""
         return self.weak[: max_vectors(len(self.inverse))]
 
     def vectors(self, which: np.ndarray) -> np.ndarray:
-        """Vectors (n, k) of the null space that belong to weak pivots, their largest entry 1."""
+        """Null-space vectors (n, k) of the given zero pivots, scaled to largest entry 1."""
         return _scale_columns(self._ends(which)[self.pattern.perm] / self.size[:, None])
 
     def dependencies(self, G: Any) -> np.ndarray | None:
-        """A basis (n, k) of the null space where the matrix is G G^T; None if it is in doubt what is none.
+        """Basis (n, k) of the null space of the matrix G G^T; None if zero pivots are doubtful.
 
-        What was added to the diagonal is taken out by a step of inverse iteration; what is left of x G then says
-        whether rows depend on one another as truly as singular values tell it.
+        A step of inverse iteration removes the effect of the diagonal shift. The residual x G then decides on
+        dependency as reliably as singular values.
         """
         if not self.least > CERTAIN_PIVOT:
             return None
@@ -263,7 +263,7 @@ class SemidefinitePivots:
         return x
 
     def _ends(self, which: np.ndarray) -> np.ndarray:
-        """Vectors x with L^T x = e_k, in the order of the pivots."""
+        """Vectors x with L^T x = e_k, in elimination order."""
         from scipy.sparse.linalg import spsolve_triangular
 
         ends = np.zeros((len(self.inverse), len(which)))
@@ -275,7 +275,7 @@ class SemidefinitePivots:
         return self.lower.T.tocsr()
 
     def _solve(self, b: np.ndarray) -> np.ndarray:
-        """(A + what was added)^-1 b."""
+        """Solve with A + diagonal shift."""
         from scipy.sparse.linalg import spsolve_triangular
 
         y = np.zeros_like(b)
@@ -286,22 +286,22 @@ class SemidefinitePivots:
 
 
 def max_vectors(n: int) -> int:
-    """How many vectors of n numbers there is `ROOM` for."""
+    """Number of vectors of n numbers that fit into `ROOM`."""
     return max(ROOM // max(n, 1), 1)
 
 
 def _scale_columns(x: np.ndarray) -> np.ndarray:
-    """Columns whose largest entry is 1."""
+    """Scale columns to largest entry 1."""
     return x / np.maximum(np.abs(x).max(axis=0, initial=0.0), 1e-300)
 
 
 def negative_pivots(A: Any) -> int:
-    """How many eigenvalues of a sparse symmetric matrix are negative (Sylvester's law of inertia)."""
+    """Number of negative eigenvalues of a sparse symmetric matrix (Sylvester's law of inertia)."""
     return int((_factor_shifted(A, 0.0)[2] < 0.0).sum())
 
 
 def _factor_shifted(A: Any, added: float) -> tuple[LDLPattern, np.ndarray, np.ndarray]:
-    """L D L^T in a pattern and order of its own, of A and so much more on its diagonal; D is inverse."""
+    """Factor A + ``added`` * I = L D L^T; returns the pattern, L, and the inverse of D."""
     A = A.tocoo()
     n = A.shape[0]
     P, place = analyse_ldl(n, A.row, A.col)
@@ -314,19 +314,19 @@ def _factor_shifted(A: Any, added: float) -> tuple[LDLPattern, np.ndarray, np.nd
     return P, L, D
 
 
-SOLVE_REFINEMENTS = 2  # times that a solution is improved
-INDEPENDENCE_MARGIN = 1e-4  # singular values above this part of the largest are surely some
+SOLVE_REFINEMENTS = 2  # refinement steps of a solution
+INDEPENDENCE_MARGIN = 1e-4  # relative size above which singular values are certainly nonzero
 
 
 def saddle_point_solver(
     P: Any, G: Any, H: Any = None, refined: int = SOLVE_REFINEMENTS
 ) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-    """What gives x and l of P x - G^T l = f, H x = g; H is G if not given; improved so many times.
+    """Return a solver for x and l of P x - G^T l = f, H x = g; H defaults to G; ``refined`` refinement steps.
 
     Raises
     ------
     AnalysisError
-        If there are no such x and l for every f and g.
+        If the linear system is singular.
     """
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
@@ -356,10 +356,10 @@ def saddle_point_solver(
 
 
 def null_basis(G: Any) -> np.ndarray:
-    """An orthonormal basis (n, n - m) of what independent rows (m, n) allow.
+    """Orthonormal basis (n, n - m) of the null space of independent rows (m, n).
 
-    Random vectors are projected on it and made orthonormal by Cholesky's factor of their products, twice (Yamamoto and
-    others 2015): that is matrix products, where Householder's reflections would take several times as long.
+    Random vectors are projected on it and made orthonormal by the Cholesky factor of their Gram matrix, twice
+    (Yamamoto and others 2015). These are matrix products; Householder reflections would take several times as long.
     """
     import scipy.sparse as sp
     from scipy.linalg import solve_triangular
@@ -367,7 +367,7 @@ def null_basis(G: Any) -> np.ndarray:
     m, n = G.shape
     if not m:
         return np.eye(n)
-    project = saddle_point_solver(sp.identity(n, format="csr"), G, refined=0)  # twice, which improves it
+    project = saddle_point_solver(sp.identity(n, format="csr"), G, refined=0)  # the second projection refines it
     basis = np.random.default_rng(1).standard_normal((n, n - m))
     for _ in range(2):
         basis = project(basis, np.zeros((m, n - m)))[0]
@@ -376,7 +376,7 @@ def null_basis(G: Any) -> np.ndarray:
 
 
 def clearly_independent(G: Any) -> bool:
-    """Whether rows of unit size are far from depending on one another: G G^T less a little has no negative pivots."""
+    """Whether rows of unit size are clearly independent: G G^T minus a small multiple of I has no negative pivots."""
     import scipy.sparse as sp
 
     A = G @ G.T

@@ -5,6 +5,9 @@ named after a description takes quaternions (..., 4) or rotation matrices (..., 
 axes, take radians, and take complex numbers where they are analytic, so that a complex step gives their derivatives.
 An orientation of a frame B seen from A is R_AB: it takes components along B to components along A. Functions of rates
 take ``axes="body"`` for components along B, ``axes="base"`` for components along A.
+
+Imports NumPy and `math` only. A new description is a pair of functions ``name`` and ``from_name`` in `conversions`,
+with rates in `kinematic_matrices`.
 """
 
 from __future__ import annotations

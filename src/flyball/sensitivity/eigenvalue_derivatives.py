@@ -1,7 +1,7 @@
-"""Derivatives of eigenvalues by parameters, as described or at the equilibrium, with controllers, sampled too.
+"""Derivatives of eigenvalues by parameters, in the described position or at the equilibrium, with controllers.
 
-The system matrix is exact, its derivatives are differences of sixth order of it; then dw = y^H dA x / y^H x
-(Lancaster 1964), groups of equal eigenvalues together.
+The system matrix is exact. Its derivatives are differences of sixth order; then dw = y^H dA x / y^H x (Lancaster
+1964), with groups of equal eigenvalues treated together. Sampled controllers are supported.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .parameter_derivatives import DerivativeRequest, ParameterFunction, differe
 
 
 def eigenvalue_sensitivity(a: DerivativeRequest) -> Sensitivity:
-    """Eigenvalues and their derivatives; of sampled controllers multipliers from one cycle to the next."""
+    """Eigenvalues and their derivatives; with sampled controllers the multipliers of one cycle."""
     matrix, unit = _closed_loop_matrix(a) if a.model.controllers else _mechanism_matrix(a)
     base = matrix(a.parameters)
     dA = np.array([difference_derivative(a.model, a.parameters, name, matrix) for name in a.to])
@@ -36,7 +36,7 @@ def eigenvalue_sensitivity(a: DerivativeRequest) -> Sensitivity:
 
 
 def eigenvalue_function(a: DerivativeRequest) -> ParameterFunction:
-    """The eigenvalues for any parameters, in the order of those that they were."""
+    """Function that returns the eigenvalues for any parameters, in the order of the initial ones."""
     matrix, _ = _closed_loop_matrix(a) if a.model.controllers else _mechanism_matrix(a)
     A = matrix(a.parameters)
     first, _ = eigenvalue_derivatives(A, np.zeros((0, *A.shape)))
@@ -48,7 +48,7 @@ def eigenvalue_function(a: DerivativeRequest) -> ParameterFunction:
 
 
 def _mechanism_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
-    """The matrix of a mechanism without controllers, in the free coordinates that it has at first; its unit."""
+    """Function for the system matrix without controllers, in fixed free coordinates; and the unit of eigenvalues."""
     about = _equilibrium_by_parameters(a)
 
     def state(parameters: Mapping[str, float]) -> MechanismState:
@@ -61,7 +61,7 @@ def _mechanism_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
 
 
 def _closed_loop_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
-    """The matrix of the closed loop, and its unit: none if it leads from one sample to another."""
+    """Function for the closed-loop matrix, and the unit of eigenvalues: empty for sampled controllers."""
     about = _equilibrium_by_parameters(a)
 
     def linear(parameters: Mapping[str, float]) -> Any:
@@ -81,7 +81,7 @@ def _closed_loop_matrix(a: DerivativeRequest) -> tuple[ParameterFunction, str]:
 
 
 def _equilibrium_by_parameters(a: DerivativeRequest) -> Callable[[Mapping[str, float]], Any]:
-    """The equilibrium for any parameters, near the first; None where eigenvalues are of the mechanism as drawn."""
+    """Function for the equilibrium at any parameters, near the first; None where the described position is used."""
     begin: list[Any] = []
 
     def about(parameters: Mapping[str, float]) -> Any:
@@ -93,18 +93,17 @@ def _equilibrium_by_parameters(a: DerivativeRequest) -> Callable[[Mapping[str, f
     return about
 
 
-# How eigenvalues change with a matrix: dw = y^H dA x / y^H x (Lancaster 1964), groups of equal ones together.
+# Derivatives of the eigenvalues of a matrix: dw = y^H dA x / y^H x (Lancaster 1964), groups of equal ones together.
 #
-# Where an eigenvalue is repeated with as many eigenvectors, its first changes are the eigenvalues of dA within them.
-# Where it has too few, it has no derivative, unless all stay zero: a mechanism that can move away as a whole has two
-# zeros and keeps them. Whether they stay is looked up a finite step aside.
+# If an eigenvalue is repeated with as many eigenvectors, its first-order changes are the eigenvalues of dA in their
+# subspace. If it has fewer eigenvectors, it has no derivative, unless all stay zero: a mechanism that can move as a
+# whole has two zero eigenvalues and keeps them. A finite step of the parameter checks whether they stay zero.
 
 
-MATRIX_ROUNDING = 100.0 * np.finfo(float).eps  # of the matrix' size: what is uncertain of it
-IDENTITY_TOLERANCE = (
-    1e-6  # part of the matrix' size by which a group of equal eigenvalues differs from a multiple of the identity
-)
-STAYED_FRACTION = 1e-3  # of what dA would do to a group in a finite step: eigenvalues that moved less have stayed
+MATRIX_ROUNDING = 100.0 * np.finfo(float).eps  # uncertainty of the matrix, relative to its norm
+IDENTITY_TOLERANCE = 1e-6  # difference of a group from a multiple of the identity, relative to the norm
+# Eigenvalues that moved less than this part of the change by dA in a finite step have stayed.
+STAYED_FRACTION = 1e-3
 
 OffsetSample = Callable[[int], tuple[float, np.ndarray, str]]
 
@@ -120,12 +119,12 @@ def eigenvalue_derivatives(
     dA : ndarray (k, n, n)
         Derivatives of A by k parameters.
     aside : callable
-        Gives for the k-th parameter a finite step, A that far aside, and the parameter's name.
+        Returns for the k-th parameter a finite step, A at the stepped value, and the parameter's name.
 
     Returns
     -------
     w : ndarray (n,)
-        Sorted by absolute and imaginary value.
+        Eigenvalues sorted by magnitude, then imaginary part.
     dw : ndarray (n, k)
 
     Raises
@@ -180,7 +179,7 @@ def _group_derivatives(
             h, other, name = aside(k)
             value, spread = complex(np.mean(w[group])), float(np.abs(w[group]).max())
             then = np.abs(np.linalg.eigvals(other / scale[:, None] * scale))
-            moved = np.sort(then)[: len(group)].max()  # as many as are zero now, if they are
+            moved = np.sort(then)[: len(group)].max()  # as many as are zero now
             stayed = moved <= max(
                 STAYED_FRACTION * h * np.abs(inside).max(), 10.0 * spread, np.sqrt(MATRIX_ROUNDING) * size
             )

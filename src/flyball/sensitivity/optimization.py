@@ -18,8 +18,9 @@ from ..progress import ReportProgress, progress_bar
 from ..results.sensitivity_and_optimum import Optimum
 from .sensitivity import DerivativeOptions, SensitivityOptions, sensitivity
 
-DIFFERENCE_STEP = 1e-6  # of the quantities, for the slope of a function that the user gives
-FAILURE_COST = 1e3  # times the first cost: what parameters cost with which the mechanism cannot be assembled
+DIFFERENCE_STEP = 1e-6  # relative step of the quantities for the gradient of a user's function
+# Cost of parameters with which the mechanism cannot be assembled, relative to the first cost.
+FAILURE_COST = 1e3
 
 Bounds = Mapping[str, tuple[float | str | None, float | str | None]]
 
@@ -60,7 +61,7 @@ class OptimizeOptions(DerivativeOptions):
         require_positive(self.tolerance, "tolerance")
 
     def sensitivity(self, parameters: Mapping[str, float]) -> SensitivityOptions:
-        """What is asked at other values of the parameters."""
+        """Options of the sensitivity analysis at other values of the parameters."""
         return SensitivityOptions(
             of=self.of,
             to=tuple(self.to),
@@ -96,7 +97,7 @@ SEARCH_MESSAGES = {  # by the status of L-BFGS-B
 
 
 def optimize(model: Model, o: OptimizeOptions) -> Optimum:
-    """Find parameters that serve best: see `Mechanism.optimize`."""
+    """Find optimal parameters: see `Mechanism.optimize`."""
     refuse_unsupported(model, "optimize", controlled=True)
     with progress_bar(o.progress, "optimizing") as tell:
         search = ParameterSearch(model, o, tell)
@@ -127,7 +128,7 @@ class ParameterSearch:
         self.count = 0
         self._best: tuple[float, np.ndarray, Any] | None = None
         self._first = 0.0
-        self._refused: list[str] = []  # why trials could not be computed
+        self._refused: list[str] = []  # reasons why trials could not be computed
 
     def _bounds(self, to: Sequence[str] | Bounds, k: int) -> np.ndarray:
         out = np.full(len(self.names), np.inf if k else -np.inf)
@@ -146,7 +147,7 @@ class ParameterSearch:
         return out
 
     def at(self, x: np.ndarray) -> Any:
-        """Sensitivities at scaled parameters, kept until others are asked for."""
+        """Sensitivities at scaled parameters; the last result is cached."""
         if self._known is None or not np.array_equal(self._known[0], x):
             values = dict(zip(self.names, (x * self.scale).tolist(), strict=True))
             self.count += 1
@@ -162,14 +163,14 @@ class ParameterSearch:
         return self._known[1]
 
     def _weighed(self, x: np.ndarray, cost: float) -> None:
-        """Keep the best place."""
+        """Store the parameters if their cost is the lowest so far."""
         if self._best is None:
             self._first = cost
         if self._best is None or cost < self._best[0]:
             self._best = cost, x.copy(), self.at(x)
 
     def left(self) -> Interrupted | None:
-        """What is raised for the user's interrupt, with the best place by then; None if there is none."""
+        """The error for the user's interrupt, with the best parameters so far; None if there are none."""
         if self._best is None:
             return None
         cost, x, found = self._best
@@ -178,7 +179,7 @@ class ParameterSearch:
         return Interrupted(message, self._optimum(x, cost, self._first, False, message))
 
     def fit(self, target: Any, weights: Any) -> Optimum:
-        """Least squares."""
+        """Fit the quantities to a target by least squares."""
         from scipy.optimize import least_squares
 
         x0 = self.start / self.scale
@@ -224,7 +225,7 @@ class ParameterSearch:
         return out
 
     def minimum(self, function: Callable[[np.ndarray], float]) -> Optimum:
-        """Minimisation of a function of the quantities."""
+        """Minimise a function of the quantities."""
         from scipy.optimize import minimize
 
         x0 = self.start / self.scale
@@ -280,12 +281,12 @@ class ParameterSearch:
 
 
 def _target_array(target: Any, values: np.ndarray, of: Sequence[str], analysis: str) -> np.ndarray:
-    """The target in the shape of the quantities; eigenvalues in any order, of each complex pair one will do.
+    """The target in the shape of the quantities; eigenvalues in any order, one of each complex pair suffices.
 
     Raises
     ------
     ModelError
-        If it does not fit them.
+        If its shape does not match.
     """
     parts = [number(x, {}, None, "target") if isinstance(x, str) else x for x in np.asarray(target, object).ravel()]
     goal = _number_array(parts, "target", complex if analysis == "modes" else float)
@@ -309,12 +310,12 @@ def _target_array(target: Any, values: np.ndarray, of: Sequence[str], analysis: 
 
 
 def _number_array(values: Any, name: str, kind: type = float) -> np.ndarray:
-    """An array of numbers.
+    """Convert to an array of numbers.
 
     Raises
     ------
     ModelError
-        If it is none.
+        If that is not possible.
     """
     try:
         return np.array(values, kind)
@@ -323,9 +324,9 @@ def _number_array(values: Any, name: str, kind: type = float) -> np.ndarray:
 
 
 def _difference_gradient(function: Callable[[np.ndarray], float], values: np.ndarray) -> np.ndarray:
-    """Derivatives of a function by the quantities, by central differences: it costs nothing to call.
+    """Derivatives of a function by the quantities, by central differences.
 
-    By the real and the imaginary part of complex ones, as real and imaginary part.
+    For complex quantities the derivatives by real and imaginary part are the real and imaginary part of the result.
     """
     out = np.zeros(values.shape, values.dtype)
     for i in np.ndindex(values.shape):

@@ -1,17 +1,17 @@
 """Derivatives by parameters: of a state and the initial state, and of any quantity by differences.
 
-Central differences are of sixth order where a derivative is wanted, of second where one is checked. The step begins
-as a part of the parameter and is made smaller or larger until the differences of sixth and of fourth order agree
-best.
+Central differences are of sixth order for a derivative, of second order for a check. The step starts as a part of the
+parameter and is reduced or increased until the differences of sixth and of fourth order agree best.
 
-Along a change (dq, dv, dp) of positions, velocities and a parameter one complex step through the residuals gives
-what the constraints and the equations of motion miss, exactly; accelerations and multipliers follow by
+For a change (dq, dv, dp) of positions, velocities and a parameter, one complex step through the residuals gives the
+exact changes of the constraints and the equations of motion. Accelerations and multipliers follow from
 
     M dvdot + (F - G^T) dlam = -(r along (dq, dv, dp)),    G dvdot = -(a along (dq, dv, dp))
 
-F is the dependence of joint friction on reactions. The initial state changes by the constraints alone where drivers
-leave no freedom; elsewhere it is the described positions and velocities, put on the constraints by steps of least
-size, and so are its changes. Where assembly moved the mechanism farther, its result is differenced.
+F is the dependence of joint friction on reactions. If drivers leave no freedom, the constraints alone determine the
+change of the initial state. Otherwise the initial state is the described positions and velocities, moved onto the
+constraints by minimum-norm steps, and its changes follow likewise. If assembly moved the mechanism farther, its result
+is differenced.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ from ..tables.values import Values, values
 
 @dataclass
 class DerivativeRequest:
-    """What is asked: of which quantities, by which parameters, where."""
+    """Quantities, parameters and operating point of a derivative computation."""
 
     model: Model
     of: tuple[str, ...]
@@ -74,11 +74,11 @@ class DerivativeRequest:
     coordinates: str
 
 
-DIFFERENCE_STEP, CHECK_STEP = 2e-3, 1e-5  # of the parameter
+DIFFERENCE_STEP, CHECK_STEP = 2e-3, 1e-5  # relative to the parameter
 SIXTH_ORDER = np.array([0.75, -0.15, 1.0 / 60.0])
 FOURTH_ORDER = np.array([2.0 / 3.0, -1.0 / 12.0, 0.0])
-AGREEMENT = 1e-9  # of the derivative
-DIFFERENCE_ROUNDING = 1e-11  # of what is differenced
+AGREEMENT = 1e-9  # relative to the derivative
+DIFFERENCE_ROUNDING = 1e-11  # relative to the differenced values
 MAX_STEP_CHANGES = 7
 
 ParameterFunction = Callable[[Mapping[str, float]], np.ndarray]
@@ -87,12 +87,12 @@ ParameterFunction = Callable[[Mapping[str, float]], np.ndarray]
 def difference_derivative(
     model: Model, parameters: Mapping[str, float], name: str, found: ParameterFunction
 ) -> np.ndarray:
-    """Derivative by a parameter of what a function makes of the parameters; sixth order.
+    """Derivative by a parameter of a function of the parameters, by differences of sixth order.
 
     Raises
     ------
     AnalysisError, ModelError
-        That of the function, if it fails however small the step is.
+        The error of the function, if it fails with every step size.
     """
     value = model.environment(parameters)[name]
 
@@ -132,7 +132,7 @@ def difference_derivative(
 def offset_sample(
     model: Model, parameters: Mapping[str, float], name: str, found: ParameterFunction
 ) -> tuple[float, np.ndarray, str]:
-    """The step with which differences begin, what is found that far aside, and the parameter's name."""
+    """The first step of the differences, the function's value at that step, and the parameter's name."""
     h = DIFFERENCE_STEP * parameter_scale(model, parameters, name)
     return h, found({**parameters, name: model.environment(parameters)[name] + h}), name
 
@@ -140,16 +140,16 @@ def offset_sample(
 def small_step_derivative(
     model: Model, parameters: Mapping[str, float], name: str, found: ParameterFunction
 ) -> np.ndarray:
-    """The same with one small step, second order."""
+    """Like `difference_derivative`, by one central difference of second order with a small step."""
     value = model.environment(parameters)[name]
     h = CHECK_STEP * parameter_scale(model, parameters, name)
     return (found({**parameters, name: value + h}) - found({**parameters, name: value - h})) / (2.0 * h)
 
 
 def parameter_scale(model: Model, parameters: Mapping[str, float], name: str) -> float:
-    """The parameter itself; if it is zero, the change of it that changes something of the mechanism by the whole.
+    """Magnitude of the parameter; if it is zero, the change that changes something in the mechanism by its full size.
 
-    Places count as parts of the mechanism's length, other numbers as parts of the largest of their kind.
+    Positions are compared with the mechanism's length, other numbers with the largest of their kind.
     """
     value = float(np.real(model.environment(parameters)[name]))
     if value:
@@ -168,8 +168,10 @@ def parameter_scale(model: Model, parameters: Mapping[str, float], name: str) ->
     return 1.0 / effect if effect > 0.0 else 1.0
 
 
-REMAINING_GAP = 1e-7  # part of the gaps that a parameter opens which is left where no motion closes them
-GAP_ROUNDING = 1e-9  # part of the mechanism's length below which gaps that the whole of a parameter opens are none
+# A parameter is refused if more than this part of the gaps that it opens remains after the best motion.
+REMAINING_GAP = 1e-7
+# Gaps below this, relative to the mechanism's length, for a full change of the parameter count as zero.
+GAP_ROUNDING = 1e-9
 
 
 @dataclass
@@ -183,7 +185,7 @@ class StateDerivative:
 
     @property
     def parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """As rows, for `output_derivatives.curve_derivatives`."""
+        """The changes as rows, for `output_derivatives.curve_derivatives`."""
         return self.q[None], self.v[None], self.vdot[None], self.lam[None]
 
 
@@ -199,11 +201,11 @@ class ParameterDirection:
 
     @staticmethod
     def derivative(x: np.ndarray) -> np.ndarray:
-        """By the parameter, of numbers that carry its step."""
+        """Derivative by the parameter of numbers that contain its complex step."""
         return complex_step_derivative(x)
 
     def along(self, x: MechanismState, dq: np.ndarray, dv: np.ndarray) -> np.ndarray:
-        """Derivatives of all residuals at x along changes of positions and velocities and the parameter, (width,)."""
+        """Derivatives (width,) of all residuals at x along changes of positions, velocities and the parameter."""
         nv = len(x.v)
         steps = np.zeros((1, 3 * nv + 1), complex)
         steps[0, :nv], steps[0, nv : 2 * nv] = 1j * COMPLEX_STEP * dq, 1j * COMPLEX_STEP * dv
@@ -214,7 +216,7 @@ class ParameterDirection:
 
 
 class ConstrainedSystem:
-    """Mass matrix and constraints at a state, ready to be solved with."""
+    """Mass matrix and constraints at a state, factorised for solutions."""
 
     def __init__(self, x: MechanismState, M: np.ndarray | None = None) -> None:
         c = x.c
@@ -236,7 +238,7 @@ class ConstrainedSystem:
 
     @cached_property
     def inverse(self) -> np.ndarray:
-        """Pseudo-inverse of the equations of motion with the constraints: rows may be redundant."""
+        """Pseudo-inverse of the equations of motion with the constraints; rows may be redundant."""
         A = self.A
         if self.x.c.structure.loads:
             n, F = len(self.M), reaction_friction(self.x, self.G)
@@ -253,14 +255,14 @@ class ConstrainedSystem:
         return self.scale * (self._inverses[key] @ (self.size * right)[rows])
 
     def acceleration(self, r: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(dvdot, dlam) that take away what is missed of the equations of motion and of the constraints."""
+        """(dvdot, dlam) that cancel the residuals of the equations of motion and of the constraints."""
         n = len(self.M)
         x = self.inverse @ -np.r_[self.scale * r, self.size * a]
         return self.scale * x[:n], self.size * x[n:]
 
 
 def reaction_friction(x: MechanismState, G: np.ndarray) -> np.ndarray:
-    """What joint friction makes of the reactions, F (nv, rows); refused where redundancy leaves these open."""
+    """Derivatives F (nv, rows) of joint friction by the reactions; refused where these are undetermined."""
     s = x.c.structure
     F = friction_by_multipliers(x, *complex_tables(x.c))
     turns = np.array([1.0 if d.unit == "m" else 1.0 / x.c.values.length for d in velocity_names(s)])
@@ -276,7 +278,7 @@ def consistent_changes(
     Raises
     ------
     ModelError
-        If none keep them: with another value of the parameter the mechanism cannot be assembled.
+        If there are none: the mechanism cannot be assembled with another value of the parameter.
     """
     at = d.e.at
     before = d.along(x, dq, dv)[at["g"]]
@@ -304,7 +306,7 @@ def _refuse_inconsistent(d: ParameterDirection, x: MechanismState, before: np.nd
 def consistent_derivative(
     d: ParameterDirection, x: MechanismState, lin: ConstrainedSystem, dq: np.ndarray, dv: np.ndarray
 ) -> StateDerivative:
-    """The tangent whose positions and velocities are nearest to the given ones and keep the constraints."""
+    """State derivative with the changes of positions and velocities nearest to the given ones that keep the constraints."""
     at = d.e.at
     dq, dv = consistent_changes(d, x, lin, dq, dv)
     left = d.along(x, dq, dv)
@@ -312,7 +314,7 @@ def consistent_derivative(
 
 
 DESCRIBED_TOLERANCE = (
-    1e-12  # difference of the start from what is described, of the mechanism's length or the largest velocity
+    1e-12  # difference of the start from the description, relative to the length or the largest velocity
 )
 
 
@@ -323,7 +325,7 @@ def initial_state_derivatives(
     x: MechanismState,
     directions: Sequence[ParameterDirection],
 ) -> list[StateDerivative]:
-    """Changes of the start with each parameter, with accelerations and multipliers; see `initial_changes`."""
+    """Derivatives of the initial state by each parameter, with accelerations and multipliers; see `initial_changes`."""
     lin = ConstrainedSystem(x)
     pairs = initial_changes(model, parameters, base, x, directions, lin)
     return [consistent_derivative(d, x, lin, *pair) for d, pair in zip(directions, pairs, strict=True)]
@@ -337,21 +339,21 @@ def initial_changes(
     directions: Sequence[ParameterDirection],
     lin: ConstrainedSystem,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Changes of positions and velocities of the start with each parameter.
+    """Derivatives of the initial positions and velocities by each parameter.
 
     Parameters
     ----------
     model : Model
     parameters : mapping
-        Values in place of the model's.
+        Values that replace the model's.
     base : Assembly
-        The start.
-    x : State
-        The same with accelerations and multipliers.
-    directions : sequence of Direction
+        The initial state as assembled.
+    x : MechanismState
+        The initial state with accelerations and multipliers.
+    directions : sequence of ParameterDirection
         Parameters.
-    lin : Linear
-        The constraints there.
+    lin : ConstrainedSystem
+        The constraints at the initial state.
     """
     still = np.zeros(len(x.v))
     if is_fully_driven(base):
@@ -375,7 +377,7 @@ def is_fully_driven(base: Assembly) -> bool:
 
 
 def is_as_described(model: Model, base: Assembly) -> bool:
-    """Whether the start is what the description says, to rounding, or all that it leaves open follows from it."""
+    """Whether the start equals the description within rounding, or its open part follows from the described one."""
     drawn = base.compiled.values
     apart = np.abs(tangent_step(base.compiled, drawn.q, base.q) / base.compiled.sizes).max(initial=0.0)
     if apart > DESCRIBED_TOLERANCE or model.initial:
@@ -399,7 +401,7 @@ def _velocity_targets(base: Assembly) -> VelocityEquations:
 
 
 def _described_changes(d: ParameterDirection, base: Assembly, x: MechanismState) -> tuple[np.ndarray, np.ndarray]:
-    """Changes of the described positions and velocities, put on the constraints in the way of assembly."""
+    """Changes of the described positions and velocities, projected onto the constraints as in assembly."""
     c, at = base.compiled, d.e.at
     dq = tangent_rate(c, x.q, d.derivative(d.values.q))
     c.at(x.t, x.q, x.v)
@@ -428,15 +430,15 @@ def _described_changes(d: ParameterDirection, base: Assembly, x: MechanismState)
 def changes_in_motion_coordinates(
     start: InitialState, d: ParameterDirection, values: Values, changes: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Changes (nv,), (nv,) of positions, along the velocities, and of velocities.
+    """Convert initial changes to the coordinates of the motion: (nv,) positions along the velocities, (nv,) velocities.
 
     Parameters
     ----------
-    start : Start
-    d : Direction
+    start : InitialState
+    d : ParameterDirection
         The parameter, in absolute coordinates.
     values : Values
-        The mechanism's numbers in the coordinates of the motion, a complex step along the parameter.
+        The mechanism's values in the coordinates of the motion, with a complex step of the parameter.
     changes : two arrays (nv,), (nv,)
         The changes in absolute coordinates.
     """
@@ -452,7 +454,7 @@ def changes_in_motion_coordinates(
 
 
 def _body_states(start: InitialState, values: Values, of: tuple[np.ndarray, np.ndarray]) -> dict[str, BodyState]:
-    """How every body moves at the start, with what the parameter changes as imaginary parts."""
+    """State of every body at the start; imaginary parts are changes by the parameter."""
     base = start.base
     q = base.q.astype(complex)
     retract(values.system, q, 1j * COMPLEX_STEP * of[0])

@@ -61,15 +61,15 @@ from .parameter_derivatives import (
 )
 from .variational_equations import MotionSensitivity, VariationalIntegration, prescribed_motion_sensitivity
 
-LEAST_STIFFNESS_RATIO = 1e-8  # stiffness, of what acts, below which an equilibrium's place is not determined
+LEAST_STIFFNESS_RATIO = 1e-8  # relative stiffness below which the position of an equilibrium is not determined
 
 
-MOTION_DEFAULTS = {"outputs": 51, "rtol": 1e-9, "atol": 1e-11}  # of a motion, where they are not given
+MOTION_DEFAULTS = {"outputs": 51, "rtol": 1e-9, "atol": 1e-11}  # defaults of a motion
 
 
 @dataclass(frozen=True, kw_only=True)
 class DerivativeOptions(Options):
-    """What derivatives are asked of: quantities, parameters, and the analysis that makes the ones of the others."""
+    """Options of derivatives: quantities, parameters, and the analysis that relates them."""
 
     analysis: str
     t: float
@@ -103,14 +103,14 @@ class DerivativeOptions(Options):
             raise ModelError(f"about must be 'equilibrium' or nothing, got {_value_text(self.about)}")
 
     def of_motion(self, name: str) -> Any:
-        """An option of a motion, or what is usual."""
+        """An option of a motion, or its default."""
         value = getattr(self, name)
         return MOTION_DEFAULTS[name] if value is None else value
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensitivityOptions(DerivativeOptions):
-    """What `Mechanism.sensitivity` is asked."""
+    """Arguments of `Mechanism.sensitivity`."""
 
     of: tuple[str, ...]
     to: tuple[str, ...]
@@ -138,7 +138,7 @@ def _computed_sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
 
 
 def _checked_question(model: Model, o: SensitivityOptions) -> DerivativeRequest:
-    """What is asked, looked through: names there are, of quantities and parameters."""
+    """Check the names of quantities and parameters and build the request."""
     refuse_unsupported(model, "sensitivity", controlled=True)
     env = model.environment(o.parameters)
     for name in o.to:
@@ -165,7 +165,7 @@ def _checked_question(model: Model, o: SensitivityOptions) -> DerivativeRequest:
 
 
 def _with_controllers(model: Model, o: SensitivityOptions) -> Sensitivity:
-    """Of a mechanism with controllers: of one that has bodies in their place."""
+    """Sensitivity of a mechanism with controllers, by its auxiliary model."""
     if o.analysis not in ("motion", "equilibrium", "modes") or model.events:
         refuse_controllers(
             model, f"sensitivity with analysis={o.analysis!r}" + (", with events," if model.events else "")
@@ -183,13 +183,13 @@ def _with_controllers(model: Model, o: SensitivityOptions) -> Sensitivity:
 
 
 def _with_model_names(found: Sensitivity, of: tuple[str, ...], other: AuxiliaryModel) -> Sensitivity:
-    """What was found of a copy, by the names of the model."""
+    """Translate the results of an auxiliary model to the names of the model."""
     units = ("" if name in other.outputs else u for name, u in zip(of, found.units, strict=True))
     return replace(found, of=of, units=tuple(units))
 
 
 def _with_verification(a: DerivativeRequest, analysis: str, out: Sensitivity) -> Sensitivity:
-    """With the column of central differences."""
+    """Add the derivatives by central differences for comparison."""
     again = ANALYSES[analysis][1](a)
     parts = [small_step_derivative(a.model, a.parameters, name, again) for name in a.to]
     out.verification = np.stack([x.reshape(out.values.shape) for x in parts], axis=-1)
@@ -197,7 +197,7 @@ def _with_verification(a: DerivativeRequest, analysis: str, out: Sensitivity) ->
 
 
 def _value_text(value: Any) -> str:
-    """A value in a message: a text as it is, else what kind of thing it is."""
+    """Text for a value in a message: a string as it is, else its type."""
     return repr(value) if isinstance(value, (str, float, int)) else f"a {type(value).__name__}"
 
 
@@ -239,7 +239,7 @@ def _instant_sensitivity(a: DerivativeRequest) -> Sensitivity:
 
 
 def _refuse_kinks(a: DerivativeRequest, e: EquationDerivatives, tangents: Sequence[StateDerivative]) -> None:
-    """Refuse forces that have no slope along the changes with the parameters, or by one of these."""
+    """Refuse forces without a derivative along the changes by the parameters, or by a parameter."""
     none = np.zeros((len(e.state.v), 1))
     dq, dv = (np.column_stack([none, *ways]) for ways in ([k.q for k in tangents], [k.v for k in tangents]))
     refuse_nonsmooth(e, dq, dv, a.to)
@@ -287,7 +287,7 @@ def _motion_sensitivity(a: DerivativeRequest) -> Sensitivity:
 
 
 def _refuse_undetermined(c: CompiledMechanism, varied: MotionSensitivity, of: Sequence[str]) -> None:
-    """Refuse quantities that redundancy leaves open at one of the times."""
+    """Refuse quantities that redundant constraints leave undetermined at one of the times."""
     m = varied.motion
     for k, t in enumerate(varied.t.tolist()):
         c.z[:] = m.z[k]
@@ -300,14 +300,14 @@ def _refuse_undetermined(c: CompiledMechanism, varied: MotionSensitivity, of: Se
 def _simulated(
     a: DerivativeRequest, times: np.ndarray, parameters: Mapping[str, float], coordinates: str, rtol: float, atol: float
 ) -> Result:
-    """The motion at times."""
+    """Simulate the motion at the given times."""
     asked = SimulateOptions(
         t_end=float(times[-1]),
         t_start=a.t,
         outputs=times.tolist(),
         parameters=parameters,
         start=None,
-        specialize=False,  # differences of motions: all by one engine
+        specialize=False,  # differences of motions require the same engine for all
         progress=False,
         **default_integration(coordinates, rtol, atol).choices(),
     )
@@ -325,7 +325,7 @@ def _motion_function(a: DerivativeRequest) -> ParameterFunction:
 def _equilibrium_sensitivity(a: DerivativeRequest) -> Sensitivity:
     found = equilibrium(a.model, rest_options(a.t, a.parameters))
     b = found.assembly
-    if a.model.controllers:  # their states are unknowns, too
+    if a.model.controllers:  # controller states are unknowns, too
         other, rest = determined_auxiliary_rest(a.model, b, a.of)
         named = tuple(other.outputs.get(name, name) for name in a.of)
         with errors_in_user_terms(other):
@@ -342,7 +342,7 @@ def _equilibrium_sensitivity(a: DerivativeRequest) -> Sensitivity:
 
 
 def _sensitivity_at_rest(a: DerivativeRequest, rest: RestState) -> Sensitivity:
-    """By the equations at rest: changes of positions and multipliers make up for those by the parameters."""
+    """Sensitivity by the equations at rest: changes of positions and multipliers compensate those by parameters."""
     x = rest.equations.state
     directions, tangents = [ParameterDirection(rest.equations, name) for name in a.to], []
     still = np.zeros(len(x.v))
@@ -376,7 +376,7 @@ def _equilibrium_function(a: DerivativeRequest) -> ParameterFunction:
     return found
 
 
-# what finds the derivatives, and what makes a function of the parameters for differences
+# analysis -> (computes the derivatives, returns a function of the parameters for differences)
 ANALYSES: dict[
     str, tuple[Callable[[DerivativeRequest], Sensitivity], Callable[[DerivativeRequest], ParameterFunction]]
 ] = {
@@ -387,25 +387,25 @@ ANALYSES: dict[
 }
 
 
-# A mechanism with controllers whose motion is asked about, as one that has bodies in their place (`sliders`).
+# Motion of a mechanism with controllers, by an auxiliary model with bodies in their place (`controller_states`).
 
 
 STATE_MASS_RATIO = (
-    1e-3  # of the mechanism's mass, that of a body for a state: errors of works are judged by the mass of all
+    1e-3  # mass of an auxiliary body relative to the mechanism: it enters the error estimate of the works
 )
 
 
 def moving_copy(model: Model, parameters: Mapping[str, float] | None, outputs: Sequence[str]) -> AuxiliaryModel:
-    """The copy in which velocities stand for states, which begins as the model does.
+    """Auxiliary model in which velocities represent controller states, with the initial state of the model.
 
     Parameters
     ----------
     model : Model
-        With continuous controllers.
+        The model with continuous controllers.
     parameters : mapping
-        Values in place of the model's.
+        Values that replace the model's.
     outputs : sequence of str
-        Curves that are asked for.
+        Requested curves.
     """
     c = compile_mechanism(model, parameters=parameters)
     mass = STATE_MASS_RATIO * float(c.values.system.bodies.mass.sum()) or 1.0

@@ -1,8 +1,8 @@
 """Motions and their derivatives by parameters: the variational equations, integrated by the compiled loop.
 
-The compiled loop is ``engine/sensitivity_equations.py``. The initial state is assembled, and its derivatives found, in
-absolute coordinates (`parameter_derivatives`); in joint coordinates they are those that the bodies' are. Steps of a
-parameter are parts of it, so that the tolerances of derivatives are those of the motion.
+The compiled loop is ``engine/sensitivity_equations.py``. The initial state and its derivatives are found in absolute
+coordinates (`parameter_derivatives`) and converted to joint coordinates by the motions of the bodies. Parameter changes
+are relative, so that the tolerances of the motion also apply to the derivatives.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ SOLVER_FIELDS = (
     "inverse_inertia", "excess_inertia", "inverse_mass", "inverse_reference_inertia", "excess_mass",
     "inverse_reference_mass",
 )  # fmt: skip
-OUTPUT_NUMBERS = 10_000_000  # numbers of output that are held at a time
+OUTPUT_NUMBERS = 10_000_000  # numbers of output in memory at a time
 
 
 @dataclass
 class MotionDerivatives:
-    """A motion at times, and how it changes with one parameter; each (n, ..), along the times first."""
+    """A motion, or its derivatives by one parameter; all arrays (n, ..) with the times first."""
 
     q: np.ndarray
     v: np.ndarray
@@ -51,21 +51,21 @@ class MotionDerivatives:
 
     @property
     def parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Without the states."""
+        """All but the states ``z``."""
         return self.q, self.v, self.vdot, self.lam
 
 
 @dataclass
 class MotionSensitivity:
-    """A motion and its changes.
+    """A motion and its derivatives.
 
     Attributes
     ----------
     t : ndarray (n,) [s]
-    motion : Changes
+    motion : MotionDerivatives
         Coordinates, velocities, accelerations, multipliers with efforts, states.
-    by : list of Changes
-        Of each parameter; positions along the velocities.
+    by : list of MotionDerivatives
+        Derivatives by each parameter; positions along the velocities.
     """
 
     t: np.ndarray
@@ -73,7 +73,7 @@ class MotionSensitivity:
     by: list[MotionDerivatives]
 
     def result(self, start: InitialState) -> Result:
-        """The motion, to be read by name."""
+        """The motion as a result."""
         c, m = start.assembly.compiled, self.motion
         health = Health(True, "a motion and its changes", 0.0, 0.0, 0, 0, 0, 0, 0.0)
         q, v, z, vdot, lam = (np.ascontiguousarray(x) for x in (m.q, m.v, m.z, m.vdot, m.lam))
@@ -83,11 +83,11 @@ class MotionSensitivity:
 
 
 def _no_progress(fraction: float, note: str = "") -> None:
-    """Tell nobody."""
+    """Progress report that does nothing."""
 
 
 def prescribed_motion_sensitivity(loop: VariationalIntegration) -> MotionSensitivity:
-    """A motion that drivers prescribe, and its changes: the constraints decide both, works are integrals of powers."""
+    """A prescribed motion and its derivatives, from the constraints; works are integrals of powers."""
     start, clock = loop.start, loop.clock
     at = 1 + clock.integrals
     own = clock._replace(real=clock.real.copy(), count=clock.count.copy(), y=clock.y.copy(), K=clock.K.copy())
@@ -115,18 +115,18 @@ def prescribed_motion_sensitivity(loop: VariationalIntegration) -> MotionSensiti
 
 
 class VariationalIntegration:
-    """The loop of a motion and its changes, ready to run.
+    """Integration of a motion together with its derivatives.
 
     Parameters
     ----------
-    start : Start
-        Where the motion begins, in the coordinates that it is computed in.
-    clock : Clock
-        Of the motion alone.
+    start : InitialState
+        Initial state, in the coordinates of the integration.
+    clock : StepState
+        Integrator state of the motion without derivatives.
     values : sequence of Values
-        The mechanism's numbers with a complex step of each parameter.
+        The mechanism's values with a complex step of each parameter.
     sizes : sequence of float
-        What counts as a whole change of each parameter.
+        Unit of change of each parameter.
     method : str
         The integrator.
     """
@@ -158,11 +158,11 @@ class VariationalIntegration:
         t, y, vdot, lam = (np.zeros(n, complex) for n in (1, len(start.y), self.nv, self.nr))
         self.bench = residual.ResidualBatch(t, y, vdot, lam, steps, found)
         self.plan = self._step_plan(values, tables)
-        self.ended = clock  # as the last run has left it
+        self.ended = clock  # integrator state after the last run
         clear_faults(c.work.stack)
 
     def _step_plan(self, values: Sequence[Values], tables: np.ndarray) -> SensitivityPlan:
-        """Which numbers of the tables each parameter changes."""
+        """Table entries that each parameter changes, and work arrays."""
         s = self.c.structure
         entry, step, first = [np.zeros(0, np.int64)], [np.zeros(0)], [0]
         for x, size in zip(values, self.sizes, strict=True):
@@ -182,16 +182,16 @@ class VariationalIntegration:
 
     @property
     def _state_width(self) -> int:
-        """Width of the state of motion and changes."""
+        """Number of state variables of motion and derivatives."""
         return self.nq + self.nv + self.nz + self.n * (2 * self.nv + self.nz)
 
     def run(self, dq: np.ndarray, dv: np.ndarray) -> MotionSensitivity:
-        """Integrate from changes (parameters, nv) of the start.
+        """Integrate from derivatives (parameters, nv) of the initial positions and velocities.
 
         Raises
         ------
         SimulationError
-            If it cannot go on: a singular position, or something that is not smooth.
+            If it stops: at a singular position, or where a law is not smooth.
         """
         clock = self._clock(np.concatenate([dq, dv], axis=1) * self.sizes[:, None])
         buffer = np.zeros((max(2, min(len(clock.times), OUTPUT_NUMBERS // self.width + 1)), self.width))
@@ -205,7 +205,7 @@ class VariationalIntegration:
         return self._unpacked(np.concatenate(rows))
 
     def at(self, t: np.ndarray, y: np.ndarray) -> MotionSensitivity:
-        """Changes at states (n, width) of a motion that drivers prescribe, with powers in place of works."""
+        """Derivatives at states (n, width) of a prescribed motion, with powers in place of works."""
         n = len(t)
         states = np.zeros((n, self._state_width))
         states[:, : self.nq + self.nv] = y[:, : self.nq + self.nv]
@@ -236,7 +236,7 @@ class VariationalIntegration:
         )
 
     def _clock(self, changes: np.ndarray) -> ex.StepState:
-        """Of motion and changes."""
+        """Integrator state of motion and derivatives."""
         own, n = self.clock, self.n
         Y = np.zeros((ex.STATE_ROWS, self._state_width))
         at, more = self.nq + self.nv, 2 * self.nv * n
@@ -263,7 +263,7 @@ class VariationalIntegration:
         return MotionSensitivity(t[:, 0], MotionDerivatives(q, v, vdot, lam, z), by)
 
     def stopped(self, clock: ex.StepState, t: float | None = None, motion_only: bool = False) -> SimulationError:
-        """Why it went no further; ``motion_only``: the clock is that of the motion, without the changes."""
+        """The error for an integration that stopped; ``motion_only``: ``clock`` has no derivatives."""
         t = float(clock.real.t) if t is None else t
         real, own = clock.real.copy(), self.clock
         real.t = t
@@ -280,15 +280,16 @@ class VariationalIntegration:
 
 
 def _residual_tables(s: Structure, system: System) -> list[np.ndarray]:
-    """The tables that the residuals look at, and records of frames, of which those on ground hold numbers."""
+    """The tables that the residuals read, and the frame records, whose ground frames contain parameters."""
     bodies = system.bodies._replace(**{name: 0.0 * getattr(system.bodies, name) for name in SOLVER_FIELDS})
     tables = [x for name in PARAMETER_TABLES for _, x in named_arrays(getattr(system._replace(bodies=bodies), name))]
     return [*tables, allocate_work(s, system, complex).FK]
 
 
 def _combined_tables(s: Structure, system: System, values: Sequence[Values]) -> tuple[System, Work, np.ndarray]:
-    """Tables and scratch in complex numbers, with all that parameters can change in one array."""
-    for x in values:  # a rotation that is none as it stands, and that a parameter changes, must be looked at
+    """Tables and work arrays in complex numbers, with everything that parameters can change in one array."""
+    # A rotation that is the identity now but depends on a parameter must be evaluated.
+    for x in values:
         for name in ("joint_turned", "body_turned"):
             turned = getattr(system.bodies, name)
             turned[:] = np.maximum(turned.real, getattr(x.system.bodies, name).real)

@@ -1,12 +1,11 @@
-"""Motion in time: `simulate` and everything it needs.
+"""Simulation of motion in time: `simulate` and the modules that it uses.
 
-`method_choice` decides between an integrator and impulse time stepping, `initial_state` finds consistent initial
-values and the coordinates, `simulate` runs the compiled loop, `events/` handles what happens at an instant
-(impacts, stops, friction, actions of events), `implicit/` prepares implicit integrators, `impulse_stepping/` is
-time stepping by impulses, `motion_result` makes the result and its health, `diagnosis` says why a motion cannot go
-on.
+`method_choice` selects an integrator or impulse time stepping, `initial_state` finds consistent initial values and
+the coordinates, `simulate` runs the compiled loop, `events/` resolves events (impacts, stops, friction, actions),
+`implicit/` prepares implicit integrators, `impulse_stepping/` contains impulse time stepping, `motion_result` builds
+the result and its health report, and `diagnosis` explains why an integration failed.
 
-It may import `model/`, `tables/`, `engine/`, `numerics/`, `collision/`, `codegen/`, `assembly/`, `mobility/` and
-`results/`. A new integrator is a tableau or a step method in `numerics/integrators/`, with its name in
-`method_choice`; a new kind of event guard is handled in `events/`.
+This package may import `model/`, `tables/`, `engine/`, `numerics/`, `collision/`, `codegen/`, `assembly/`,
+`mobility/` and `results/`. A new integrator is a tableau or a step method in `numerics/integrators/`, with its name
+in `method_choice`. A new kind of event guard is handled in `events/`.
 """

@@ -1,8 +1,8 @@
-"""Checkpoints: a motion that is saved to a file while it runs, segment by segment, and resumes from there.
+"""Checkpoints: a motion that is saved to a file while it runs, segment by segment, and can be resumed from there.
 
-A segment begins where the one before it ended, from what a result holds and nothing else: factors and starting
-values of solvers are found anew in each. So a motion that was interrupted or killed, and resumes from its file,
-equals to the last digit the one that was not.
+A segment starts from the stored result of the segment before it and from nothing else: factorizations and starting
+values of solvers are computed anew. A motion that was interrupted or killed and is then resumed from its file
+therefore equals the uninterrupted motion to the last digit.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from .simulate import Span, simulate, simulate_with_reason
 
 @dataclass(frozen=True, kw_only=True)
 class CheckpointOptions(SimulateOptions):
-    """What `Mechanism.simulate` is asked."""
+    """Arguments of `Mechanism.simulate`."""
 
     checkpoint: str | os.PathLike | None
 
@@ -52,7 +52,7 @@ class CheckpointOptions(SimulateOptions):
 
 
 def simulate_with_checkpoints(model: Model, o: CheckpointOptions) -> Result:
-    """The motion; kept in a file on the way if that is asked for."""
+    """Simulate; save the motion to a file while it runs if ``checkpoint`` is given."""
     return simulate(model, o) if o.checkpoint is None else _simulated_with_checkpoints(model, o)
 
 
@@ -80,7 +80,7 @@ def _motion_fingerprint(model: Model, o: CheckpointOptions, span: Span) -> str:
 
 
 class _SegmentedMotion:
-    """Part after part."""
+    """A motion computed segment by segment."""
 
     def __init__(
         self, model: Model, way: MethodChoice, span: Span, file: CheckpointFile, report: ReportProgress, auto: bool
@@ -89,7 +89,7 @@ class _SegmentedMotion:
         self.auto = auto
 
     def all(self) -> Result:
-        """To the end."""
+        """Compute the motion to its end."""
         kept, way = self.kept, self.way
         options, why = (way.instead, kept.by) if kept.by and way.instead is not None else (way.options, way.why)
         try:
@@ -104,7 +104,7 @@ class _SegmentedMotion:
                 raise error from None
 
     def _through(self, o: SimulateOptions, why: str) -> Result:
-        """To the end, by a method that is chosen."""
+        """Compute the motion to its end by the given method."""
         kept = self.kept
         while True:
             try:
@@ -128,7 +128,7 @@ class _SegmentedMotion:
         return result
 
     def _left(self, result: Result) -> Interrupted:
-        """What is raised for the user's interrupt: what goes on does so from where the last part ended."""
+        """Return the exception for the user's interrupt; the motion can be resumed where the last segment ended."""
         kept = self.kept
         kept.write()
         result.health.message += (
@@ -139,7 +139,7 @@ class _SegmentedMotion:
         return Interrupted(result.health.message, result)
 
     def _part(self, o: SimulateOptions, why: str) -> tuple[Result, Segment]:
-        """The next part: its motion, and how it ended."""
+        """Compute the next segment. Returns its motion and the segment's state."""
         first, last, times = self.span
         before = self.kept.parts[-1] if self.kept.parts else None
         t = first if before is None else before.final[0]
@@ -160,14 +160,16 @@ class _SegmentedMotion:
             return simulate_with_reason(self.model, o.known(**changed), (t, last, times), why, self.auto, part), part
 
 
-# The user's interrupt of a motion that is kept on the way.
+# Keyboard interrupts of a motion with checkpoints.
 
 
 @contextmanager
 def deferred_interrupt(part: Segment) -> Iterator[None]:
-    """Have an interrupt end a part that was long computed where it is, in order; a second one, or before, at once.
+    """Let a keyboard interrupt end a long segment in order, at its present time.
 
-    Where something else handles interrupts, or in another thread than the first, nothing is changed.
+    A second interrupt, or one of a segment that has run only briefly, raises at once. Where another handler is
+    installed,
+    or outside the main thread, nothing is changed.
     """
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -185,49 +187,49 @@ def deferred_interrupt(part: Segment) -> Iterator[None]:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-# Where a motion is kept on its way: one result file, and files beside it of what came since that was written.
+# Files of a motion with checkpoints: one result file, and segment files with what was computed since it was written.
 #
-# A file that is there is whole: each is written beside its place and then put there. The first file is written anew
-# once the others hold as much as it does, so that all that is ever written is some three times the result, and no write
-# is longer than what was computed since takes to write, or once in a while all.
+# Every file that exists is complete: it is written under another name and then renamed. The first file is rewritten
+# once the segment files hold as much as it does. In total about three times the size of the result is written. A write
+# covers only what was computed since the last one, except when the first file is rewritten.
 
 
-EVERY = 20.0  # seconds between two writes, at least
-MOST_FILES = 60  # files beside the first one
+EVERY = 20.0  # least time between two writes [s]
+MOST_FILES = 60  # largest number of segment files
 CHECKPOINT_KEY = "checkpoint"  # in `Result.carried`
 REMEDY = "give another file, or remove that one"
 
 
 class CheckpointFile:
-    """Parts of a motion and the files that hold them.
+    """Segments of a motion and the files that store them.
 
     Parameters
     ----------
     path : Path
     mark : str
-        What tells the motion from others.
+        Fingerprint of the motion.
     times : ndarray [s]
         Output times of the whole motion.
 
     Attributes
     ----------
     parts : list of Result
-        As far as it is computed; several that are written may be one.
+        Segments computed so far; several that are already written may be joined to one.
     by : str
-        Why it goes by steps of impulses after all, if it does.
+        Why impulse time stepping replaced the integration; empty if it did not.
     """
 
     def __init__(self, path: Path, mark: str, times: np.ndarray) -> None:
         self.path, self.mark, self.times = path, mark, times
         self.parts: list[Result] = []
         self.by = ""
-        self._run, self._count, self._written = uuid.uuid4().hex, 0, 0  # parts in all, and those in files
-        self._first = self._rows_beside = 0  # times in the first file, and in those beside it
+        self._run, self._count, self._written = uuid.uuid4().hex, 0, 0  # number of segments, and of those already written
+        self._first = self._rows_beside = 0  # output times in the first file, and in the segment files
         self._files: list[Path] = []
         self._last = time.monotonic()
 
     def read(self, cls: type[Model]) -> bool:
-        """Take what the files hold; whether it is the whole motion.
+        """Read the files. Returns whether they hold the whole motion.
 
         Raises
         ------
@@ -259,20 +261,20 @@ class CheckpointFile:
         return bool(self.parts[-1].carried[CHECKPOINT_KEY]["done"])
 
     def add(self, part: Result) -> None:
-        """One more part; it is written if that is due."""
+        """Add a segment; write it if a write is due."""
         self.parts.append(part)
         self._count += 1
         if time.monotonic() - self._last > EVERY:
             self.write()
 
     def restart(self, by: str) -> None:
-        """The motion begins once more, another way."""
+        """Discard all segments; the motion starts again by another method, for the reason ``by``."""
         self.parts, self.by, self._run = [], by, uuid.uuid4().hex
         self._count = self._written = self._first = self._rows_beside = 0
         self._remove_segment_files()
 
     def write(self) -> None:
-        """Write what is not in files yet."""
+        """Write the segments that are not in files yet."""
         new = self.parts[self._written :]
         if not new:
             return
@@ -291,11 +293,11 @@ class CheckpointFile:
         self._written, self._last = len(self.parts), time.monotonic()
 
     def whole(self, *last: Result) -> Result:
-        """All with what was computed last."""
+        """Return all segments joined with the one computed last."""
         return self._joined([*self.parts, *last])
 
     def finish(self, result: Result) -> None:
-        """Write the whole motion, as other programs read it too, and nothing beside it."""
+        """Write the whole motion to one file that other programs can read, and remove the segment files."""
         self._save(self.path, result, done=True)
         self._remove_segment_files()
 
@@ -312,23 +314,23 @@ class CheckpointFile:
         return self.path.with_name(f"{self.path.name}.{part}")
 
     def _remove_segment_files(self) -> None:
-        """Remove the files beside the first one, those of an earlier motion too."""
+        """Remove the segment files, including those of an earlier motion."""
         for path in self.path.parent.glob(f"{self.path.name}.*"):
             if path.name.removeprefix(f"{self.path.name}.").isdigit():
                 path.unlink(missing_ok=True)
         self._files = []
 
 
-# What the health of a motion that was computed in parts tells late.
+# Parts of the health report of a segmented motion that are computed on first access.
 
 
 def with_joined_health(result: Result, parts: Sequence[Result]) -> Result:
-    """The parts end to end, ``result``, with a health that knows what each of them does."""
+    """Return ``result`` (the joined segments) with a health report that covers all segments."""
     if len(parts) == 1:
         return result
     health = result.health
     health.late = {"mobility": parts[0].health.late["mobility"], "energy_drift": lambda: result.energy.drift}
-    if isinstance(health.options.get("method"), Mapping):  # accelerations of steps by impulses are means
+    if isinstance(health.options.get("method"), Mapping):  # accelerations of impulse time stepping are mean values over steps
         health.late |= {
             "doubtful": partial(diagnostics.impulse_stepping_doubts, result),
             "warnings": partial(diagnostics.impulse_stepping_warnings, result),

@@ -1,8 +1,8 @@
-"""Diagnosis: why an integration could not go on; rounding limits; residual of the accelerations.
+"""Diagnosis: why an integration could not continue; rounding limits; residual of the accelerations.
 
-`failure_reason` finds the cause of a failure: a law that jumps or is not finite, drivers that contradict each other, a
-lock-up, a jam by friction, an unbounded motion, too many steps. `acceleration_violation` checks G vdot = gamma
-independently of the solve.
+`failure_reason` finds the cause of a failure: a law that jumps or is not finite, contradictory drivers, a lock-up, a
+friction jam, an unbounded motion, too many steps. `acceleration_violation` checks G vdot = gamma independently of the
+solver.
 """
 
 from __future__ import annotations
@@ -41,17 +41,18 @@ if TYPE_CHECKING:
 
 
 class UnresolvedInstant(SimulationError):
-    """An instant at which rigid bodies have no answer, or no end of answers."""
+    """An instant at which rigid-body equations have no solution, or at which events never end."""
 
 
 class InitialOverlap(ModelError):
-    """A motion that begins with bodies in each other."""
+    """A motion that starts with overlapping bodies."""
 
 
 def jam_message(e: Any, t: float, single: bool) -> str:
-    """What is said where no force of friction in a joint, or where bodies touch, was found that goes with its own load.
+    """Return the message for friction in a joint or contact for which no consistent load was found.
 
-    With one such load (``single``) the search finds it if it exists; with several it may end short of them.
+    With a single load (``single``) the search finds a solution if one exists; with several it may end without finding
+    it.
     """
     if not single:
         where = f"of {body_names(e)}" if isinstance(e, Touch) else f"in joint {e.joint!r}"
@@ -76,15 +77,15 @@ def jam_message(e: Any, t: float, single: bool) -> str:
 
 
 def body_names(e: Touch) -> str:
-    """Both bodies of a place of contact."""
+    """Return the names of both bodies of a contact point."""
     return " and ".join(repr(b) if b != GROUND else GROUND for b in (e.body_i, e.body_j))
 
 
-LIMIT_TOLERANCE = 1e-6  # of their sizes: limits closer than this cross where something has just ended
+LIMIT_TOLERANCE = 1e-6  # relative distance below which limits count as crossed where an integration has just ended
 
 
 def contradicting_limits(c: CompiledMechanism, t: float, near: float = LIMIT_TOLERANCE) -> str:
-    """The controller whose limits cross at the kinematics last evaluated, in words; else nothing."""
+    """Return a message on a controller whose limits cross at the kinematics last evaluated; empty if there is none."""
     S, W = c.values.system, c.work
     stack = np.zeros_like(W.stack)
     with np.errstate(all="ignore"):
@@ -111,17 +112,17 @@ def refuse_contradicting_limits(c: CompiledMechanism, t: float) -> None:
         raise AnalysisError(f"{c.structure.model.name!r}: at t = {t:.6g} s, {text}")
 
 
-NOTABLE = 10.0  # times the tolerance: an error of a step from rounding that is told
-RECENT_SHARE = 1e-3  # part of the time span within which rounding found to decide is why a run stopped
+NOTABLE = 10.0  # rounding error of a step, in tolerances, from which on it is reported
+RECENT_SHARE = 1e-3  # part of the time span before a stop within which rounding counts as its cause
 
 
 def rounding_is_notable(worst: np.ndarray, far: np.ndarray, atol: np.ndarray, relative: np.ndarray) -> np.ndarray:
-    """In which of several motions `rounding_error_remark` or `origin_distance_remark` have something to say.
+    """Return in which of several motions `rounding_error_remark` or `origin_distance_remark` is not empty.
 
     Parameters
     ----------
     worst, far : (n,) ndarray
-        The clock's EXCESS; how far the farthest frame is from the origin [m].
+        ``largest_error`` of the integrator state; distance of the farthest frame from the origin [m].
     atol, relative : (n,) ndarray
         Tolerance of positions [m]: the absolute one, and rtol times the mechanism's length.
     """
@@ -129,7 +130,7 @@ def rounding_is_notable(worst: np.ndarray, far: np.ndarray, atol: np.ndarray, re
 
 
 def rounding_error_remark(clock: ex.StepState) -> str:
-    """The largest error of a step that rounding made and that was accepted; nothing where it is not notable."""
+    """Return a remark on the largest accepted step error caused by rounding; empty if it is not notable."""
     size = clock.real.largest_error
     if not size > NOTABLE:
         return ""
@@ -141,7 +142,7 @@ def rounding_error_remark(clock: ex.StepState) -> str:
 
 
 def origin_distance_remark(a: Assembly, clock: ex.StepState) -> str:
-    """How far from the origin it is, where positions are not known there to the tolerance."""
+    """Return a remark if the mechanism is so far from the origin that rounding of positions exceeds the tolerance."""
     length = a.compiled.values.length
     far = float(np.abs(a.compiled.array("FK")[:, :3]).max(initial=0.0))
     digit = math.ulp(far)
@@ -154,7 +155,7 @@ def origin_distance_remark(a: Assembly, clock: ex.StepState) -> str:
 
 
 def rounding_suffix(clock: ex.StepState) -> str:
-    """What is to be said of a run that stopped, if rounding was found to decide shortly before."""
+    """Return the addition to the message of a stopped run if rounding dominated shortly before."""
     if clock.real.t - clock.real.rounding_found_at > RECENT_SHARE * clock.real.span:
         return ""
     return (
@@ -163,20 +164,20 @@ def rounding_suffix(clock: ex.StepState) -> str:
     )
 
 
-MOST_TIMES = 100  # output times that are looked at
+MOST_TIMES = 100  # largest number of output times that are checked
 NEGLIGIBLE_ACCELERATION = (
-    1e-14  # of the mechanism's length (or a radian) by the square of the motion's time: what is less is rounding
+    1e-14  # relative to the mechanism's length (or a radian) over the squared duration; smaller ones are rounding
 )
 
 
 def acceleration_violation(result: Result) -> float:
-    """Largest |G vdot - gamma| at up to `MOST_TIMES` output times, relative to the terms that make it up.
+    """Return the largest |G vdot - gamma| at up to `MOST_TIMES` output times, relative to its terms.
 
-    Looked at in absolute coordinates, whatever the motion was computed in: what two bodies add to a row cancels in
-    others. The terms are what would be there without the constraints, |G| M^-1 |f|, which reactions cancel;
-    |G| |vdot|; and what gamma is made of, rates of turn times rates of the rows: where nothing moves, or all moves
-    steadily, the accelerations themselves are only the rounding of these; where no force acts either, all of them are
-    (`NEGLIGIBLE_ACCELERATION`). With Baumgarte's stabilization gamma is what that makes of it.
+    It is evaluated in absolute coordinates whatever the coordinates of the motion, since in others the contributions of
+    two bodies to a row cancel. The terms are |G| M^-1 |f| (accelerations without constraints, which reactions cancel),
+    |G| |vdot|, and the terms of gamma: angular velocities times rates of the rows. At rest or in steady motion the
+    accelerations are only the rounding of these terms; without forces all terms are rounding
+    (`NEGLIGIBLE_ACCELERATION`). With Baumgarte's stabilization gamma includes its terms.
     """
     n, old = len(result.t), result.values.structure
     if not n or not (result.model.joints or result.model.drivers or old.switches):
@@ -210,7 +211,7 @@ def acceleration_violation(result: Result) -> float:
 
 
 def _accelerations(result: Result, c: CompiledMechanism) -> np.ndarray:
-    """Accelerations of all bodies at all output times, as c's velocities go, (n, nv)."""
+    """Return the accelerations of all bodies at all output times in the order of c's velocities, (n, nv)."""
     out = np.zeros((len(result.t), c.structure.nv))
     planar = c.structure.model.planar
     for name, b in c.structure.place.items():
@@ -226,10 +227,12 @@ def _accelerations(result: Result, c: CompiledMechanism) -> np.ndarray:
 def acceleration_residual(
     c: CompiledMechanism, v: np.ndarray, x: np.ndarray, sizes: np.ndarray, o: Mapping[str, Any] | None = None
 ) -> tuple[np.ndarray, float, float]:
-    """How far the accelerations x are off each row, (nr,), the largest sum of a row's terms, and that without x's own.
+    """Return the residual of accelerations x in each row, (nr,), the largest sum of a row's terms, and that without x's
+    own.
 
-    Rows in metres count as parts of the mechanism's length. The state (velocities v) is the one in c's scratch,
-    evaluated with forces; ``sizes`` are c's, ``o`` the options of the motion.
+    Rows in metres are divided by the mechanism's length. The state (velocities v) is the one in c's workspace,
+    evaluated
+    with forces; ``sizes`` are c's, ``o`` the options of the motion.
     """
     S, n = c.values.system, len(c.structure.rows)
     row_p = S.row_start[: n + 1]
@@ -250,9 +253,10 @@ def acceleration_residual(
 
 
 def _unconstrained_accelerations(c: CompiledMechanism) -> np.ndarray:
-    """Accelerations (nv,) that forces would give the bodies without constraints, at the state in c's scratch.
+    """Return the accelerations (nv,) that forces would cause without constraints, at the state in c's workspace.
 
-    Every body is taken for a compact one: a slender one that its joints keep from spinning does not spin.
+    Each body has a single reference inertia about all axes: a slender body that its joints keep from spinning does not
+    spin.
     """
     S = c.values.system
     per = np.zeros(c.structure.nv)
@@ -262,34 +266,34 @@ def _unconstrained_accelerations(c: CompiledMechanism) -> np.ndarray:
     return per * c.work.velocities.applied
 
 
-JUMP_WINDOW = 1e-10  # part of the time span within which a law that jumps is looked for
-LOOKAHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
-LOCKED_RESIDUAL = 1e-3  # part of the accelerations asked for that no solution of the rows leaves open
-DISAGREEMENT = 1e-6  # part of a rate or second derivative by which laws of one coordinate differ that disagree
+JUMP_WINDOW = 1e-10  # part of the time span within which jumps of a law are sought
+LOOKAHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law is evaluated
+LOCKED_RESIDUAL = 1e-3  # relative residual of the accelerations above which the mechanism is locked
+DISAGREEMENT = 1e-6  # relative difference of derivatives above which two laws of one coordinate disagree
 DERIVATIVE_NAMES = ("value", "rate", "second derivative")
 GROWTH_FACTOR = (
-    1.2  # times by which a derivative without bound grows where what separates from the instant is a hundredth
+    1.2  # growth of an unbounded derivative when the distance from the instant is divided by a hundred
 )
-JUMP_FACTOR = 10.0  # a law that changes this many times more than its own slope says has jumped
+JUMP_FACTOR = 10.0  # ratio of a law's change to that by its slope above which it has jumped
 
 
 def failure_reason(
     a: Assembly, base: Assembly, clock: ex.StepState, with_result: bool = True, method: str = ""
 ) -> tuple[str, Exception | None]:
-    """What stopped the integration, and the exception that a user's function raised, if one did.
+    """Return why the integration stopped, and the exception that a user's function raised, if one did.
 
     Parameters
     ----------
     a : Assembly
-        Its scratch is as the compiled loop has left it.
+        Its workspace is as the compiled loop has left it.
     base : Assembly
         The mechanism in absolute coordinates, where every joint and driver has rows.
-    clock : Clock
+    clock : StepState
         State of the integration.
     with_result : bool
-        Whether there is a result up to then.
+        Whether there is a partial result.
     method : str
-        By which it was integrated.
+        Name of the integrator.
     """
     name = a.compiled.structure.model.name
     t = float(clock.real.t)
@@ -318,7 +322,7 @@ def failure_reason(
 
 
 def health_remarks(a: Assembly, clock: ex.StepState) -> tuple[str, ...]:
-    """What went wrong on the way and was overcome, and where rounding was the limit, for the health report."""
+    """Return health remarks on faults that were overcome, and on rounding as the limit of accuracy."""
     return tuple(
         text for text in (_overcome_fault(a), rounding_error_remark(clock), origin_distance_remark(a, clock)) if text
     )
@@ -336,9 +340,9 @@ def _overcome_fault(a: Assembly) -> str:
 
 
 def driver_fault(c: CompiledMechanism, t: float, span: float) -> str:
-    """A driver whose law is not finite, jumps, or has a derivative without bound, about the time t; else nothing.
+    """Return why a driver's law fails about time t (not finite, jump, unbounded derivative); empty if none does.
 
-    ``span`` is the largest time [s], by which times are told apart.
+    ``span`` is the largest time [s], relative to which times are distinguished.
     """
     S, W = c.values.system, c.work
     stack = np.zeros_like(W.stack)
@@ -356,7 +360,7 @@ def driver_fault(c: CompiledMechanism, t: float, span: float) -> str:
 
 
 def reason_without_solution(c: CompiledMechanism, t: float, span: float) -> str:
-    """Why the equations of motion have no solution at the state evaluated last; ``span`` as above."""
+    """Return why the equations of motion have no solution at the state evaluated last; ``span`` as in `driver_fault`."""
     stack = c.work.stack
     found = function_fault(stack, c.structure.functions) or c.structure.missed(stack)
     text = found.message if found else driver_fault(c, t, span) or force_fault(c, t) or _controller_fault(c, t)
@@ -369,14 +373,14 @@ def reason_without_solution(c: CompiledMechanism, t: float, span: float) -> str:
 
 
 def _force_fault_at_end(a: Assembly, clock: ex.StepState) -> str:
-    """A force whose formula ends where the motion stopped; else nothing."""
+    """Return a message on a force without finite value where the motion stopped; empty if there is none."""
     t = float(clock.real.t)
     force = force_fault(a.compiled, t)
     return f"at t = {t:.6g} s, {force}" if force else ""
 
 
 def _driver_laws(c: CompiledMechanism) -> list[tuple[Any, int, bool]]:
-    """Drivers, where the law of each begins, and whether whole turns count for nothing."""
+    """Return the drivers, the start index of each law, and whether the value is an angle modulo whole turns."""
     s, S = c.structure, c.values.system
     laws: list[tuple[Any, int, bool]] = [
         (row.element, int(S.rows.law[k]), bool(S.rows.wrapped[k]))
@@ -389,7 +393,7 @@ def _driver_laws(c: CompiledMechanism) -> list[tuple[Any, int, bool]]:
 
 
 def _contradicting_drivers(a: Assembly, clock: ex.StepState) -> str:
-    """Two drivers of one coordinate whose laws part where the motion stopped; else nothing."""
+    """Return a message on two drivers of one coordinate whose laws diverge where the motion stopped; else empty."""
     S, W, t = a.compiled.values.system, a.compiled.work, float(clock.real.t)
     stack = np.zeros_like(W.stack)
     first: dict[str, tuple[Any, tuple]] = {}
@@ -407,7 +411,7 @@ def _contradicting_drivers(a: Assembly, clock: ex.StepState) -> str:
 
 
 def _not_finite_law(after: list[tuple]) -> str:
-    """What is wrong with a law that has these values and derivatives soon after, if they are not finite."""
+    """Describe a value or derivative that is not finite at times just after an instant; empty if all are finite."""
     for jet in after:
         for what, x in zip(DERIVATIVE_NAMES, jet, strict=True):
             if not math.isfinite(x):
@@ -416,7 +420,7 @@ def _not_finite_law(after: list[tuple]) -> str:
 
 
 def _unbounded_derivative(near: list[tuple], when: str) -> str:
-    """What is wrong with a law that has these values and derivatives at times ever farther from one instant."""
+    """Describe a derivative that grows towards an instant; ``near`` has values at increasing distance from it."""
     for what, *sizes in zip(DERIVATIVE_NAMES[1:], *(np.abs(jet[1:]) for jet in near), strict=True):
         if all(x > GROWTH_FACTOR * y for x, y in pairwise(sizes)):
             return (
@@ -428,7 +432,7 @@ def _unbounded_derivative(near: list[tuple], when: str) -> str:
 
 
 def _jump_of_law(before: tuple, after: tuple, step: float, wrapped: bool) -> str:
-    """What is wrong with a law whose value and two derivatives are these just before and just after."""
+    """Describe a jump between value and derivatives just before and just after an instant; empty if there is none."""
     if not all(map(math.isfinite, before)):
         return ""
     for k, remedy in ((0, "step5(t, t0, 0, t1, 1) goes over smoothly"), (1, "step5 or a cubic Table goes smoothly")):
@@ -473,7 +477,7 @@ def _not_finite_motion(a: Assembly, clock: ex.StepState, method: str) -> str:
 
 
 def _end_of_curve(a: Assembly, clock: ex.StepState) -> str:
-    """A curve at whose end its follower has come; else nothing."""
+    """Return a message on a follower that has reached the end of its curve; empty if there is none."""
     s, numbers = a.compiled.structure, a.compiled.values.numbers
     for joint in s.model.joints:
         at = s.state_at.get(f"{joint.name}.place")
@@ -485,16 +489,16 @@ def _end_of_curve(a: Assembly, clock: ex.StepState) -> str:
 
 
 def _active_corners(a: Assembly) -> list[str]:
-    """Laws on whose corners the motion is held."""
+    """Return the labels of laws on whose corners the motion is held."""
     mode = a.compiled.work.modes.mode
     specs = enumerate(a.compiled.structure.switches)
     return [x.switch.label for k, x in specs if x.switch.kind == BRANCH and mode[k] != OFF]
 
 
 def force_fault(c: CompiledMechanism, t: float) -> str:
-    """The force that is no number at the kinematics that the compiled loop has left, and why; else nothing.
+    """Return a message on a force that is not finite at the kinematics last evaluated; empty if there is none.
 
-    Where limits of a controller cross it is that.
+    Controllers whose limits cross are reported first.
     """
     if text := contradicting_limits(c, t):
         return text
@@ -541,7 +545,7 @@ def force_fault(c: CompiledMechanism, t: float) -> str:
 
 
 def _controller_fault(c: CompiledMechanism, t: float) -> str:
-    """The controller whose state has no finite rate for what is measured as the compiled loop has left it."""
+    """Return a message on a controller whose state has no finite rate at the measured values; empty if there is none."""
     for x in c.structure.controls:
         if part := undefined_law_part(c, x.controller, t):
             law = abbreviated(tree_text(x.law.tree))
@@ -550,7 +554,9 @@ def _controller_fault(c: CompiledMechanism, t: float) -> str:
 
 
 def _extrapolated_fault(a: Assembly, clock: ex.StepState) -> str:
-    """The force or controller without a finite value where the motion would be by its present rates."""
+    """Return a message on a force or controller that is not finite where the present rates lead; empty if there is
+    none.
+    """
     c, t, y, rates = a.compiled, float(clock.real.t), clock.y[ex.CURRENT], clock.K[0]
     if not np.isfinite(y).all() or not np.isfinite(rates).all():
         return ""
@@ -567,7 +573,7 @@ def _extrapolated_fault(a: Assembly, clock: ex.StepState) -> str:
 
 
 def _law_texts(e: Element) -> str:
-    """What the laws of a force are as given, the beginning and end of long ones."""
+    """Return the laws of an element as given; long ones are abbreviated."""
     given = {name: getattr(e, name) for name in ("law",) if isinstance(e, Driver)}
     given |= {name: getattr(e, name) for name in fields_with(e.__class__, LawOf)}
     texts = [f"{name} = {abbreviated(x)}" for name, x in given.items() if isinstance(x, str)]
@@ -575,7 +581,7 @@ def _law_texts(e: Element) -> str:
 
 
 def _lock_up(a: Assembly, base: Assembly, clock: ex.StepState) -> str:
-    """The elements for whose rows there are no accelerations where the motion stopped, if so."""
+    """Name the elements whose rows allow no accelerations where the motion stopped; empty if there are none."""
     t, y, own, c = float(clock.real.t), clock.y[0], a.compiled, base.compiled
     if not len(c.structure.rows) or not np.isfinite(y).all():
         return ""
@@ -646,7 +652,7 @@ def _too_many_steps(a: Assembly, clock: ex.StepState) -> str:
 
 
 def _fastest_component(clock: ex.StepState) -> int:
-    """The component of the state whose derivative changed most within the last step, by its tolerance."""
+    """Return the state component whose derivative changed most within the last step, relative to its tolerance."""
     n = clock.count.controlled
     with np.errstate(all="ignore"):
         change = np.ptp(clock.K[:, :n], axis=0) / (clock.real.atol + clock.real.rtol * np.abs(clock.y[0, :n]))
@@ -654,7 +660,7 @@ def _fastest_component(clock: ex.StepState) -> int:
 
 
 def _component_name(a: Assembly, i: int) -> str:
-    """Name of the body or tree joint that a component of the state belongs to."""
+    """Return the name of the body, tree joint or controller state that a component of the state belongs to."""
     s, tree = a.compiled.structure, a.compiled.structure.tables["tree"]
     if s.nq + s.nv <= i < s.nq + s.nv + len(s.controls):
         return f"controller state {s.controls[i - s.nq - s.nv].name!r}"

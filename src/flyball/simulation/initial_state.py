@@ -1,7 +1,7 @@
 """Initial state: consistent positions and velocities at the start, and the coordinates of the motion.
 
-The start is assembled as described, or is where an earlier result ended. Absolute or joint coordinates are chosen
-by estimated cost. For coordinate partitioning the independent coordinates are chosen here first.
+The start is the assembled reference configuration, or the end of an earlier result. Absolute or joint coordinates are
+chosen by estimated cost. For coordinate partitioning the first independent coordinates are chosen here.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ from .integration_intervals import Segment, whole_motion
 from .solver_switching import CodeSelection, StiffnessMonitor
 
 COORDINATES = ("auto", "absolute", "joint")
-THIN_INERTIA = 1e-7  # inertia of a coordinate, as part of that of the mechanism's mass at its length, that is none
-SINGULAR_MASS = 1e-13  # least eigenvalue of the mass matrix with a unit diagonal: below it lie rounding errors
-MOST_AVOIDED = 8  # joints that are taken out of the forest, one after the other, before it is given up
-UNSOLVED = 1e-9  # what the solve may leave of the equations at the start
+THIN_INERTIA = 1e-7  # negligible inertia of a coordinate, relative to total mass times the mechanism's length squared
+SINGULAR_MASS = 1e-13  # smallest eigenvalue of the mass matrix scaled to a unit diagonal; smaller ones are rounding
+MOST_AVOIDED = 8  # joints that are removed from the spanning forest, one after the other, before giving up
+UNSOLVED = 1e-9  # relative residual of the equations that is allowed at the start
 
 
 def choose_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | None) -> tuple[Assembly, str]:
-    """The assembled start in the coordinates to be used, and what they are and why.
+    """Choose the coordinates. Returns the assembled start in them, and a description with the reason.
 
     Parameters
     ----------
@@ -62,8 +62,9 @@ def choose_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] |
     ModelError
         For an unknown wish.
     AnalysisError
-        If friction or an event follows reactions that redundancy leaves undetermined, for joint coordinates: there a
-        tree joint would carry all, here what redundant joints carry is chosen by the size of their rows.
+        If joint coordinates are requested but friction or an event depends on reactions that redundancy leaves
+        undetermined. In joint coordinates the tree joint would carry everything; in absolute coordinates the load is
+        distributed among redundant joints by least squares.
     """
     refuse_unknown_coordinates(wish)
     if wish == "absolute":
@@ -94,7 +95,7 @@ def _evaluation_cost(s: Structure) -> float:
 
 
 def _indeterminate_loads(a: Assembly) -> str:
-    """Why friction, or an event that names what a joint carries, needs absolute coordinates, if it does."""
+    """Return why friction, or an event on a joint's reaction, needs absolute coordinates; empty if it does not."""
     s = a.compiled.structure
     if not s.loads and not forces_in_events(s.model):
         return ""
@@ -112,7 +113,7 @@ def _indeterminate_loads(a: Assembly) -> str:
 
 
 def refuse_unknown_coordinates(wish: str) -> None:
-    """Refuse unknown coordinates."""
+    """Refuse an unknown choice of coordinates."""
     if wish not in COORDINATES:
         raise ModelError(f"unknown coordinates {wish!r}; choose one of {', '.join(COORDINATES)}")
 
@@ -122,7 +123,7 @@ def _size_in_words(c: CompiledMechanism) -> str:
 
 
 def _cut_joints(c: CompiledMechanism) -> str:
-    """Joints that close loops."""
+    """Name the joints that close loops."""
     s = c.structure
     cut = [j.name for j in s.model.joints if j.name not in s.tree_joints]
     if not cut:
@@ -133,7 +134,10 @@ def _cut_joints(c: CompiledMechanism) -> str:
 def _sound_forest(
     a: Assembly, parameters: Mapping[str, float] | None, most: float = np.inf
 ) -> tuple[CompiledMechanism | None, str]:
-    """A forest that is sound where the mechanism starts and may cost less than ``most``; else none, and why."""
+    """Return a mechanism in joint coordinates that is regular at the start and may cost less than ``most``.
+
+    If there is none, return None and the reason.
+    """
     model = a.compiled.structure.model
     avoided: list[str] = []
     for _ in range(MOST_AVOIDED):
@@ -157,10 +161,11 @@ def _sound_forest(
 
 
 def _massless_tree_joint(c: CompiledMechanism, a: Assembly) -> str | None:
-    """A tree joint along whose coordinates hardly any inertia moves, or a body that hangs by none and has none.
+    """Return a tree joint whose coordinates move hardly any inertia, or a body without joint and without inertia.
 
-    Each may move inertia alone and several together none, as a body without inertia that turns about its mass centre
-    while its neighbour keeps its place. The factorisation then divides by rounding errors, or by zero.
+    Each joint alone may move inertia while several together move none. An example is a body without inertia that turns
+    about its mass centre while its neighbour stays in place. The factorization then divides by rounding errors or by
+    zero.
     """
     s, S = c.structure, c.values.system
     if S.scales.semidefinite == 0.0 or S.sizes.solver != COUPLED or not s.nv:
@@ -198,43 +203,43 @@ def _massless_tree_joint(c: CompiledMechanism, a: Assembly) -> str | None:
     return names[of[np.argmax(np.abs(moves[:, 0]))]] if least[0] < SINGULAR_MASS else None
 
 
-MOST_STARTS = 4  # starts of the same numbers whose coordinates are kept
+MOST_STARTS = 4  # initial states that are cached for one set of parameter values
 
 
 @dataclass
 class InitialState:
-    """A consistent start in the coordinates of the motion."""
+    """A consistent initial state in the coordinates of the motion."""
 
     base: Assembly  # in absolute coordinates
     assembly: Assembly
     y: np.ndarray
-    coordinates: str  # which they are, and why
-    wound: dict[str, float]  # body -> whole turns that its coordinates count and its angle does not (`Result.wound`)
-    engine: CodeSelection | None = None  # what the motion is computed by; table-driven if none
-    before: Result | None = None  # what it goes on from
-    pace: StiffnessMonitor | None = None  # whether it goes on by another method; none: it does not
-    since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
-    part: Segment = field(default_factory=whole_motion)  # of the motion
+    coordinates: str  # the chosen coordinates, and why
+    wound: dict[str, float]  # body -> whole turns in its coordinates beyond its angle (`Result.wound`)
+    engine: CodeSelection | None = None  # None: general engine
+    before: Result | None = None  # the earlier result that the motion continues
+    pace: StiffnessMonitor | None = None  # None: the method does not change
+    since: float = 0.0  # start of the call, by `time.perf_counter`
+    part: Segment = field(default_factory=whole_motion)  # segment of the motion
 
     def again(self, part: Segment) -> InitialState:
-        """The same with arrays and scratch of its own; it is of a mechanism as described, with nothing before it."""
+        """Return a copy with its own arrays and workspace, for a motion that continues no earlier one."""
         base = self.base.again()
         a = base if self.assembly is self.base else self.assembly.again()
         return InitialState(base, a, self.y.copy(), self.coordinates, dict(self.wound), part=part)
 
     @property
     def carried(self) -> Mapping[str, Any]:
-        """What the part of the motion before this one hands on; nothing where there is none."""
+        """Data from the segment before this one; empty if there is none."""
         return self.before.carried if self.part.later and self.before is not None else {}
 
 
 def start_time(t_start: float | None, before: Result | None) -> float:
-    """When a motion begins.
+    """Return the start time of a motion [s].
 
     Raises
     ------
     ModelError
-        If an earlier result and a time both say when, or that is no result.
+        If both a time and an earlier result are given, or ``before`` is not a result.
     """
     if before is None:
         return 0.0 if t_start is None else t_start
@@ -255,11 +260,13 @@ def find_initial_state(
     switches: bool = False,
     part: Segment | None = None,
 ) -> InitialState:
-    """Assemble, or go on from an earlier result; choose coordinates.
+    """Assemble the mechanism, or continue an earlier result, and choose the coordinates.
 
-    With ``switches`` there are rows for what holds at times (`tables.switches`), all off; else nothing holds, and
-    friction goes by the sign of the rate. ``part`` says which part of a motion it is: a later one has the coordinates,
-    and the parameters, of the one before it.
+    With ``switches`` the tables contain rows for all switches (stops, stick friction, locks), all inactive. Without
+    them
+    none exist, and friction follows the sign of the rate. ``part`` is the segment of the motion: a later segment has
+    the
+    coordinates and parameters of the one before it.
 
     Raises
     ------
@@ -293,7 +300,7 @@ def _computed_state(
     switches: bool,
     part: Segment,
 ) -> InitialState:
-    """Where it begins, found from the description."""
+    """Compute the initial state without the cache."""
     if before is not None and before.phases is not None:
         set_by_events = _set_by_events(model, before)
         parameters = {**(parameters or {}), **set_by_events} if part.later else {**set_by_events, **(parameters or {})}
@@ -306,14 +313,14 @@ def _computed_state(
 
 
 def _reproducible(s: Structure) -> bool:
-    """Whether what is made of it is what would be made of it now: no file is read, no Python function called."""
+    """Return whether a cached state stays valid: the model reads no file and calls no Python function."""
     return not s.functions and not shape_files(s.model)
 
 
 def _in_same_coordinates(
     base: Assembly, parameters: Mapping[str, float] | None, before: Result, switches: bool
 ) -> InitialState:
-    """Go on in the coordinates that an earlier part has."""
+    """Continue in the coordinates of the earlier segment."""
     model, tree = base.compiled.structure.model, before.values.structure.tree
     c = compile_mechanism(model, parameters=parameters, tree=tree) if tree else base.compiled.again()
     nq, nv = c.structure.nq, c.structure.nv
@@ -327,9 +334,9 @@ def _in_same_coordinates(
 
 
 def _set_by_events(model: Model, before: Result) -> dict[str, float]:
-    """Parameters that events set in an earlier motion, or in one that it went on from, as they were at its end.
+    """Return the final values of parameters that events set in an earlier motion, or in one that it continued.
 
-    States of controllers that events set are part of the state that it ended in.
+    Controller states that events set are part of the final state instead.
     """
     assert before.phases is not None
     names = {a.parameter for e in model.events for a in e.do if isinstance(a, Set)} & model.parameters.keys()
@@ -347,7 +354,7 @@ def initial_state_at(
     *,
     switches: bool = False,
 ) -> InitialState:
-    """Begin where the mechanism is assembled already; choose coordinates."""
+    """Return the initial state for an assembled mechanism; choose the coordinates."""
     refuse_unknown_coordinates(coordinates)
     x = base.compiled.values
     key = coordinates, float(base.t).hex(), base.y.tobytes(), switches
@@ -376,11 +383,11 @@ def _initial_state_of(
     if switches:
         a = add_switches(a, parameters)
     found = InitialState(base, a, a.y, why, _whole_turns(base, a, a.y))
-    return replace(found, base=base.again(), assembly=a.again())  # without the scratch
+    return replace(found, base=base.again(), assembly=a.again())  # without the workspace
 
 
 def _restore_modes(before: Result, a: Assembly) -> None:
-    """What held where an earlier result ended holds on."""
+    """Restore the modes with which an earlier result ended."""
     s, W = a.compiled.structure, a.compiled.work
     old = before.values.structure
     if before.phases is None or [x.element.name for x in s.switches] != [x.element.name for x in old.switches]:
@@ -391,7 +398,7 @@ def _restore_modes(before: Result, a: Assembly) -> None:
 
 
 def add_switches(a: Assembly, parameters: Mapping[str, float] | None) -> Assembly:
-    """The same with the rows that have modes, all off, if there are any."""
+    """Return the assembly with rows for all switches, all inactive, if the model has any."""
     s = a.compiled.structure
     if not declared_switches(s.model) and not s.model.events and not nonsmooth_elements(s.model):
         return a
@@ -412,7 +419,7 @@ def _whole_turns(base: Assembly, a: Assembly, y: np.ndarray) -> dict[str, float]
 
 
 def _absolute_state(model: Model, t: float, parameters: Mapping[str, float] | None, before: Result | None) -> Assembly:
-    """Where to start from, in absolute coordinates: assembled as described, or where an earlier result ended."""
+    """Return the start in absolute coordinates: assembled as described, or where an earlier result ended."""
     if before is None:
         return assemble(model, t=t, parameters=parameters)
     old = before.values.structure
@@ -432,14 +439,14 @@ def _absolute_state(model: Model, t: float, parameters: Mapping[str, float] | No
 
 
 def start_record(start: InitialState) -> MotionStart:
-    """How its motion begins; a later part of one counts its own only."""
+    """Return the record of the motion's start; a later segment has no energies from earlier ones."""
     return MotionStart(
         start.y.copy(), energies_at_end(start.before) if start.before is not None and not start.part.later else {}
     )
 
 
 def _final_state(before: Result, a: Assembly) -> np.ndarray:
-    """The state that an earlier result ended in: to the bit in its own coordinates, works and turns included."""
+    """Return the final state of an earlier result, unchanged to the last bit in its own coordinates."""
     s, old = a.compiled.structure, before.values.structure
     y = before.final[1].copy()
     if s.tree == old.tree and s.states == old.states:
@@ -450,21 +457,21 @@ def _final_state(before: Result, a: Assembly) -> np.ndarray:
     return np.r_[a.q, a.v, z]
 
 
-# Whether a motion may go on where an earlier result ended: edits since then must leave all where and as it was.
+# Check that a motion may continue an earlier result: edits since then must not change positions or velocities.
 
 
-POSITION_CHANGE = 1e-6  # of the mechanism's length, or radians, that a motion may go on from
-VELOCITY_CHANGE_SHARE = 1e-4  # of the largest velocity
-VELOCITY_CHANGE = 1e-5  # velocities [m/s, rad/s] that a motion may leave in its constraints
+POSITION_CHANGE = 1e-6  # allowed change of position, relative to the mechanism's length, or [rad]
+VELOCITY_CHANGE_SHARE = 1e-4  # allowed change of velocity, relative to the largest velocity
+VELOCITY_CHANGE = 1e-5  # allowed violation of the velocity constraints [m/s, rad/s]
 
 
 def refuse_jump(before: Result, c: CompiledMechanism, t: float, q: np.ndarray, v: np.ndarray) -> None:
-    """Refuse a state that constraints do not allow, or that joint coordinates would put elsewhere.
+    """Refuse a state that violates constraints, or that joint coordinates would move.
 
     Raises
     ------
     ModelError
-        Naming what is off, and how far.
+        Naming the body or constraint and the difference.
     """
     if c.values is before.values:
         return
@@ -523,10 +530,11 @@ def _refuse_difference(
 
 
 def choose_independent(model: Model, start: InitialState) -> None:
-    """Tell the compiled loop which coordinates depend on the others, and their sizes.
+    """Choose the dependent coordinates for coordinate partitioning, and set the coordinate scales.
 
-    As many as the rank at the start: those that QR with column pivoting takes first, lengths measured by the
-    mechanism's and rows made unit vectors (Businger and Golub 1965).
+    Their number is the rank of the constraint Jacobian at the start. QR with column pivoting selects them first;
+    lengths
+    are scaled by the mechanism's length and rows normalized to unit vectors (Businger and Golub 1965).
     """
     from scipy.linalg import qr
 
@@ -547,7 +555,7 @@ def choose_independent(model: Model, start: InitialState) -> None:
 
 
 def independent_names(start: InitialState) -> tuple[str, ...]:
-    """Names of the coordinates that are independent now."""
+    """Return the names of the coordinates that are independent now."""
     c = start.assembly.compiled
     return tuple(
         n.name for n, p in zip(velocity_names(c.structure), c.work.velocities.partition, strict=True) if p < 0.0

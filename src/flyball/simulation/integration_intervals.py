@@ -1,8 +1,7 @@
 """Intervals of integration: times at which steps must end, and segments of a checkpointed motion.
 
-Laws of time have breakpoints and short pulses; steps end there. A checkpointed motion is computed in segments,
-whose length is counted in steps and not in seconds, so that the same call gives the same digits, interrupted or
-not.
+Laws of time have breakpoints and short pulses; steps end there. A checkpointed motion is computed in segments. Their
+length is counted in steps and not in seconds, so that the same call gives the same digits, interrupted or not.
 """
 
 from __future__ import annotations
@@ -24,7 +23,10 @@ from .solver_switching import mechanism_kind
 
 
 def laws_checked_in_steps(c: CompiledMechanism, breaks: Breakpoints) -> frozenset[int]:
-    """Starts of the laws that samples have to guard within steps: what they do follows the state, or is not known."""
+    """Return the start indices of laws that are sampled for pulses within steps.
+
+    These are laws that depend on the state, and laws whose breakpoints could not be found.
+    """
     by_state = c.structure.kept.get("laws that follow the state", None, 1, lambda: _laws_of_state(c))
     if not breaks.given_up:
         return by_state
@@ -37,7 +39,7 @@ def _laws_of_state(c: CompiledMechanism) -> frozenset[int]:
 
 
 def remark_on_checked_laws(c: CompiledMechanism, sampled: frozenset[int]) -> str:
-    """What health says of laws that are sampled; nothing where there are none."""
+    """Return the health remark on laws that are sampled within steps; empty if there are none."""
     if not sampled:
         return ""
     names = dict.fromkeys(c.structure.laws[at] for at in sorted(sampled))
@@ -46,37 +48,37 @@ def remark_on_checked_laws(c: CompiledMechanism, sampled: frozenset[int]) -> str
 
 
 PAUSED_MESSAGE = "not at its end: kept at t = {:.6g} s"
-"""What a result that is a part of a motion says of its end."""
-SEGMENT_COST = 4e9  # that a part should last, as estimated [ns]
-EVALUATIONS_PER_STEP = 12  # evaluations that a step takes, about
-LEAST_STEPS = 50  # steps of a part
-OLD = 10.0  # seconds after which an interrupt ends a part where it is: by then it was to have ended
-LATEST = 40.0  # seconds after which a part ends in any case
-IMPLICIT_STEP_WEIGHT = 10.0  # explicit steps that a step of an implicit method takes as long as
-EVENT_COST = 1e6  # what an event costs [ns]
-BODY_COST = 2e4  # what a body that touches costs in a step by impulses [ns]
+"""Message of a result that is one segment of a motion."""
+SEGMENT_COST = 4e9  # intended estimated cost of a segment [ns]
+EVALUATIONS_PER_STEP = 12  # approximate number of evaluations per step
+LEAST_STEPS = 50  # least number of steps of a segment
+OLD = 10.0  # computing time [s] from which an interrupt ends a segment at its present time
+LATEST = 40.0  # computing time [s] at which a segment ends in any case
+IMPLICIT_STEP_WEIGHT = 10.0  # cost of an implicit step, in explicit steps
+EVENT_COST = 1e6  # estimated cost of an event [ns]
+BODY_COST = 2e4  # estimated cost of a body in contact in one step of impulse time stepping [ns]
 
 
 class Segment:
-    """A part of a motion.
+    """A segment of a motion.
 
     Parameters
     ----------
     first : float [s], optional
-        When the whole motion began; if not given with this part.
-    later : bool
-        Whether it goes on from another part, whose coordinates it then has.
+        Start time of the whole motion; by default the motion starts with this segment.
+    resumes : bool
+        Whether it continues another segment, whose coordinates it then has; stored as ``later``.
     lasts : float [ns], optional
-        How long it should take, as estimated; `SEGMENT_COST` if not given, inf: to the end of the motion.
+        Its estimated cost; `SEGMENT_COST` if not given, inf: to the end of the motion.
 
     Attributes
     ----------
     paused : bool
-        Whether it has ended before the motion did.
+        Whether it ended before the motion did.
     asked : bool
-        Whether the user had it end where it is.
+        Whether the user's interrupt ended it.
     open : bool
-        Whether something is still to happen at the time at which it ended: the output of that time is not there.
+        Whether a sampling is still due at its end time: the output at that time does not exist yet.
     """
 
     def __init__(self, first: float | None = None, resumes: bool = False, lasts: float | None = None) -> None:
@@ -87,11 +89,11 @@ class Segment:
         self._event, self._since = 0.0, time.monotonic()
 
     def begin(self, s: Structure) -> None:
-        """It is integrated: how many steps it has."""
+        """Set the number of steps of an integrated segment."""
         self._measure(EVALUATIONS_PER_STEP * mechanism_kind(s)[1])
 
     def begin_by_impulses(self, bodies: int) -> None:
-        """It is stepped by impulses."""
+        """Set the number of steps of a segment computed by impulse time stepping."""
         self._measure(BODY_COST * max(bodies, 1))
 
     def _measure(self, step: float) -> None:
@@ -99,32 +101,34 @@ class Segment:
         self._left = max(LEAST_STEPS, math.ceil(self._cost_limit / step)) if self._cost_limit < math.inf else math.inf
 
     def most(self, steps: float, weight: float = 1.0) -> int:
-        """As many of these steps, each of which counts so much, as are left of it; one at least."""
+        """Return how many of these steps, each with this weight, are left in the segment; at least one."""
         return int(max(1.0, min(steps, math.ceil(self._left / weight) if self._left < math.inf else steps)))
 
     def count_steps(self, steps: float) -> None:
-        """So many steps were taken."""
+        """Subtract the steps that were taken."""
         self._left -= steps
 
     def decided(self) -> None:
-        """What happens at an instant was decided."""
+        """Subtract the cost of an event."""
         self._left -= self._event
 
     def interrupted(self) -> bool:
-        """The user interrupts it: whether it ends in order, soon, because it is too old to be computed once more."""
+        """Handle an interrupt. Returns whether the segment will end in order, because it has run too long to be
+        repeated.
+        """
         if self.asked or not self._cost_limit < math.inf or time.monotonic() - self._since <= OLD:
             return False
         self.asked = True
         return True
 
     def due(self) -> bool:
-        """Whether it is to end."""
+        """Return whether the segment should end."""
         return (
             self.asked or self._left <= 0.0 or (self._cost_limit < math.inf and time.monotonic() - self._since > LATEST)
         )
 
     def over(self, clock: ex.StepState | None = None) -> bool:
-        """Whether it ends here: not after a step that was refused."""
+        """Return whether the segment ends here; it does not after a rejected step."""
         calm = clock is None or (clock.count.accepted > 0 and clock.real.max_growth > 1.0)
         if calm and self.due():
             self.paused = True
@@ -132,26 +136,26 @@ class Segment:
 
 
 def whole_motion() -> Segment:
-    """A motion in one part."""
+    """Return a segment that covers the whole motion."""
     return Segment(lasts=math.inf)
 
 
-LAWS_PER_FORCE = 3  # of a force
-SLIVER = 2e-14  # part of the largest time: what is left of a stretch is no step
+LAWS_PER_FORCE = 3  # laws of one force
+SLIVER = 2e-14  # shortest remainder of an interval that is integrated, relative to the largest time
 
 
 def known_breaks(c: CompiledMechanism, t0: float, t1: float) -> Breakpoints:
-    """Where laws of a mechanism, and guards, have corners or act briefly by time alone, between two times [s]."""
+    """Return the times between two times [s] at which laws or guards have breakpoints or short pulses by time alone."""
     return find_breakpoints(laws_of_time(c), c.system.const, t0, t1)
 
 
 def laws_of_time(c: CompiledMechanism) -> Timed:
-    """Laws that may have corners or act briefly by time alone, whatever their constants are."""
+    """Return the laws that may have breakpoints or pulses by time alone, for any values of their constants."""
     return c.structure.kept.get("laws of time", None, 1, lambda: _find_laws_of_time(c))
 
 
 def _find_laws_of_time(c: CompiledMechanism) -> Timed:
-    """All laws that forces, rows, guards have by time."""
+    """Find the time-dependent laws among those of forces, rows, drivers, guards, corners and controllers."""
     S = c.system
     guards = S.guards.of[S.guards.kind == G_LAW]
     forces = S.forces.laws.ravel()
@@ -161,18 +165,19 @@ def _find_laws_of_time(c: CompiledMechanism) -> Timed:
 
 
 class SmoothIntervals:
-    """The stretches of time between breaks, one after the other.
+    """The intervals between breakpoints, one after the other.
 
-    A law that is sharp at a time may belong to either side there: a step ends a little before, the next begins as
-    little behind, with what the equations are there.
+    At a time at which a law jumps, either of its sides may be evaluated. A step therefore ends slightly before that
+    time
+    and the next one begins slightly after it, where the equations are evaluated again.
 
     Parameters
     ----------
-    clock : Clock
-        As the motion begins.
-    found : Breaks
+    clock : StepState
+        At the start of the motion.
+    found : Breakpoints
     until : callable
-        Of a time: one up to which the clock is to run at most, for reasons of its own, no later than that.
+        Takes the end time of an interval and returns the time up to which the loop should run, at most that end.
     """
 
     def __init__(
@@ -184,20 +189,21 @@ class SmoothIntervals:
         self.aim()
 
     def passed(self) -> None:
-        """Go on with the next one where nothing is left of this one; where that was the last, this is the end."""
+        """Advance to the next interval where nothing is left of this one; after the last, move to the end."""
         while self.over():
             if not self.next():
                 self.clock.real.t = self.goal
                 break
 
     def over(self) -> bool:
-        """Whether nothing is left of this one that could be a step."""
+        """Return whether the rest of this interval is too short for a step."""
         real = self.clock.real
         return bool(self.goal - real.t <= SLIVER * real.largest)
 
     def aim(self) -> None:
-        """Have the clock run to the end of the stretch, or to what it stops for before. What rounding leaves to that
-        (an instant of sampling beside an event's) is no step, and is passed.
+        """Set the end time of the loop to the end of the interval, or to an earlier stop.
+
+        A remainder of rounding size (a sampling instant next to an event) is skipped.
         """
         real = self.clock.real
         real.t_end = end = self.until(self.goal)
@@ -206,26 +212,26 @@ class SmoothIntervals:
 
     @property
     def goal(self) -> float:
-        """Where the stretch ends."""
+        """End of the interval [s]."""
         if self.at == len(self.times):
             return self.end
         end = float(self.times[self.at])
         return min(self.end, end - rounding_margin(end) if self.sharp[self.at] else end)
 
     def through(self) -> bool:
-        """Whether the clock is at its end."""
+        """Return whether the end of the interval is reached."""
         return bool(self.clock.real.t >= self.goal)
 
     def whole(self) -> None:
-        """Have it run to the end of the motion."""
+        """Set the end time of the loop to the end of the motion."""
         self.clock.real.t_end = self.end
 
     def ends_with_jump(self) -> bool:
-        """Whether forces may jump at the end of this stretch."""
+        """Return whether forces may jump at the end of this interval."""
         return bool(self.at < len(self.times) and self.sharp[self.at])
 
     def next(self) -> bool:
-        """Go on with the next one, if there is one."""
+        """Advance to the next interval. Returns whether there is one."""
         if self.at == len(self.times):
             return False
         real, t = self.clock.real, float(self.times[self.at])
@@ -240,22 +246,22 @@ class SmoothIntervals:
         return True
 
 
-# Where a part of a motion may end: behind a step that was accepted and at whose end nothing happens.
+# A segment may end after an accepted step at whose end no event occurs.
 #
-# Where every step ends on something, such as an event or a corner of a law, the next one is cut in two.
+# Where every step ends on an event or a corner of a law, the next step is cut in two.
 
 
-NARROWEST_SHARE = 1e-6  # part of what a step could be that is cut off at least
-TINY_STEP = 1e-12  # of the largest time: less is no step
+NARROWEST_SHARE = 1e-6  # smallest part of a step to which it is cut
+TINY_STEP = 1e-12  # shortest step, relative to the largest time
 
 
 class SegmentEnd:
-    """Where the part ends.
+    """Finds the end of a segment.
 
     Parameters
     ----------
-    part : Part
-    clock : Clock
+    part : Segment
+    clock : StepState
     """
 
     def __init__(self, part: Segment, clock: ex.StepState) -> None:
@@ -263,17 +269,17 @@ class SegmentEnd:
         self._settled, self._share = 0, 1.0
 
     def note_event(self) -> None:
-        """Something does here and now: the part does not end."""
+        """Note an event at the present time: the segment does not end here."""
         self._settled = int(self.clock.count.accepted)
         if self.part.due():
             self._share = max(0.5 * self._share, NARROWEST_SHARE)
 
     def here(self) -> bool:
-        """Whether the part ends here and now."""
+        """Return whether the segment ends at the present time."""
         return bool(self.clock.count.accepted > self._settled and self.part.over(self.clock))
 
     def until(self, end: float) -> float:
-        """The time up to which the loop is to run where it would run to ``end``."""
+        """Return the time up to which the loop should run where it would run to ``end``."""
         real = self.clock.real
         if self._share == 1.0 or not self.part.due():
             return end

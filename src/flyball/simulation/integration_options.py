@@ -28,21 +28,21 @@ STABILIZATION = {
     "partitioning": projection.PARTITIONING,
 }
 MOST_STEPS = 10_000_000  # steps
-COPIES_IN_MEMORY = 2  # copies of a motion in memory while its parts are put together
-LEAST_ROW_WIDTH = 4  # numbers kept of each time: of one hinge
-SMALL_MEMORY = 2**18  # [bytes] that every machine has
+COPIES_IN_MEMORY = 2  # copies of a motion in memory while its parts are joined
+LEAST_ROW_WIDTH = 4  # numbers stored for each output time of the smallest mechanism, one hinge
+SMALL_MEMORY = 2**18  # [bytes]; below this the machine's memory is not checked
 DOUBLE = np.dtype(float).itemsize
-DEFAULT_MEMORY = 2**36  # [bytes] of a machine that does not say how much it has
-BAUMGARTE_RATE = 10.0  # [1/s] of Baumgarte's method, where none is given
-FINEST_RTOL = 1e-13  # relative tolerance below which rounding decides
-ATOL_PER_RTOL = 1e-2  # part of a coordinate's size below which its error is held to atol, where that is not given
-COARSEST_RTOL = 0.1  # tolerance above which what comes out is no motion of the mechanism
-LEAST_ATOL = 1e-14  # part of the mechanism's length [m], or of a radian, that rounding leaves
+DEFAULT_MEMORY = 2**36  # [bytes], where the operating system does not report the memory
+BAUMGARTE_RATE = 10.0  # default rate of Baumgarte's method [1/s]
+FINEST_RTOL = 1e-13  # smallest relative tolerance; rounding is larger than smaller ones
+ATOL_PER_RTOL = 1e-2  # default atol relative to rtol
+COARSEST_RTOL = 0.1  # largest relative tolerance with a meaningful result
+LEAST_ATOL = 1e-14  # smallest default atol, relative to the mechanism's length [m] or to a radian
 
 
 @dataclass(frozen=True, kw_only=True)
 class Integration(Options):
-    """How a motion is integrated, as kept in the result; the meanings stand with `Mechanism.simulate`."""
+    """Options of an integration, as stored in the result; `Mechanism.simulate` describes them."""
 
     coordinates: str
     method: str
@@ -85,7 +85,7 @@ class Integration(Options):
         self.check_method()
 
     def check_method(self) -> None:
-        """Refuse integrators that there are not."""
+        """Refuse unknown integrators."""
         try:
             tableau(self.method)
         except ValueError as error:
@@ -95,12 +95,12 @@ class Integration(Options):
         self.refuse_without_step()
 
     def refuse_without_step(self) -> None:
-        """Refuse a method that has no estimate of its error, if no width of its steps is given."""
+        """Refuse a method without error estimate if no step width is given."""
         if self.step is None and not tableau(self.method).E.any():
             raise ModelError(f"method={self.method!r} has no estimate of its error: give the width of its steps, step=")
 
     def _rates(self) -> None:
-        """Baumgarte's rates have their usual values, or are refused where nothing asks for them."""
+        """Set the default rates of Baumgarte's method; refuse rates with any other stabilization."""
         for name in ("alpha", "beta"):
             value = getattr(self, name)
             if self.stabilization == "baumgarte":
@@ -112,26 +112,26 @@ class Integration(Options):
                                  f"nothing")  # fmt: skip
 
     def sized(self, length: float) -> Self:
-        """With its `tolerance` as ``atol``."""
+        """Return the options with `tolerance` as ``atol``."""
         return self.known(atol=self.tolerance(length))
 
     def tolerance(self, length: float) -> float:
-        """The ``atol`` given, or that of a mechanism of that length [m]."""
+        """Return the given ``atol``, or the default for a mechanism of that length [m]."""
         return default_atol(self.rtol, length) if self.atol is None else self.atol
 
     def choices(self) -> dict[str, Any]:
-        """The choices of the integration by name, without what else was asked."""
+        """Return the integration options by name, without the other arguments."""
         own = vars(self)
         return {name: own[name] for name in names_of(Integration)}
 
 
 def default_atol(rtol: float, length: float) -> float:
-    """The tolerance where the state is small, of a mechanism of that length [m]."""
+    """Return the default absolute tolerance for a mechanism of that length [m]."""
     return max(ATOL_PER_RTOL * rtol, LEAST_ATOL) * min(1.0, length)
 
 
 def default_integration(coordinates: str, rtol: float, atol: float, max_steps: int = MOST_STEPS) -> Integration:
-    """An integration as other analyses want it: by the usual method, kept on the constraints."""
+    """Return the options with which other analyses integrate: the default method, with projection."""
     return Integration(
         coordinates=coordinates,
         method="dop853",
@@ -148,12 +148,12 @@ def default_integration(coordinates: str, rtol: float, atol: float, max_steps: i
 
 
 def refuse_beyond_memory(outputs: int, width: int) -> None:
-    """Refuse more output times, of ``width`` numbers each, than the memory of this machine holds.
+    """Refuse output times, of ``width`` numbers each, that exceed the memory of this machine.
 
     Raises
     ------
     ModelError
-        With how many bytes they take, and how many times would fit.
+        With the bytes that they take, and how many times would fit.
     """
     each = COPIES_IN_MEMORY * width * DOUBLE
     if outputs * each > SMALL_MEMORY and outputs * each > (there := _memory_of_machine()):
@@ -164,15 +164,15 @@ def refuse_beyond_memory(outputs: int, width: int) -> None:
 
 
 def _memory_of_machine() -> int:
-    """What this machine has [bytes]."""
+    """Return the memory of this machine [bytes]."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):  # Windows does not tell
+    except (AttributeError, ValueError, OSError):  # not available on Windows
         return DEFAULT_MEMORY
 
 
 def _evenly_spaced(t_start: float, t_end: float, n: int) -> np.ndarray:
-    """Evenly spaced times: those of ``np.linspace``, in a third of its time."""
+    """Return evenly spaced times as ``np.linspace`` does, in a third of its computing time."""
     times = np.arange(n, dtype=float)
     times *= (t_end - t_start) / (n - 1)
     times += t_start
@@ -215,10 +215,10 @@ IMPACT_ORDERS = ("simultaneous", "sequential")
 
 @dataclass(frozen=True, kw_only=True)
 class Stepping:
-    """How a motion with contact is stepped: ``simulate(..., method=fb.Stepping(step="2 ms"))``.
+    """Options of impulse time stepping: ``simulate(..., method=fb.Stepping(step="2 ms"))``.
 
-    Every step solves for the velocities at its end, with all contacts and joints at once, and then moves bodies out of
-    what overlap is left without giving them velocity.
+    Every step solves for the velocities at its end, with all contacts and joints together. It then removes remaining
+    overlaps of bodies without changing their velocities.
 
     Parameters
     ----------
@@ -227,23 +227,23 @@ class Stepping:
         ``max_step`` if that is less, and where compliant contacts collide steps are divided until they resolve the
         impact.
     solver : str
-        Of the cone problem: ``auto`` (chosen for each island of bodies that touch), or one by name: see
+        Solver of the cone problem: ``auto`` (chosen for each island of bodies in contact), or one by name: see
         ``docs/contact_solvers.md``.
     iterations : int, optional
-        Most iterations of the solve for velocities; a number that suits the solver if not given.
+        Largest number of iterations of the velocity solve; by default it depends on the solver.
     position_iterations : int, optional
-        Most iterations of the solve for positions; the same.
+        Largest number of iterations of the position solve; by default it depends on the solver.
     tolerance : float [m/s]
         Residual of the velocities at which iterations stop. In very short steps it is a hundredth of the velocity that
         gravity adds in the step, where that is less.
     coulomb : bool
-        Coulomb's law. If not, the convex problem that approximates it, in which what slides floats up by friction
-        coefficient times sliding speed times step.
+        Whether to use Coulomb's law. If not, the convex approximation is solved, in which sliding bodies separate by
+        friction coefficient times sliding speed times step.
     restitution : {"poisson", "newton", "moreau"}
-        Law of impacts that come together; one after the other they go by Poisson's.
+        Law of simultaneous impacts; sequential impacts use Poisson's law.
     impacts : {"simultaneous", "sequential"}
-        Whether what is hit at once is solved at once, or one contact after the other, the fastest first, as in Newton's
-        cradle.
+        Whether simultaneous impacts are solved together, or one contact after the other, the fastest first, as in
+        Newton's cradle.
     """
 
     step: float | str | None = None
@@ -255,7 +255,7 @@ class Stepping:
     restitution: str = "poisson"
     impacts: str = "simultaneous"
 
-    usual: ClassVar[float] = 5e-3  # longest step [s] where none is given
+    usual: ClassVar[float] = 5e-3  # default longest step [s]
 
     def __post_init__(self) -> None:
         if isinstance(self.step, str):
@@ -291,7 +291,7 @@ class Stepping:
         return self.usual if self.step is None else float(self.step)
 
     def bounded(self, longest: float) -> Stepping:
-        """With steps of at most ``longest`` seconds; where no step is given they may still be divided."""
+        """Return the options with steps of at most ``longest`` seconds; default steps may still be divided."""
         if longest >= self.longest:
             return self
         made = dataclasses.replace(self, step=None if self.step is None else longest)

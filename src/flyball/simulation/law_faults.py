@@ -29,13 +29,13 @@ from ..numerics.integrators.butcher_tableaux import TABLEAUX, Tableau, tableau
 from ..tables.law_inputs import element_laws
 from ..tables.table_definitions import RATE, VALUE, assign
 
-LAW_SAMPLES = 257  # times at which the arguments of tables are looked at
+LAW_SAMPLES = 257  # times at which the arguments of tables are checked
 
 
 def refuse_out_of_table(a: Assembly, until: float) -> None:
-    """Refuse a motion from an assembled start up to ``until`` [s] on the way of which a table has no value.
+    """Refuse a motion from an assembled start to ``until`` [s] during which the argument of a table leaves its range.
 
-    Arguments that depend on time alone are looked at over the whole time; the others at the start.
+    Arguments that depend on time alone are checked over the whole time, the others at the start.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def refuse_out_of_table(a: Assembly, until: float) -> None:
 
 
 def out_of_table_at_start(a: Assembly) -> TableFault | None:
-    """A law that has no value at an assembled start, since it asks a table beyond its ends."""
+    """Return the fault of a law whose table argument is out of range at an assembled start; None if there is none."""
     c = a.compiled
     clear_faults(c.work.stack)
     c.at(a.t, a.q, a.v, MOTION)
@@ -68,7 +68,7 @@ def out_of_table_at_start(a: Assembly) -> TableFault | None:
 def _first_out_of_table(
     law: Expression, env: Mapping[str, Any], tables: Mapping[str, Table], start: float, end: float
 ) -> tuple[float, Table, float] | None:
-    """The first time at which a table that is called has no value, the table, and the argument then."""
+    """Return the first time at which the argument of a table is out of range, the table, and the argument; or None."""
     times = np.linspace(start, end, LAW_SAMPLES)
     found = []
     for table, x, live in _table_arguments(law.tree, law, {**env, "t": times}, tables, np.full(LAW_SAMPLES, True)):
@@ -81,7 +81,7 @@ def _first_out_of_table(
     early = late[0] - (end - start) / (LAW_SAMPLES - 1)
     if early < start:
         return late
-    for _ in range(60):  # nearer to where it leaves the table
+    for _ in range(60):  # bisection towards the time at which it leaves the table
         middle = 0.5 * (early + late[0])
         at = [
             (middle, table, float(x[0]))
@@ -102,7 +102,9 @@ def _out_of_range(table: Table, x: np.ndarray) -> np.ndarray:
 def _table_arguments(
     node: SyntaxNode, law: Expression, env: Mapping[str, Any], tables: Mapping[str, Table], live: np.ndarray
 ) -> Iterator[tuple[Table, np.ndarray, np.ndarray]]:
-    """Tables that a law calls, their arguments where these depend on time alone, and when the law needs them."""
+    """Yield the tables that a law calls, their arguments where these depend on time alone, and when the law uses
+    them.
+    """
 
     def value(part: SyntaxNode) -> Any:
         names = {n.value for n in part.walk() if n.kind == "name"}
@@ -122,11 +124,11 @@ def _table_arguments(
         yield from _table_arguments(arg, law, env, tables, live)
 
 
-LONGEST_TEXT = 100  # characters of a part of a law in a message
+LONGEST_TEXT = 100  # longest part of a law in a message, in characters
 
 
 def law_inputs(c: CompiledMechanism, k: int) -> tuple[float, float]:
-    """What the laws of force k may depend on besides time, at the kinematics in the scratch."""
+    """Return the inputs of the laws of force k besides time, at the kinematics in the workspace."""
     S, W, e = c.values.system, c.work, c.structure.forces[k]
     F, M = S.forces.F[k], S.forces.M[k]
     if isinstance(e, CoordinateForce):
@@ -136,12 +138,12 @@ def law_inputs(c: CompiledMechanism, k: int) -> tuple[float, float]:
 
 
 def undefined_law_part(c: CompiledMechanism, element: Element, t: float, given: tuple[float, ...] = ()) -> str:
-    """The part without a finite value of a law of an element, at what sensors measured last; nothing if all have one.
+    """Return the part of an element's law that has no finite value at the last sensor values; empty if there is none.
 
     Parameters
     ----------
-    c : Compiled
-        Its scratch holds what is measured, and the states of controllers.
+    c : CompiledMechanism
+        Its workspace holds the measured values and the states of controllers.
     element : Element
         A force, a driver or a controller.
     t : float
@@ -162,7 +164,9 @@ def undefined_law_part(c: CompiledMechanism, element: Element, t: float, given: 
 
 
 def undefined_part(law: Expression, values: Mapping[str, Any], tables: Mapping[str, Table]) -> str:
-    """The part of a law that has no finite value though its arguments have, and these; nothing if there is none."""
+    """Return the part of a law that has no finite value though its arguments have, with these; empty if there is
+    none.
+    """
     if law.function is not None or not law.names <= values.keys():
         return ""
 
@@ -190,24 +194,24 @@ def undefined_part(law: Expression, values: Mapping[str, Any], tables: Mapping[s
     return f"{abbreviated(tree_text(node), LONGEST_TEXT)} is {value(node):g}{at}"
 
 
-UNBOUNDED_GROWTH = 1e30  # times what it began with, or a unit, that nothing comes to that is meant
-LARGE_GROWTH = 1e3  # the same, of a motion that a fixed step may have led astray
-ESCAPING = 1e-4  # part of itself by which a state changes within a step that is as narrow as times can be told apart
-NARROW_STEP = 1e-13  # part of the largest time: such steps
-MOST_EIGENVALUES = 400  # coordinates, velocities and states whose eigenvalues are looked for
-DIFFERENCE_STEP = 1e-7  # differences, as part of the state
+UNBOUNDED_GROWTH = 1e30  # growth, relative to the initial value or a unit, beyond which a motion is unbounded
+LARGE_GROWTH = 1e3  # the same, from which on a fixed step may be unstable
+ESCAPING = 1e-4  # relative change of a state within a narrowest step from which on it escapes in finite time
+NARROW_STEP = 1e-13  # width of a narrowest step, relative to the largest time
+MOST_EIGENVALUES = 400  # largest number of state variables whose eigenvalues are computed
+DIFFERENCE_STEP = 1e-7  # relative step of the finite differences
 LARGEST_STRETCH, STRETCH_POINTS = (
     15.0,
     3000,
-)  # h |lambda| up to which steps may be stable, and how finely that is looked at
-GROWTH_TOLERANCE = 1e-3  # part by which a step may make a mode grow that is still called stable
-UNSTABLE_SHARE = 0.1  # a mode grows by itself whose real part is more than this part of its size
+)  # largest h |lambda| that is examined, and the number of points
+GROWTH_TOLERANCE = 1e-3  # relative growth per step of a mode that still counts as stable
+UNSTABLE_SHARE = 0.1  # ratio of real part to modulus above which an eigenvalue is unstable by itself
 
 ComponentNames = Callable[[Assembly, int], str]
 
 
 def step_too_long(a: Assembly, clock: ex.StepState, method: str) -> str:
-    """That a fixed step is too long, and which would do; nothing if that is not the matter."""
+    """Return the message that a fixed step is too long, with a stable one; empty if that is not the cause."""
     step = float(clock.real.step)
     if not step > 0.0 or method not in TABLEAUX:
         return ""
@@ -225,7 +229,7 @@ def step_too_long(a: Assembly, clock: ex.StepState, method: str) -> str:
 
 
 def unbounded_motion(a: Assembly, clock: ex.StepState, named: ComponentNames) -> str:
-    """What has grown beyond all bounds, if something has."""
+    """Return a message on a state variable that has grown beyond all bounds; empty if there is none."""
     y, grown = clock.y[ex.CURRENT], _growth(a, clock.y[ex.CURRENT])
     if not len(grown) or not grown.max() > UNBOUNDED_GROWTH:
         return ""
@@ -237,10 +241,11 @@ def unbounded_motion(a: Assembly, clock: ex.StepState, named: ComponentNames) ->
 
 
 def finite_time_escape(a: Assembly, clock: ex.StepState, named: ComponentNames) -> str:
-    """What runs off to infinity, or faster and faster, within a finite time, if something does.
+    """Return a message on a quantity that diverges within a finite time; empty if there is none.
 
-    A force whose law does, the state of a controller, and where there are no rows, so that nothing can lock, a
-    coordinate or velocity.
+    It may be the law of a force or the state of a controller. Where there are no constraint rows, so that nothing can
+    lock,
+    it may also be a coordinate or a velocity.
     """
     s, t = a.compiled.structure, float(clock.real.t)
     if not clock.real.h < NARROW_STEP * max(abs(t), clock.real.largest):
@@ -261,7 +266,9 @@ def finite_time_escape(a: Assembly, clock: ex.StepState, named: ComponentNames) 
 
 
 def _unbounded_law(a: Assembly, clock: ex.StepState) -> str:
-    """A force whose law has grown, and grows by more than `ESCAPING` of itself within such a step; else nothing."""
+    """Return a message on a force whose law has grown and changes by more than `ESCAPING` of itself within a narrow
+    step.
+    """
     c, t, h, y = a.compiled, float(clock.real.t), float(clock.real.h), clock.y[ex.CURRENT]
     if not np.isfinite(y).all():
         return ""
@@ -298,7 +305,7 @@ def _unbounded_law(a: Assembly, clock: ex.StepState) -> str:
 
 
 def _likely_cause(a: Assembly, i: int) -> str:
-    """Where to look for what makes component i run off."""
+    """Return a hint at the likely cause of the divergence of component i."""
     s = a.compiled.structure
     if i >= s.nq + s.nv:
         x = s.controls[i - s.nq - s.nv]
@@ -309,12 +316,11 @@ def _likely_cause(a: Assembly, i: int) -> str:
 
 
 def longest_stable(a: Assembly, R: Tableau) -> tuple[float, float]:
-    """The longest step [s] in which a method follows stably all that does not grow by itself, where a motion begins.
+    """Return the longest stable step [s] of a method at the start of a motion, and the rate [1/s] that limits it.
 
-    And the rate [1/s] that decides; infinite and 0 if nothing does, or there is too much to look at.
-
-    By the stability function of the method (Hairer and Wanner 1996, section IV.2) at the eigenvalues of the derivatives
-    of (q, v, x)' by these, x being states of controllers; modes of what holds at times are those of now.
+    Modes that grow by themselves are left out. Returns infinity and 0 if nothing limits the step, or there are too many
+    state variables. The stability function of the method (Hairer and Wanner 1996, section IV.2) is evaluated at the
+    eigenvalues of the Jacobian of (q, v, x)', where x are states of controllers; modes are held fixed.
     """
     n = _state_length(a)
     J = _difference_jacobian(a, n) if 0 < n <= MOST_EIGENVALUES else np.zeros((1, 1))
@@ -335,7 +341,7 @@ def longest_stable(a: Assembly, R: Tableau) -> tuple[float, float]:
 
 
 def _stability_polynomial(R: Tableau) -> np.ndarray:
-    """Coefficients of the stability function: 1 + z b.(1 + z A 1 + z^2 A^2 1 + ...)."""
+    """Return the coefficients of the stability function: 1 + z b.(1 + z A 1 + z^2 A^2 1 + ...)."""
     s = int(R.order_i[1])
     A, b, x, out = R.A[:s, :s], R.A[s, :s], np.ones(s), [1.0]
     for _ in range(s):
@@ -345,7 +351,9 @@ def _stability_polynomial(R: Tableau) -> np.ndarray:
 
 
 def _difference_jacobian(a: Assembly, n: int) -> np.ndarray:
-    """Derivatives of the first ``n`` rates by what they are the rates of, by differences; the run's scratch is left."""
+    """Return the derivatives of the first ``n`` rates by the state, by finite differences; the run's workspace is
+    unchanged.
+    """
     c, y = a.compiled, a.y
     other = c.again()
     assign(other.work.modes, c.work.modes)
@@ -365,19 +373,19 @@ def _difference_jacobian(a: Assembly, n: int) -> np.ndarray:
 
 
 def _growth(a: Assembly, y: np.ndarray) -> np.ndarray:
-    """Coordinates, velocities and states over what they began with, or a unit; 0 for what is no number."""
+    """Return coordinates, velocities and states relative to their initial values, or to 1; 0 for what is not finite."""
     n = _state_length(a)
     return np.nan_to_num(np.abs(y[:n]), nan=0.0) / np.maximum(np.abs(a.y[:n]), 1.0)
 
 
 def _state_length(a: Assembly) -> int:
-    """How many coordinates, velocities and states of continuous controllers there are."""
+    """Return the number of coordinates, velocities and states of continuous controllers."""
     s = a.compiled.structure
     return s.nq + s.nv + len(s.controls) - len(s.sampled)
 
 
 def _component_in_words(a: Assembly, i: int, value: float, named: ComponentNames) -> str:
-    """A component and what it is."""
+    """Describe a component of the state and its value."""
     s = a.compiled.structure
     if i >= s.nq + s.nv:
         return f"{named(a, i)} is {value:.3g}"

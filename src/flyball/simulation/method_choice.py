@@ -1,7 +1,7 @@
-"""Choice of the method: an explicit or implicit integrator, or impulse time stepping; and why.
+"""Choice of the method (explicit or implicit integrator, or impulse time stepping), and the reason for it.
 
-Here too: contact points added to a copy of the model for event-driven integration, and what implicit integrators
-support.
+This module also adds contact points to a copy of the model for event-driven integration, and checks what implicit
+integrators support.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ from .integration_options import MOST_STEPS, Integration, Stepping
 from .solver_switching import AUTO_CODE as EITHER
 from .solver_switching import EXPLICIT_METHOD, check_specialize
 
-FEW = 16  # places; with more, steps with all their rows cost far more than steps by impulses
-MOST_CORNERS = 3  # of two bodies in space, by whose friction no two ways of sharing it are told apart
-MOST_COPIES = 4  # copies of one model at other values of the parameters
+FEW = 16  # largest number of contact points for event-driven integration; with more, impulse stepping costs far less
+MOST_CORNERS = 3  # contact points of two bodies in space among which friction is still determined
+MOST_COPIES = 4  # cached copies of one model at different parameter values
 IMPULSE_REMEDY = "leave method out, or give method='impulse'"
 
 
 def contact_points(model: Model, parameters: Mapping[str, float] | None) -> ContactPlaces:
-    """The places of a model at the values of the parameters."""
+    """Return the contact points of a model at the given parameter values."""
     given = element_numbers(model, parameters)
     return model.kept.get("places", given.key, MOST_COPIES, lambda: contact_places(model, given))
 
 
 def unsupported_contacts(model: Model, parameters: Mapping[str, float] | None) -> str:
-    """What of its contacts rows of constraint do not know; empty if they know all."""
+    """Describe contacts that constraint rows do not support; empty if all are supported."""
     if not (model.contacts or model.bulk):
         return ""
     p = contact_points(model, parameters)
@@ -52,7 +52,9 @@ def unsupported_contacts(model: Model, parameters: Mapping[str, float] | None) -
 
 
 def too_many_contacts(model: Model, parameters: Mapping[str, float] | None) -> str:
-    """Whether there are so many places that steps by impulses are better; empty if not."""
+    """Return why impulse time stepping is preferable (too many contact points, friction undetermined); empty if it is
+    not.
+    """
     places = contact_points(model, parameters).touches
     if len(places) > FEW:
         return f"bodies may touch at {len(places)} places, too many to go from touch to touch (most {FEW})"
@@ -60,7 +62,7 @@ def too_many_contacts(model: Model, parameters: Mapping[str, float] | None) -> s
 
 
 def _indeterminate_friction(places: Sequence[Touch]) -> str:
-    """Bodies in space whose friction at many corners rigid bodies leave open; empty if there are none."""
+    """Name two bodies in space whose friction is undetermined at many contact points; empty if there are none."""
     pairs = Counter((e.body_i, e.body_j) for e in places if e.slips)
     for (a, b), n in pairs.items():
         if n > MOST_CORNERS:
@@ -69,12 +71,12 @@ def _indeterminate_friction(places: Sequence[Touch]) -> str:
 
 
 def with_contact_points(model: Model, parameters: Mapping[str, float] | None) -> Model:
-    """A copy of the model in which places of contact are parts.
+    """Return a copy of the model with its contact points as elements.
 
     Raises
     ------
     ModelError
-        If rows do not know all of them.
+        If constraint rows do not support all contacts.
     """
     if not model.contacts or any(isinstance(e, Touch) for e in model.forces):
         return model
@@ -97,28 +99,28 @@ def _with_touches(model: Model, touches: tuple[Touch, ...]) -> Model:
 
 
 def _first_of_several(texts: tuple[str, ...]) -> str:
-    """The first, and how many there are."""
+    """Return the first text and the number of the others."""
     return texts[0] + (f" (and {len(texts) - 1} more)" if len(texts) > 1 else "")
 
 
 RADAU, GENERALISED_ALPHA, VARIATIONAL = "radau", "generalised-alpha", "variational"
 IMPLICIT_METHODS = (RADAU, GENERALISED_ALPHA, VARIATIONAL)
-"""Integrators with loops of their own, by name."""
+"""Implicit integrators by name; each has its own compiled loop."""
 FIXED_STEP_METHODS = (GENERALISED_ALPHA, VARIATIONAL)
-"""Those of them whose steps are of one width, which has to be given."""
-DEFAULT_RHO_INF = 0.8  # spectral radius at infinity of generalised-alpha, where none is given
+"""Implicit integrators with steps of fixed width, which has to be given."""
+DEFAULT_RHO_INF = 0.8  # default spectral radius at infinity of generalised-alpha
 MOST_JOINT_GROUPS = (
-    40  # groups of joint coordinates that no equation sees together, up to which these cost less than absolute ones
+    40  # column groups of the Jacobian up to which joint coordinates cost less than absolute ones
 )
 
 
 def explicit_substitute(method: str) -> str:
-    """The explicit integrator that computes what an implicit one does not know."""
+    """Return the explicit integrator that is used where an implicit one is not applicable."""
     return EXPLICIT_METHOD if method in IMPLICIT_METHODS else method
 
 
 def refuse_idle_options(o: Any) -> None:
-    """Refuse options that implicit integrators do nothing with.
+    """Refuse options that have no effect with implicit integrators.
 
     Raises
     ------
@@ -143,15 +145,16 @@ def refuse_idle_options(o: Any) -> None:
 def in_suitable_coordinates(
     start: InitialState, method: str, wish: str, parameters: Mapping[str, float] | None
 ) -> InitialState:
-    """The start in coordinates that implicit integrators are good at.
+    """Return the start in coordinates that suit implicit integrators.
 
-    Joint coordinates of long chains have full matrices, and drivers prescribe some; such mechanisms go to absolute
-    ones.
+    Joint coordinates of long chains have full matrices, and drivers prescribe some of them; such mechanisms use
+    absolute
+    coordinates.
 
     Raises
     ------
     ModelError
-        For what implicit integrators do not know.
+        For what implicit integrators do not support.
     """
     s = start.assembly.compiled.structure
     if method != RADAU:
@@ -180,7 +183,7 @@ def in_suitable_coordinates(
 
 
 def reason_against_implicit(start: InitialState) -> str:
-    """Why a motion in those coordinates cannot go on by an implicit method, in words; empty: it can."""
+    """Return why a motion in these coordinates cannot continue by an implicit method; empty if it can."""
     s = start.assembly.compiled.structure
     try:
         refuse_function_laws(s)
@@ -201,7 +204,7 @@ def reason_against_implicit(start: InitialState) -> str:
 
 
 def _refuse_open_loads(start: InitialState, method: str) -> None:
-    """Friction under reactions that redundancy leaves open takes them from Newton's method, where they are any."""
+    """Refuse friction that depends on reactions which redundancy leaves undetermined."""
     s = start.base.compiled.structure
     found = undetermined_loads(s.loads, mobility(s.model, start.base).undetermined) if s.loads else []
     if found:
@@ -213,7 +216,7 @@ def _refuse_open_loads(start: InitialState, method: str) -> None:
 
 
 def _jacobian_groups(start: InitialState) -> int:
-    """How many evaluations a Jacobian takes in joint coordinates."""
+    """Return how many evaluations a Jacobian takes in joint coordinates."""
     c = start.assembly.compiled
     return jacobian_layout(c.structure, c.system).groups
 
@@ -222,7 +225,7 @@ AUTO_METHOD, IMPULSE_METHOD, DEFAULT_INTEGRATOR = (
     "auto",
     "impulse",
     "dop853",
-)  # methods beside the integrators by name; what auto is
+)  # method names besides the integrators; the default integrator
 METHOD_SYNONYMS = {
     "impulses": IMPULSE_METHOD,
     "stepping": IMPULSE_METHOD,
@@ -240,19 +243,19 @@ METHOD_SYNONYMS = {
     "rattle": VARIATIONAL,
     "energy-momentum": VARIATIONAL,
 }
-"""What methods are called in words."""
+"""Synonyms of method names, for hints in messages."""
 INTEGRATOR_DEFAULTS = {
     "rtol": 1e-7, "atol": None, "stabilization": "projection", "alpha": None, "beta": None, "specialize": EITHER,
     "max_steps": MOST_STEPS, "step": None,
     "rho_inf": None,
 }  # fmt: skip
-"""Options of an integration that mean nothing to steps by impulses, and what they are when they are not given."""
+"""Integration options without effect on impulse time stepping, with their defaults."""
 IMPULSE_STEPPING = "steps by impulses"
 
 
 @dataclass(frozen=True, kw_only=True)
 class SimulateOptions(Integration):
-    """What `Mechanism.simulate` is asked."""
+    """Arguments of `Mechanism.simulate`."""
 
     method: str | Stepping  # type: ignore[assignment]
     t_end: float
@@ -271,7 +274,7 @@ class SimulateOptions(Integration):
         self._check_damping()
 
     def _check_damping(self) -> None:
-        """The spectral radius at infinity is one, and has something to do."""
+        """Check the spectral radius at infinity; only generalised-alpha takes it."""
         if self.rho_inf is None:
             return
         if self.method != GENERALISED_ALPHA:
@@ -283,7 +286,7 @@ class SimulateOptions(Integration):
                              f"damped), got {self.rho_inf!r}")  # fmt: skip
 
     def check_method(self) -> None:
-        """An integrator, steps by impulses, or what suits the model."""
+        """Check that the method is an integrator, impulse time stepping, or ``"auto"``."""
         if isinstance(self.method, Stepping):
             return
         if isinstance(self.method, str) and self.method in (AUTO_METHOD, IMPULSE_METHOD, *IMPLICIT_METHODS):
@@ -299,16 +302,16 @@ class SimulateOptions(Integration):
 
 
 class MethodChoice(NamedTuple):
-    """By what a motion is computed.
+    """The chosen method of a simulation.
 
     Attributes
     ----------
     options : SimulateOptions
         With an integrator by name, or a `Stepping`.
     why : str
-        For the health, where there was something to choose.
+        The reason, for the health report; empty where there was nothing to choose.
     instead : SimulateOptions, optional
-        Steps by impulses, where the integration turns out not to be possible.
+        Impulse time stepping, to be used if the integration turns out not to be possible.
     """
 
     options: SimulateOptions
@@ -317,13 +320,13 @@ class MethodChoice(NamedTuple):
 
 
 def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
-    """The method that is meant.
+    """Choose the method.
 
     Raises
     ------
     ModelError
-        If the method does not know what the model has, or options have no effect on it; where none is asked for, if
-        there is none for all that is there.
+        If the requested method does not support the model or one of the options. With ``"auto"``, if no method
+        supports all of them.
     """
     if o.method == AUTO_METHOD:
         return _choose_automatically(model, o)
@@ -357,7 +360,7 @@ def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
 
 
 def _remark_on_requested(o: SimulateOptions, touch: bool) -> str:
-    """What is said of an integrator that was asked for, where there is something to say."""
+    """Return the health remark on an integrator that was requested; empty if there is nothing to remark."""
     parts = [f"steps of {o.step:g} s"] if o.step is not None else []
     if o.method == GENERALISED_ALPHA:
         parts.append(f"rho_inf = {DEFAULT_RHO_INF if o.rho_inf is None else o.rho_inf:g}")
@@ -369,7 +372,7 @@ def _remark_on_requested(o: SimulateOptions, touch: bool) -> str:
 
 
 def _choose_automatically(model: Model, o: SimulateOptions) -> MethodChoice:
-    """The method where none is asked for."""
+    """Choose the method where none is requested."""
     adaptive = o.known(method=DEFAULT_INTEGRATOR)
     if not (model.contacts or model.bulk):
         return MethodChoice(adaptive)
@@ -395,12 +398,12 @@ def _choose_automatically(model: Model, o: SimulateOptions) -> MethodChoice:
 
 
 def _unknown_to_impulse_stepping(model: Model) -> list[str]:
-    """What steps by impulses do not know."""
+    """Return what impulse time stepping does not support."""
     return [e.title for e in (*model.events, *model.controllers, *not_for_impulse_stepping(model))]
 
 
 def _given_options(o: SimulateOptions) -> list[str]:
-    """Options that are given and that only an integration takes."""
+    """Return the names of given options that apply to an integration only."""
     return [name for name, usual in INTEGRATOR_DEFAULTS.items() if getattr(o, name) != usual]
 
 
@@ -410,18 +413,20 @@ def _impulse_options(o: SimulateOptions) -> SimulateOptions:
 
 
 def _continues_impulse_stepping(start: Result | None) -> str:
-    """A motion goes on as it came."""
+    """Return the reason for impulse time stepping if the earlier result used it; else an empty string."""
     if start is None or not isinstance(start.health.options.get("method"), Mapping):
         return ""
     return "so went the motion that this one goes on from"
 
 
 def is_unresolved(error: BaseException) -> bool:
-    """Whether a motion failed by what rigid bodies that touch leave without an answer, or an end; or by an overlap."""
+    """Return whether the motion failed at an instant that rigid-body contact leaves unresolved, or by an initial
+    overlap.
+    """
     return isinstance(error, InitialOverlap | UnresolvedInstant) or isinstance(error.__cause__, UnresolvedInstant)
 
 
 def reason_for_impulses(error: BaseException) -> str:
-    """Why steps by impulses were taken after all, for the health."""
+    """Return the health remark on why impulse time stepping replaced the integration."""
     found = error.__cause__ if isinstance(error.__cause__, UnresolvedInstant) else error
     return f"{IMPULSE_STEPPING}, since from touch to touch it does not go: {found}"

@@ -1,7 +1,6 @@
-"""The result of an integrated motion: `Result` and health, or the exception with the partial result.
+"""Result of an integrated motion: `Result` with its health report, or the exception with the partial result.
 
-Accelerations and reactions at output times are solved for when they are first asked for, where that gives the same
-values.
+Accelerations and reactions at output times are computed on first access, where that gives the same values.
 """
 
 from __future__ import annotations
@@ -46,10 +45,10 @@ from .sampling_instants import never_sampled
 
 
 def can_defer_accelerations(start: InitialState, o: Integration, task: int) -> bool:
-    """Whether accelerations can be left for later: they would be the same then.
+    """Return whether accelerations can be computed later with the same values.
 
-    Friction starts from the loads found last, a Python function may have a memory, and events may change modes and
-    numbers.
+    This is not so with friction (its solve starts from the loads found last), with Python functions (they may have
+    memory), or where events change modes and numbers.
     """
     s = start.assembly.compiled.structure
     usual = task == INTEGRATE and o.stabilization == "projection"
@@ -58,7 +57,7 @@ def can_defer_accelerations(start: InitialState, o: Integration, task: int) -> b
 
 
 def idle_clock(ny: int, t: float = 0.0) -> ex.StepState:
-    """Time and state, so many numbers, for tasks that integrate nothing."""
+    """Create an integrator state with time and ``ny`` state entries, for tasks that integrate nothing."""
     real = ex.StepReals.blank()
     real.t = t
     none = np.zeros(0, np.int64)
@@ -67,9 +66,9 @@ def idle_clock(ny: int, t: float = 0.0) -> ex.StepState:
 
 
 def solve_accelerations(start: InitialState, rows: np.ndarray, health: Health) -> tuple[np.ndarray, np.ndarray]:
-    """Accelerations (n, nv) and multipliers (n, nr) at the states of rows of output; nan where there are none.
+    """Return accelerations (n, nv) and multipliers (n, nr) at the states of output rows; nan where there are none.
 
-    Of these ``health`` tells in its remarks.
+    Missing ones are reported in the remarks of ``health``.
     """
     c = start.assembly.compiled
     s, W = c.structure, c.work
@@ -82,7 +81,7 @@ def solve_accelerations(start: InitialState, rows: np.ndarray, health: Health) -
 
 
 def missing_accelerations(c: CompiledMechanism, rows: np.ndarray) -> str:
-    """What is to be said of rows of output (n, width) some of which have no accelerations: when, and why."""
+    """Describe at which of the output rows (n, width) there are no accelerations, and why."""
     s = c.structure
     missing = rows[~np.isfinite(rows).all(axis=1)]
     t, q, v, z = np.split(missing[0, : 1 + s.nq + s.nv + len(s.states)], np.cumsum([1, s.nq, s.nv]))
@@ -104,15 +103,15 @@ def make_result(
     deferred: DeferredArrays | None = None,
     unsolved: Callable[[Health], tuple[np.ndarray, np.ndarray]] | None = None,
 ) -> Result:
-    """Result and health; a failed run raises with its partial result.
+    """Build the result and its health report; a failed run raises with its partial result.
 
-    ``deferred`` finds works when they are asked for, ``unsolved`` accelerations and multipliers; it
-    puts into the health at which times there are none.
+    ``deferred`` computes works on first access, and ``unsolved`` accelerations and multipliers; the latter adds to the
+    health report the times without a solution.
 
     Raises
     ------
     SimulationError
-        If the integration could not go on.
+        If the integration could not continue.
     """
     start, clock = here.start, here.clock
     a, model = start.assembly, start.base.compiled.structure.model
@@ -164,20 +163,20 @@ def make_result(
 
 
 def _cause_of_failed_step(a: Assembly, clock: ex.StepState) -> str:
-    """What is behind a step of fixed width that has no solution, if it is known; else nothing."""
+    """Return why a step of fixed width has no solution, if the cause is known; else an empty string."""
     t = float(clock.real.t)
     text = contradicting_limits(a.compiled, t)
     return f"at t = {t:.6g} s, {text}" if text else driver_fault(a.compiled, t, float(clock.real.largest))
 
 
 def _data_for_next_segment(here: EventContext, followed: bool) -> dict[str, Any]:
-    """What the next part of the motion begins with."""
+    """Return the data with which the next segment starts."""
     pace, found = here.start.pace, {"open": here.start.part.open, "followed": followed}
     return found | {"by": pace.carried if pace else "", "width": float(here.clock.real.h)}
 
 
 def _health(start: InitialState, clock: ex.StepState, o: Integration) -> Health:
-    """Figures of a run."""
+    """Create the health report of a run."""
     array = start.assembly.compiled.array
     return Health(
         success=True,

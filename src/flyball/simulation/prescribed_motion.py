@@ -1,11 +1,11 @@
 """Mechanisms whose drivers leave no freedom: works as integrals of powers, and checks of stops and friction.
 
 The compiled loop (`engine/`) gives positions, velocities, accelerations and powers at each time. Powers are
-integrated by the polynomial through eight neighbouring times; where six or seven give another value, times are
-added.
+integrated by the polynomial through eight neighbouring times. Where the polynomials through six or seven give
+different values, times are added.
 
-A prescribed motion has no rows for stops or stick friction: a driver decides. A motion that passes a stop is
-refused.
+A prescribed motion has no rows for stops or stick friction, since the drivers determine the motion. A motion that
+passes a stop is refused.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from ..tables.constraint_rows import SwitchSpec
 from ..tables.table_definitions import VALUE
 from .initial_state import InitialState
 
-MOST_STARTS = 4  # starts of the same numbers of which it is kept whether drivers hold them
-NODES, FEWER = 8, (7, 6)  # an odd number too: at a jump its windows do not lie like those of eight
+MOST_STARTS = 4  # cached answers of `leaves_no_freedom` for one set of values
+NODES, FEWER = 8, (7, 6)  # nodes, and those of the error estimate; an odd number too, whose windows lie differently
 REFINEMENTS = 40
 MOST_CALLS = 1_000_000
-CLUSTERED = 1e-3  # distance of neighbouring nodes, as part of half of all eight's width
-RANK_TOLERANCE = 1e-10  # singular values of the equations of weights below this part of the largest are rounding
-SHORTEST_INTERVAL = 1e-12  # part of the span: a power that is still uneven over less has jumped
+CLUSTERED = 1e-3  # distance of neighbouring nodes below which they are clustered, relative to half the window's width
+RANK_TOLERANCE = 1e-10  # relative singular value of the weight equations below which it counts as zero
+SHORTEST_INTERVAL = 1e-12  # shortest interval that is refined, relative to the span; over less the power has jumped
 
 
 def leaves_no_freedom(start: InitialState) -> bool:
-    """Whether drivers prescribe every velocity, and rows on positions alone say where everything is.
+    """Return whether drivers prescribe every velocity, and position constraints alone determine all positions.
 
-    Controllers have states of their own, which are integrated.
+    This is False with controllers, whose states have to be integrated.
     """
     s = start.base.compiled.structure
     if s.controls or not s.model.drivers or s.nv > len(s.rows) or not all(r.holonomic for r in s.rows):
@@ -56,21 +56,21 @@ def _rank_of_rows(a: Assembly) -> int:
 
 
 def at_outputs(clock: ex.StepState, rows: np.ndarray) -> np.ndarray:
-    """The rows (n, width) of ``follow`` at output times; powers stand where works belong."""
+    """Return the rows (n, width) of task FOLLOW at output times; powers stand in the columns of works."""
     return np.ascontiguousarray(rows[np.isin(rows[:, 0], clock.times)])
 
 
 def deferred_works(start: InitialState, clock: ex.StepState, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The works that a followed motion has done, found when they are first asked for.
+    """Return the works of a prescribed motion, computed on first access.
 
     Parameters
     ----------
-    start : Start
-        With the works that the motion begins with.
-    clock : Clock
+    start : InitialState
+        With the works at the start of the motion.
+    clock : StepState
         As the loop has left it.
     rows : ndarray (n, width)
-        All that the loop has written, powers in place of works.
+        All rows that the loop has written, with powers in place of works.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def deferred_works(start: InitialState, clock: ex.StepState, rows: np.ndarray) -
 
 
 def _works(a: Assembly, clock: ex.StepState, rows: np.ndarray) -> np.ndarray:
-    """Works at the times of the rows, from none at the first."""
+    """Return the works at the times of the rows, zero at the first."""
     known, P = refined_nodes(a, clock, rows, lambda some: some[:, 1 + clock.integrals])
     return cumulative_integrals(known[:, 0], P)[np.searchsorted(known[:, 0], rows[:, 0])]
 
@@ -97,7 +97,9 @@ def _works(a: Assembly, clock: ex.StepState, rows: np.ndarray) -> np.ndarray:
 def refined_nodes(
     a: Assembly, clock: ex.StepState, rows: np.ndarray, powers: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The rows, and as many between them as the integrals of what ``powers`` makes of rows take; with these, (n, k)."""
+    """Return the rows, with rows added between them until the integrals of ``powers`` are accurate, and the powers (n,
+    k).
+    """
     known, P = rows, powers(rows)
     shortest = SHORTEST_INTERVAL * (rows[-1, 0] - rows[0, 0])
     for _ in range(REFINEMENTS):
@@ -114,13 +116,13 @@ def refined_nodes(
 
 
 def cumulative_integrals(t: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """Integrals (n, k) of powers (n, k) over time, from none at the first."""
+    """Return the integrals (n, k) of powers (n, k) over time, zero at the first time."""
     pieces, _ = _interval_integrals(t, P)
     return np.vstack([np.zeros(P.shape[1]), np.cumsum(pieces, axis=0)])
 
 
 def _largest_errors(error: np.ndarray, allowed: float) -> np.ndarray:
-    """The fewest whose errors, taken away, leave no more than half of what is allowed; none if all is well."""
+    """Return the fewest intervals whose removal halves the allowed error; none if the error is allowed."""
     if error.sum() <= allowed:
         return np.zeros(0, np.int64)
     order = np.argsort(-error)
@@ -129,7 +131,7 @@ def _largest_errors(error: np.ndarray, allowed: float) -> np.ndarray:
 
 
 def _interval_integrals(t: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Integrals over every interval, (n - 1, accounts), and how much they differ from those with fewer nodes."""
+    """Return the integrals over every interval, (n - 1, accounts), and their differences from those with fewer nodes."""
     if len(t) < 2:
         return np.zeros((0, P.shape[1])), np.zeros(0)
     best = _quadrature(t, P, min(NODES, len(t)))
@@ -139,10 +141,10 @@ def _interval_integrals(t: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
-    """Integrals over every interval of the polynomials through the m nearest nodes.
+    """Return the integrals over every interval of the polynomials through the m nearest nodes.
 
-    Where nodes crowd, the polynomial hangs on the last digits of their differences: there the smallest weights that
-    integrate powers of time do.
+    Where nodes are clustered, the polynomial depends on the rounding of their differences. There the weights of least
+    norm that integrate powers of time are used.
     """
     n = len(t) - 1
     first = np.clip(np.arange(n) - m // 2 + 1, 0, len(t) - m)
@@ -163,7 +165,7 @@ def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
 
 
 def _midpoint_rows(a: Assembly, clock: ex.StepState, known: np.ndarray, intervals: np.ndarray) -> np.ndarray:
-    """Rows half way through those pieces, and where else the loop stops on its way there; as far as it gets."""
+    """Return rows at the middle of these intervals and where the loop stops on its way, as far as it gets."""
     first = known[intervals[0]]
     times = 0.5 * (known[intervals, 0] + known[intervals + 1, 0])
     real, count, _, y, K, accounts, seen = clock
@@ -182,16 +184,16 @@ def _midpoint_rows(a: Assembly, clock: ex.StepState, known: np.ndarray, interval
 
 
 KNOWN_SWITCHES = frozenset({FRICTION, STOP, ONE_WAY})
-"""Kinds of switches that analyses of a prescribed motion know."""
-STOP_TOLERANCE = 1e-9  # of the mechanism's length, a radian, or of the fastest rate, that is not past a stop
-CHECKS_PER_INTERVAL, MOST_CHECKS = 8, 4000  # looked at between two times; in all
+"""Kinds of switches that analyses of a prescribed motion support."""
+STOP_TOLERANCE = 1e-9  # allowed excess at a stop, relative to the mechanism's length, a radian, or the largest rate
+CHECKS_PER_INTERVAL, MOST_CHECKS = 8, 4000  # times checked between two output times; in total
 CHECK_ROUNDS = 4
 
 
 def refuse_passed(result: Result, analysis: str, again: Callable[[np.ndarray], Result]) -> None:
-    """Refuse a motion that goes past a stop, at the output times or between them; health tells how closely it looked.
+    """Refuse a motion that passes a stop at or between the output times; the health report gives the number of checks.
 
-    Between two times it is looked at a few more, and where a cubic through values and rates at neighbours peaks.
+    Between two times a few more are checked, and the peaks of the cubic through values and rates at both ends.
 
     Parameters
     ----------
@@ -199,12 +201,12 @@ def refuse_passed(result: Result, analysis: str, again: Callable[[np.ndarray], R
     analysis : str
         Its name, for the message.
     again : callable
-        The same motion at other times [s].
+        Returns the same motion at other times [s].
 
     Raises
     ------
     ModelError
-        Naming the part, the time and how far.
+        Naming the element, the time and the excess.
     """
     seen, t = _switch_history(result), result.t
     remarks = _friction_at_rest(seen)
@@ -222,12 +224,12 @@ def refuse_passed(result: Result, analysis: str, again: Callable[[np.ndarray], R
 
 
 def remark_friction(result: Result) -> None:
-    """Say in a result's health where friction is at rest in a motion that drivers prescribe."""
+    """Add to the health report where friction is at rest in a motion that drivers prescribe."""
     result.health.remarks = (*result.health.remarks, *_friction_at_rest(_switch_history(result)))
 
 
 class SwitchHistory(NamedTuple):
-    """What could hold along a motion: values and rates at all times (n, times), bounds (n, 2), what is not past one."""
+    """Switch quantities along a motion: values and rates (n, times), bounds (n, 2), and the tolerance of each."""
 
     specs: list[SwitchSpec]
     x: np.ndarray
@@ -257,14 +259,14 @@ def _switch_history(result: Result) -> SwitchHistory:
 
 
 def _intermediate_times(t: np.ndarray) -> np.ndarray:
-    """Times between those of a motion."""
+    """Return times between those of a motion."""
     n = max(1, min(CHECKS_PER_INTERVAL, MOST_CHECKS // max(len(t), 1)))
     part = np.arange(1, n + 1) / (n + 1)
     return (t[:-1, None] + np.diff(t)[:, None] * part).ravel()
 
 
 def _times_of_peaks(t: np.ndarray, history: SwitchHistory) -> np.ndarray:
-    """Times at which the cubics between values and rates go past a stop, or back at a freewheel."""
+    """Return times at which cubics through values and rates pass a stop, or run backwards at a freewheel."""
     h, out = np.diff(t), [np.zeros(0)]
     for spec, x, rate, (lower, upper), near in zip(*history, strict=True):
         # x + h (r s + b s^2 + a s^3), s from 0 to 1
@@ -282,7 +284,7 @@ def _times_of_peaks(t: np.ndarray, history: SwitchHistory) -> np.ndarray:
 
 
 def _quantity_rate(c, spec: SwitchSpec, v: np.ndarray) -> float:
-    """Rate of a switch's quantity."""
+    """Return the rate of a switch's quantity."""
     S = c.values.system
     row = len(S.rows.law) + spec.measured
     entries = slice(S.row_start[row], S.row_start[row + 1])
@@ -303,7 +305,7 @@ def _refuse_passed_stops(t: np.ndarray, history: SwitchHistory, analysis: str) -
 
 
 def _friction_at_rest(history: SwitchHistory) -> list[str]:
-    """Friction that stands still."""
+    """Return remarks on friction elements that are at rest at some time."""
     out = []
     for spec, rate in zip(history.specs, history.rate, strict=True):
         still = np.abs(rate) <= STOP_TOLERANCE * np.abs(rate).max(initial=0.0)

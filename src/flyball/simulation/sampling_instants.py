@@ -1,4 +1,4 @@
-"""Sampled controllers: their sampling instants in a motion, and messages where they are far too many or none."""
+"""Sampled controllers: their sampling instants in a motion, and messages where there are too many or none."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..numerics.integrators import time_loop as ex
 from ..numerics.integrators.butcher_tableaux import Tableau, tableau
 
 SAMPLING_SHARE = (
-    0.5  # part of all steps that end where a controller is sampled, from which on that is why they are many
+    0.5  # if at least this part of the steps end at sampling instants, sampling is named as the reason for their number
 )
 
 
@@ -29,12 +29,12 @@ class SampledController(NamedTuple):
     offset: float
 
     def between(self, a: float, b: float) -> int:
-        """At how many instants after ``a`` and before ``b`` it is sampled."""
+        """Return the number of sampling instants after ``a`` and before ``b``."""
         first = max(0, math.floor((a - self.offset) / self.period + INSTANT_TOLERANCE) + 1)
         return max(0, math.ceil((b - self.offset) / self.period - INSTANT_TOLERANCE) - first)
 
     def told(self, a: float, b: float) -> str:
-        """How many instants lie between two times, in words."""
+        """Describe how many sampling instants lie between two times."""
         return (
             f"{self.title} has a period of {self.period:g} s: from t = {a:.6g} s to the end at {b:.6g} s it is sampled "
             f"{self.between(a, b):.3g} times, and each ends a step"
@@ -42,7 +42,7 @@ class SampledController(NamedTuple):
 
 
 def sampled_by_period(c: CompiledMechanism) -> list[SampledController]:
-    """The sampled controllers, the one of the shortest period first."""
+    """Return the sampled controllers, shortest period first."""
     s, numbers = c.structure, c.values.numbers
     if not s.sampled:
         return []
@@ -52,12 +52,12 @@ def sampled_by_period(c: CompiledMechanism) -> list[SampledController]:
 
 
 def refuse_too_often(c: CompiledMechanism, span: tuple[float, float], most: int) -> None:
-    """Refuse a motion that has more instants of sampling than it may have steps, where no event can end it before.
+    """Refuse a motion with more sampling instants than ``max_steps``, unless an event could end it earlier.
 
     Raises
     ------
     ModelError
-        Naming the controller, its period and how many instants there are.
+        Naming the controller, its period and the number of instants.
     """
     for x in [] if c.structure.model.events else sampled_by_period(c)[:1]:
         if x.between(*span) > most:
@@ -65,7 +65,7 @@ def refuse_too_often(c: CompiledMechanism, span: tuple[float, float], most: int)
 
 
 def sampling_limits_steps(c: CompiledMechanism, clock: ex.StepState, t_start: float) -> str:
-    """Which controller it is for whose sake steps are so many, and what lies ahead; nothing if it is none."""
+    """Name the controller whose sampling causes most steps, and the instants still to come; empty if there is none."""
     t, end = float(clock.real.t), _end_of_motion(clock)
     for x in sampled_by_period(c)[:1]:
         if x.between(t_start, t) >= SAMPLING_SHARE * clock.count.accepted:
@@ -76,7 +76,7 @@ def sampling_limits_steps(c: CompiledMechanism, clock: ex.StepState, t_start: fl
 
 
 def never_sampled(c: CompiledMechanism, clock: ex.StepState) -> tuple[str, ...]:
-    """What to say of controllers whose first instant lies beyond the end; nothing where events might change that."""
+    """Return remarks on controllers whose first instant lies beyond the end; none where events might change that."""
     if c.structure.model.events or not c.structure.sampled:
         return ()
     end = _end_of_motion(clock)
@@ -89,11 +89,11 @@ def never_sampled(c: CompiledMechanism, clock: ex.StepState) -> tuple[str, ...]:
 
 
 def _end_of_motion(clock: ex.StepState) -> float:
-    """When a motion ends [s]: what is integrated at once may end before."""
+    """Return the end time of the motion [s]; the end time of the loop may be earlier."""
     return float(max(clock.real.t_end, clock.times[-1] if len(clock.times) else -math.inf))
 
 
-# When the sampled controllers of a motion are sampled, and by which laws.
+# The sampling schedule of a motion.
 
 
 LOW_ORDER_METHOD = "rk45"  # for short intervals
@@ -102,18 +102,18 @@ LOW_ORDER_METHOD = "rk45"  # for short intervals
 def sampling(
     c: CompiledMechanism, R: Tableau, lower: bool, span: tuple[float, float], rows: tuple[int, int]
 ) -> SampledControllers | None:
-    """What samples the controllers of a mechanism between two times; None if none is sampled.
+    """Return the sampled controllers of a mechanism with their schedule between two times; None if there are none.
 
     Parameters
     ----------
-    c : Compiled
+    c : CompiledMechanism
     R : Tableau
     lower : bool
-        Whether a method of lower order may be taken where intervals are short.
+        Whether a method of lower order may be used where intervals are short.
     span : (float, float)
         First and last time [s]; at the last nothing is sampled.
     rows : (int, int)
-        Width of a row of output, and how many there is room for.
+        Width of an output row, and number of rows in the buffer.
     """
     s, numbers = c.structure, c.values.numbers
     if not s.sampled:

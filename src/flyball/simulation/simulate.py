@@ -1,6 +1,6 @@
 """Simulation: the motion in time, by the chosen method, as a `Result`.
 
-The compiled loop is called in chunks, so that progress can be reported and an interrupt comes through.
+The compiled loop is called in chunks, so that progress can be reported and a keyboard interrupt is noticed.
 """
 
 from __future__ import annotations
@@ -53,16 +53,16 @@ from .prescribed_motion import at_outputs, deferred_works, leaves_no_freedom, re
 from .sampling_instants import refuse_too_often
 from .solver_switching import EXPLICIT_METHOD, GENERAL_ENGINE, CodeSelection, StiffnessMonitor
 
-TIGHT_TOLERANCE = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
+TIGHT_TOLERANCE = 1e-8  # relative tolerances below this tighten the constraint tolerance of the stages quadratically
 UNSUPPORTED_BY_GENERATED = {
     "partitioning": "partitioning chooses coordinates on the way, which made code does not know"
 }
-"""Stabilizations that code made for a mechanism does nothing for, and why."""
-SLICE = 0.05  # seconds that a call of the compiled loop should take
+"""Stabilizations that generated code does not support, each with the reason."""
+SLICE = 0.05  # intended duration of one call of the compiled loop [s]
 
 
 def simulate(model: Model, o: SimulateOptions) -> Result:
-    """The motion by the method asked for, or by the one that suits the model: see `Mechanism.simulate`."""
+    """Simulate by the requested method, or by one chosen for the model: see `Mechanism.simulate`."""
     model = model.snapshot()
     t_start = start_time(o.t_start, o.start)
     span = (t_start, o.t_end, output_times(t_start, o.t_end, o.outputs))
@@ -79,13 +79,15 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
 
 
 Span = tuple[float, float, np.ndarray]
-"""Start and end of a motion [s], and its output times."""
+"""Start time and end time [s], and the output times."""
 
 
 def simulate_with_reason(
     model: Model, o: SimulateOptions, span: Span, why: str, auto: bool, part: Segment | None = None
 ) -> Result:
-    """The motion, or a part of it, which says by what it was computed, and why; ``auto``: methods may change.
+    """Simulate a motion or one segment of it; the health report gives the method and the reason ``why``.
+
+    ``auto`` allows changes of the method during the motion.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def _add_reason(result: Result, why: str) -> None:
 
 
 def _simulated(model: Model, o: SimulateOptions, span: Span, auto: bool, part: Segment) -> Result:
-    """The motion, or a part of it, by a method that is chosen."""
+    """Simulate a motion or one segment of it by the method in the options."""
     started = time.perf_counter()
     t_start, _, times = span
     if isinstance(o.method, Stepping):
@@ -118,7 +120,7 @@ def _simulated(model: Model, o: SimulateOptions, span: Span, auto: bool, part: S
             return simulate_by_impulses(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start, part)
     model = with_contact_points(model, o.parameters)
     begun = find_initial_state(model, t_start, o.parameters, o.start, o.coordinates, switches=True, part=part)
-    slides = _no_stops(begun) and _fully_driven(begun)  # what drivers prescribe follows no force
+    slides = _no_stops(begun) and _fully_driven(begun)  # a motion that drivers prescribe does not depend on forces
     if slides:
         begun = find_initial_state(model, t_start, o.parameters, o.start, o.coordinates, part=part)
     begun.since = started
@@ -155,14 +157,14 @@ def integrate_motion(
     task: int,
     report: ReportProgress,
 ) -> Result:
-    """The motion from where it begins, integrated (task INTEGRATE) or as drivers prescribe it (FOLLOW).
+    """Compute the motion from an initial state: integrated (task INTEGRATE) or prescribed by drivers (task FOLLOW).
 
     Raises
     ------
     ModelError
         If a table of time ends before the motion does, or the start lies beyond the ends of a table.
     SimulationError
-        If it cannot go on; its ``result`` holds the motion up to then.
+        If the integration fails; its ``result`` holds the motion up to the failure.
     """
     refuse_out_of_table(start.base, float(t_end))
     o = o.sized(start.base.compiled.values.length)
@@ -202,24 +204,24 @@ def integrate_motion(
 
 
 def _no_stops(start: InitialState) -> bool:
-    """Whether nothing is watched but corners of laws and friction."""
+    """Return whether all switches are corners of laws or friction, and there are no events."""
     s = start.assembly.compiled.structure
     return bool(s.switches) and not s.model.events and all(x.switch.kind in (BRANCH, FRICTION) for x in s.switches)
 
 
 def _fully_driven(start: InitialState) -> bool:
-    """Whether drivers leave no freedom: as in the part before it, where there is one."""
+    """Return whether drivers leave no freedom; a later segment takes this from the segment before it."""
     return bool(start.carried["followed"]) if "followed" in start.carried else leaves_no_freedom(start)
 
 
 def has_guards(start: InitialState) -> bool:
-    """Whether something may happen at an instant: there are guards, or rows with modes."""
+    """Return whether events can occur: whether there are guards, switches or events."""
     s = start.assembly.compiled.structure
     return bool(s.guards or s.switches or s.model.events)
 
 
 def _refuse_idle_stabilization(start: InitialState, stabilization: str) -> None:
-    """Refuse to keep states on constraints where there are none."""
+    """Refuse a stabilization option where there are no constraints to stabilize."""
     if not len(start.assembly.compiled.values.system.rows.law):
         joint = len(start.base.compiled.values.system.rows.law) > 0
         where, remedy = ("in joint coordinates ", ", or give coordinates='absolute'") if joint else ("", "")
@@ -237,9 +239,9 @@ def clock_for(
     o: Integration,
     sampled: frozenset[int] | None = None,
 ) -> ex.StepState:
-    """Everything the compiled loop needs to start, and the choices of the solve.
+    """Create the integrator state with which the compiled loop starts, and set the solver options.
 
-    ``sampled`` are the laws that are looked at within steps; without it all that can act briefly are.
+    ``sampled`` are the laws that are checked for pulses within steps; if not given, all laws that can act briefly are.
     """
     a, y = start.assembly, start.y
     refuse_beyond_memory(len(times), row_width(a))
@@ -270,7 +272,7 @@ def clock_for(
 
 
 def set_scales(clock: ex.StepState, base: Assembly, c: CompiledMechanism, atol: float) -> None:
-    """Write what follows from a mechanism's length and weight: tolerances, and what they are compared with."""
+    """Set the tolerances and reference scales that follow from a mechanism's length and weight."""
     real = clock.real
     energy = energy_scale(base, float(real.span))
     found = scales_and_tolerances(c.values.length, atol, real.rtol, energy)
@@ -281,7 +283,7 @@ def set_scales(clock: ex.StepState, base: Assembly, c: CompiledMechanism, atol: 
 def scales_and_tolerances(
     length: float, atol: float, rtol: float, energy: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Entries ATOL, SCALE and LEDGER of the clock, TOL_G and TOL_V of the options."""
+    """Return (atol, length scale, energy scale) and the tolerances of positions and velocities on the constraints."""
     loose = atol + rtol * length
     near = loose * min(1.0, loose / (TIGHT_TOLERANCE * length))
     return (atol, length, energy), (
@@ -291,8 +293,10 @@ def scales_and_tolerances(
 
 
 def energy_scale(a: Assembly, span: float) -> float:
-    """An energy [J] that errors of works are small against: to lift the mechanism by its length, and to move it by as
-    much in the time there is, besides what it has.
+    """Return the energy [J] with which errors of work are compared.
+
+    It is the energy to lift the mechanism by its length and to move it by as much within ``span``, plus its kinetic
+    energy.
     """
     x = a.compiled.values
     weight = x.unforced.kept.get("weight", None, 1, lambda: _weight(x.system))
@@ -300,19 +304,22 @@ def energy_scale(a: Assembly, span: float) -> float:
 
 
 def _weight(S: System) -> tuple[float, float]:
-    """Mass of all bodies [kg], and gravity [m/s^2]."""
+    """Return the mass of all bodies [kg] and the acceleration of gravity [m/s^2]."""
     return float(S.bodies.mass.sum()), float(np.sqrt((S.gravity**2).sum()))
 
 
 def rest_energy(weight: tuple[float, float], length: float, span: float) -> float:
-    """That of a mechanism at rest: of its mass [kg] and gravity [m/s^2], its length [m] and the time [s]."""
+    """Return the energy scale [J] of a mechanism at rest.
+
+    It follows from the mass [kg] and gravity in ``weight``, the length [m] and the time span [s].
+    """
     mass, g = weight
-    fast = min(length / span, 1e150)  # its square is a number, however short the span
+    fast = min(length / span, 1e150)  # the square stays finite, however short the span
     return mass * (g * length + fast * fast)
 
 
 def row_width(a: Assembly) -> int:
-    """How many numbers are kept of each output time."""
+    """Return how many numbers are stored for each output time."""
     s = a.compiled.structure
     return 1 + s.nq + s.nv + len(a.compiled.z) + s.nv + len(a.compiled.values.system.rows.law) + len(s.prescribed)
 
@@ -327,10 +334,10 @@ def run_clock(
     pace: StiffnessMonitor | None = None,
     part: Segment | None = None,
 ) -> tuple[np.ndarray, bool]:
-    """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted).
+    """Call the compiled loop until the motion is complete. Returns (output rows, whether the user interrupted).
 
-    ``engine`` may choose another one on the way; without it the run is table-driven.
-    ``pace`` may ask for another method, and then this one goes no further. It ends early where ``part`` does.
+    ``engine`` may switch between the general engine and generated code; without it the general engine is used. If
+    ``pace`` requests another method, the run ends there. It also ends where the segment ``part`` does.
     """
     c, engine, part = a.compiled, engine or CodeSelection(a.compiled, False), part or whole_motion()
     s, wide = c.structure, row_width(a)
@@ -349,7 +356,7 @@ def run_clock(
             begin, clock.count.quota = time.perf_counter(), part.most(quota)
             before = clock.count.accepted + clock.count.rejected
             with deferred_interrupts(s.functions):
-                if bound is None or c.system is not on[0] or c.scratch is not on[1]:  # made code came, or went
+                if bound is None or c.system is not on[0] or c.scratch is not on[1]:  # generated code was taken or dropped
                     bound, on = c.bound(method, clock, buffer), (c.system, c.scratch)
                 used = bound(task)
                 rows.append(buffer[:used].copy())
@@ -361,7 +368,7 @@ def run_clock(
             done = clock.count.accepted + clock.count.rejected - before
             part.count_steps(done)
             engine.choose_again(clock)
-            if part.over(clock if task == INTEGRATE else None):  # of what is followed every step is one
+            if part.over(clock if task == INTEGRATE else None):  # in task FOLLOW a segment may end after any step
                 return np.concatenate(rows), False
             quota = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
             if pace is not None and task == INTEGRATE:

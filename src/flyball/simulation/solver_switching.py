@@ -1,14 +1,13 @@
 """Switching during a motion: general engine or generated code; explicit or implicit (stiffness monitor).
 
 Both codes compute the same operations in the same order, so results agree to the last bit. The choice follows from
-estimated costs and counts of steps, never from a clock, so that the same call gives the same motion.
+estimated costs and counts of steps, never from measured time, so that the same call gives the same motion.
 
-A motion is stiff where steps of an explicit method are as wide as it is stable and no wider: h rho is near the
-edge of the region of stability, rho being the largest |eigenvalue| of the right-hand side (Hairer and Wanner 1996,
-section IV.2); for dop853 the edge is at 6 to 6.8 in all directions. With tight tolerances steps do not get there,
-since rounding of the fast modes is an error at each. A stiff motion is told from one that is merely fast by three
-signs: steps are rejected, an oscillation would have been damped away since the last check, and there is none that
-matters.
+A motion is stiff where stability limits the steps of an explicit method: h rho is near the edge of the region of
+stability, where rho is the largest |eigenvalue| of the right-hand side (Hairer and Wanner 1996, section IV.2). For
+dop853 the edge is at 6 to 6.8 in all directions. With tight tolerances steps do not reach the edge, since rounding of
+the fast modes is an error in each step. Three signs distinguish a stiff motion from one that is merely fast: steps are
+rejected, an oscillation would have decayed since the last check, and no oscillation of relevant amplitude is present.
 """
 
 from __future__ import annotations
@@ -36,15 +35,15 @@ from ..tables.table_definitions import OFF, VALUE, assign, named_arrays
 from ..tables.values import Values
 
 AUTO_CODE = "auto"
-IN_MEMORY_ONLY = "kept"  # code that this process has, if it serves a mechanism: of the runs of a study
-FIRST_DECISION, DECISION_FACTOR = 8, 4  # steps after which auto chooses, and how many times more until it does again
-GAIN = 3.0  # times faster
-PRICE_MARGIN = 1.25  # times what it takes to make or load code, that it must save
-HISTORY_WEIGHT = 3.0  # of what earlier motions took, the part that counts: each may have been the last
+IN_MEMORY_ONLY = "kept"  # use generated code only if this process already holds it: for the runs of a study
+FIRST_DECISION, DECISION_FACTOR = 8, 4  # steps until auto decides first, and their factor until each next decision
+GAIN = 3.0  # assumed speed-up by generated code
+PRICE_MARGIN = 1.25  # generated code must save this many times the cost of generating or loading it
+HISTORY_WEIGHT = 3.0  # divisor of the cost of earlier motions in the estimate of future use
 LOAD_COST = (
-    1.5e5  # what code costs that is on disk [ns], as part of what it is loaded for: the next motion has it at once.
+    1.5e5  # cost of code on disk [ns] that one motion must save; later motions reuse the loaded code.
 )
-# (To load it takes a process 3 ms, and 10 to know what it looks for, once for all its motions)
+# (Loading takes 3 ms, and computing the key of the code 10 ms, once per process)
 MOST_STEPS_PER_CALL = 100_000  # steps in one call of the compiled loop
 FAILED_STATUS = (ex.STEP_FAILED, ex.NOT_FINITE, ex.OUTPUT_FAILED)
 GENERAL_ENGINE, GENERATED_CODE = "table-driven", "made for this mechanism"
@@ -52,38 +51,40 @@ TOO_SHORT = f"{GENERAL_ENGINE}: too little is computed to make code for it"
 NO_MODES = "rows that hold at times and let go at others, and events, are for the tables"
 
 
-MOST_KINDS = 256  # kinds of mechanisms that are known
+MOST_KINDS = 256  # kinds of mechanisms in the account
 
 
 class CostAccount:
-    """Times [ns] by kind of mechanism."""
+    """Accumulated computing cost [ns] by kind of mechanism."""
 
     def __init__(self) -> None:
         self._spent: OrderedDict[str, float] = OrderedDict()
         self._lock = threading.Lock()
 
     def add(self, key: str, more: float) -> None:
-        """So much more."""
+        """Add a cost."""
         with self._lock:
             self._spent[key] = self._spent.pop(key, 0.0) + more
             while len(self._spent) > MOST_KINDS:
                 self._spent.popitem(last=False)
 
     def of(self, key: str) -> float:
-        """All of it."""
+        """Return the accumulated cost."""
         with self._lock:
             return self._spent.get(key, 0.0)
 
 
 SPENT = CostAccount()
-"""By the table-driven engine."""
+"""Cost of the general engine."""
 
 
-EVALUATION_COST, COST_SHARE = 150.0, 0.6  # an evaluation on average [ns], and part of the cost of a right-hand side
+EVALUATION_COST, COST_SHARE = 150.0, 0.6  # fixed cost of an evaluation [ns], and factor of the estimated cost of the right-hand side
 
 
 def mechanism_kind(s: Structure) -> tuple[str, float]:
-    """The same for mechanisms that differ in numbers only; what an evaluation of the table-driven engine takes [ns]."""
+    """Return a key shared by mechanisms that differ in numbers only, and the cost of an evaluation by the general
+    engine [ns].
+    """
     return s.kept.get(
         "kind", None, 1, lambda: (_structure_hash(s), EVALUATION_COST + COST_SHARE * right_hand_side_cost(s))
     )
@@ -98,7 +99,7 @@ def _structure_hash(s: Structure) -> str:
 
 
 def check_specialize(value: Any) -> None:
-    """Refuse what is not a choice of the engine.
+    """Refuse an invalid value of ``specialize``.
 
     Raises
     ------
@@ -110,8 +111,8 @@ def check_specialize(value: Any) -> None:
 
 
 def prepare_generated_code(x: Values, evaluations: int, runs: int) -> bool:
-    """Have code made for so many motions, of which one took so many evaluations by the tables, if it pays; whether
-    there is such code now.
+    """Generate code for ``runs`` motions of ``evaluations`` evaluations each, if it pays. Returns whether there is such
+    code.
     """
     plan = codegen.plan(x)
     if x.structure.guards or codegen.refusal(plan):
@@ -127,33 +128,33 @@ def prepare_generated_code(x: Values, evaluations: int, runs: int) -> bool:
 
 
 class CodeSelection:
-    """The engine of one motion.
+    """The choice between general engine and generated code in one motion.
 
     Parameters
     ----------
-    c : Compiled
-        In the coordinates of the motion, with the scratch that it is run on.
+    c : CompiledMechanism
+        In the coordinates of the motion, with the workspace that it is run on.
     wish : bool, "auto" or "kept"
-        What is wanted.
+        The value of ``specialize``, or ``"kept"`` (see `IN_MEMORY_ONLY`).
     without : str
-        Why made code would do nothing here, if it would not.
+        Why generated code would have no effect here; empty if it would have.
 
     Attributes
     ----------
     told : str
-        Which engine it is, and why.
+        Description of the choice and its reason.
     due : float
-        Steps after which it is chosen again.
+        Number of steps at which the choice is made again.
 
     Raises
     ------
     ModelError
-        If code is wanted that cannot be made.
+        If generated code is required but cannot be generated.
     """
 
     def __init__(self, c: CompiledMechanism, wish: bool | str, without: str = "") -> None:
         self.c, self.told, self.due = c, f"{GENERAL_ENGINE}: asked for", math.inf
-        self._first = math.nan  # time at which the motion begins
+        self._first = math.nan  # start time of the motion
         self._counted = 0
         if wish is False:
             return
@@ -171,13 +172,13 @@ class CodeSelection:
                 self._take(made, "kept in this process")
 
     def begin(self, clock: ex.StepState) -> None:
-        """The motion begins there."""
+        """Note the start of the motion."""
         self._first = float(clock.real.t)
         if self.due < math.inf:
             self._counted = int(self.c.work.counts.evaluations)
 
     def choose_again(self, clock: ex.StepState) -> None:
-        """Take made code for the rest of the motion, if it is time to decide and that pays."""
+        """Switch to generated code for the rest of the motion, if a decision is due and that pays."""
         steps = int(clock.count.accepted + clock.count.rejected)
         if steps < self.due:
             return
@@ -187,8 +188,9 @@ class CodeSelection:
             self._choose(self._spent() * float((end - t) / (t - self._first)))
 
     def hands_over(self, clock: ex.StepState) -> bool:
-        """Whether made code got stuck, and the engine for all mechanisms goes on from the last step: through, or it
-        leaves in the scratch what the reason is told from.
+        """Return whether generated code failed and the general engine continues from the last step.
+
+        The general engine either gets through, or leaves in the workspace the data for diagnosis.
         """
         if self.c.made is None or clock.count.status not in FAILED_STATUS:
             return False
@@ -200,24 +202,26 @@ class CodeSelection:
         return True
 
     def limited(self, clock: ex.StepState, steps: float) -> int:
-        """So many steps as a call of the compiled loop should take, or as are left until it is time to choose."""
+        """Return the number of steps of the next call of the compiled loop, at most those left until the next
+        decision.
+        """
         done = int(clock.count.accepted + clock.count.rejected)
         return int(min(max(steps, 1.0), max(self.due - done, 1.0), MOST_STEPS_PER_CALL))
 
     def stop(self) -> None:
-        """The motion goes on by another method, which goes through the tables."""
+        """End the use of generated code; the motion continues by a method that needs the general engine."""
         self.end()
         self.due = math.inf
         if self.c.made is not None:
             self.c.run_on_tables()
 
     def end(self) -> None:
-        """The motion is over: what was computed is added up."""
+        """Add the cost of the motion to the account."""
         if self.due < math.inf:
             SPENT.add(self._kind, self._spent())
 
     def _spent(self) -> float:
-        """What was computed since it began [ns]."""
+        """Return the cost since the start of the motion [ns]."""
         return (int(self.c.work.counts.evaluations) - self._counted) * self._each
 
     def _require_generated_code(self, without: str) -> None:
@@ -229,7 +233,7 @@ class CodeSelection:
             raise ModelError(f"specialize=True: {error}; leave it out") from None
 
     def _choose(self, remaining_cost: float) -> None:
-        """Take made code where it pays; ``remaining_cost``: what is still to be computed [ns]."""
+        """Switch to generated code if it pays; ``remaining_cost`` is the cost still to come [ns]."""
         if not self._pays(remaining_cost, LOAD_COST):
             return
         x = self.c.values
@@ -244,7 +248,7 @@ class CodeSelection:
             self.told, self.due = f"{GENERAL_ENGINE}: {error}", math.inf
 
     def _pays(self, computing: float, price: float) -> bool:
-        """Whether code is worth a price (both [ns])."""
+        """Return whether generated code is worth its price (both [ns])."""
         return computing * (1.0 - 1.0 / GAIN) >= PRICE_MARGIN * price
 
     def _take(self, code: codegen.GeneratedCode, how: str) -> None:
@@ -254,67 +258,67 @@ class CodeSelection:
 
 AUTO_SWITCHING, EXPLICIT_METHOD, STIFF_METHOD = "auto", "dop853", "radau"
 NEVER_AGAIN = 2**60  # steps
-EXPLICIT_STAGES = 12  # of a step of the explicit method
-CHECK_INTERVAL = 100  # steps of it between two looks
+EXPLICIT_STAGES = 12  # stages of the explicit method
+CHECK_INTERVAL = 100  # explicit steps between two stiffness checks
 CHECK_COST, CHECK_SHARE = (
     8e5,
     0.01,
-)  # what a look takes [ns], and part of the time that looks may take where they find nothing
-IMPLICIT_CHECK_INTERVAL = 60  # steps of the implicit method
-CHECKS_IN_A_ROW = 2  # looks that say the same
+)  # cost of a stiffness check [ns], and the part of the computing time that unsuccessful checks may take
+IMPLICIT_CHECK_INTERVAL = 60  # implicit steps between two checks
+CHECKS_IN_A_ROW = 2  # agreeing checks before the method changes
 IMPLICIT_LOAD_COST = (
-    4e8  # that the explicit method has left at least [ns], as estimated: what it takes to load the implicit one
+    4e8  # least remaining cost of the explicit method [ns] for which loading the implicit one pays
 )
-LEAST_EVALUATION_COST = 270.0  # that an evaluation takes [ns], with the loop about it
-STABILITY_EDGE = 3.5  # h rho of wide steps that are hardly stable any more
-LARGE_AMPLITUDE = 0.3  # part of the state; what swings so far is the motion itself, at whatever tolerance
-ROUNDING_STRETCH = 0.3  # h rho of steps that rounding may limit, with what is fast
+LEAST_EVALUATION_COST = 270.0  # least cost of an evaluation, loop included [ns]
+STABILITY_EDGE = 3.5  # h rho from which on steps are near the limit of stability
+LARGE_AMPLITUDE = 0.3  # amplitude relative to the state; larger oscillations belong to the motion at any tolerance
+ROUNDING_STRETCH = 0.3  # h rho from which on rounding of fast modes may limit the steps
 NEGLIGIBLE_AMPLITUDE = (
-    20.0  # tolerances; what swings less, by h rho = EDGE, limits no steps (by less: by the cube of that, or more)
+    20.0  # amplitude in tolerances below which an oscillation limits no steps at the edge; below it scaled by the cube
 )
-AMPLITUDE_SHARE = 1e-3  # part of the state; the same where tolerances are loose
-DECAY_EXPONENT = 3.0  # -ln of what is left of a swing since the last look, where none can have lasted
-REJECTED_SHARE = 0.05  # part of steps that are refused where rounding limits them
-EXPLICIT_STRETCH = 1.2  # h rho of implicit steps that the explicit method could take too
-PATIENCE_FACTOR = 8  # times as long it takes to go back to the implicit method once more
+AMPLITUDE_SHARE = 1e-3  # the same limit relative to the state, for loose tolerances
+DECAY_EXPONENT = 3.0  # -ln of the decay since the last check beyond which no oscillation can have lasted
+REJECTED_SHARE = 0.05  # least part of rejected steps where rounding limits them
+EXPLICIT_STRETCH = 1.2  # h rho of implicit steps up to which the explicit method could take them too
+PATIENCE_FACTOR = 8  # factor of the check interval after each return to the explicit method
 BECAUSE_STIFF, BECAUSE_NOT_STIFF, BECAUSE_JUMPED = (
     "where it is stiff",
     "where it is not stiff any more",
     "as velocities jumped",
 )
-MOST_REPORTED = 5  # changes of the method that are told one by one
+MOST_REPORTED = 5  # changes of the method that are reported one by one
 
 
 class RecentSteps(NamedTuple):
-    """Steps since the last look."""
+    """Statistics of the steps since the last check."""
 
-    width: float  # of those accepted, on average [s]
-    refused: float  # part of them
-    time: float  # [s]
+    width: float  # mean width of accepted steps [s]
+    refused: float  # part of steps that were rejected
+    time: float  # time integrated [s]
 
 
 class StiffnessMonitor:
-    """How a motion gets on, and by what it should go on.
+    """Monitors the stiffness of a motion and decides by which method it continues.
 
     Parameters
     ----------
     t_end : float
-        Where it ends [s].
+        End time [s].
     method : str
-        That is asked for; ``"auto"``: whichever suits.
+        The requested method; ``"auto"``: the method may change.
     why_not : callable
-        Says why it cannot go on by the implicit method, in words; empty: it can.
+        Returns why the motion cannot continue by the implicit method; empty if it can.
 
     Attributes
     ----------
     told : list of str
-        By what it went from when on, in words.
+        Methods used so far, and from which time on.
     asked : str
-        What it should go on by, and does not yet.
+        Method requested next; empty if there is none.
     back : str
-        What it goes on by again as soon as that knows what is.
+        Implicit method to which the motion returns once no law is held on its corner.
     now : str
-        What it has gone over to.
+        Method to which the motion changed last.
     """
 
     def __init__(self, t_end: float, method: str, why_not: Callable[[], str]) -> None:
@@ -326,13 +330,13 @@ class StiffnessMonitor:
         self.last: tuple[int, int, float] | None = None
 
     def limited(self, clock: ex.StepState, steps: int) -> int:
-        """So many steps as a call of the compiled loop should take, or as are left until it is looked at again."""
-        if self.last is None or self._since(clock) < 0:  # it has begun anew
+        """Return the number of steps of the next call of the compiled loop, at most those left until the next check."""
+        if self.last is None or self._since(clock) < 0:  # the counts were reset
             self._mark(clock)
         return max(1, min(steps, self.every - self._since(clock))) if self.mixed else steps
 
     def turns(self, c: CompiledMechanism, clock: ex.StepState, now: str) -> str:
-        """The method to go on by, where that is another one; if it is time to look."""
+        """Return the method to continue by if a check is due and another method is better; else an empty string."""
         if not self.mixed or self.last is None or self._since(clock) < self.every:
             return ""
         lately = self._recent_steps(clock)
@@ -355,22 +359,24 @@ class StiffnessMonitor:
         return STIFF_METHOD if now == EXPLICIT_METHOD else EXPLICIT_METHOD
 
     def velocity_jumped(self, now: str) -> None:
-        """Velocities have jumped: wide implicit steps would damp away what that excites, explicit ones follow it."""
+        """Request the explicit method after a jump of velocities: wide implicit steps would damp the excited
+        oscillations.
+        """
         if self.mixed and now == STIFF_METHOD:
             self.asked = EXPLICIT_METHOD
 
     @property
     def carried(self) -> str:
-        """What a motion that goes on from here begins by, where that is not what others begin by."""
+        """Method with which a continued motion starts; empty for the default."""
         return self.back or self.now if self.mixed else ""
 
     def goes_on(self, by: str) -> None:
-        """It goes on from a part of the motion at whose end that was `carried`."""
+        """Continue a segment that ended with the method `carried`."""
         self.asked = by if self.mixed else ""
         self._goes_on = bool(self.asked)
 
     def words(self) -> str:
-        """By what it went from when on."""
+        """Describe which methods were used and from which time on."""
         if len(self.told) <= MOST_REPORTED + 1:
             return "; ".join(self.told)
         return "; ".join(
@@ -378,7 +384,7 @@ class StiffnessMonitor:
         )
 
     def turned(self, clock: ex.StepState, to: str, why: str) -> None:
-        """It goes on by that from now on."""
+        """Record the change to another method."""
         self.now = to
         if not self._goes_on:
             if not self.told:
@@ -393,7 +399,7 @@ class StiffnessMonitor:
         self._mark(clock)
 
     def stays(self) -> None:
-        """It goes on by what it goes on by now, to the end."""
+        """Keep the present method to the end of the motion."""
         self.every = NEVER_AGAIN
 
     def _other_method_pays(self, c: CompiledMechanism, clock: ex.StepState, lately: RecentSteps, now: str) -> bool:
@@ -422,14 +428,15 @@ class StiffnessMonitor:
 
 
 def evaluation_time(c: CompiledMechanism) -> float:
-    """What an evaluation takes, as estimated [ns]."""
+    """Return the estimated cost of an evaluation [ns]."""
     return max(LEAST_EVALUATION_COST, mechanism_kind(c.structure)[1])
 
 
 def limits_step(fast: complex, clock: ex.StepState, lately: RecentSteps) -> bool:
-    """Whether that eigenvalue, by which nothing moves that matters, limits explicit steps.
+    """Return whether this eigenvalue limits explicit steps though its mode does not contribute to the motion.
 
-    Either these are as wide as is stable, or they are refused though nothing swings that fast: rounding does.
+    Either the steps are as wide as stability allows, or they are rejected because of rounding though no oscillation of
+    that frequency is present.
     """
     stretch, rtol = lately.width * abs(fast), float(clock.real.rtol)
     if stretch < ROUNDING_STRETCH:
@@ -446,35 +453,39 @@ def limits_step(fast: complex, clock: ex.StepState, lately: RecentSteps) -> bool
 
 
 def slides_on_corner(c: CompiledMechanism) -> bool:
-    """Whether a law is held on its corner: its side follows from accelerations, which implicit steps do not find."""
+    """Return whether a law is held on its corner.
+
+    Its side then follows from accelerations, which implicit steps do not determine.
+    """
     if not len(c.system.switches.row):
         return False
     kinds, modes = c.system.switches.kind, c.work.modes.mode
     return bool(((kinds == BRANCH) & (modes != OFF)).any())
 
 
-# The fastest that a motion could do about its present state, and what of it it does.
+# The fastest mode about the present state, and its amplitude.
 
 
-LAST_STAGE = 12  # stage of dop853 that is at the end of the step, as is the one before
-ARNOLDI_PRODUCTS = 6  # with derivatives
-RANDOM_SHARE = 0.03  # part of the first vector that is in no direction
-DIFFERENCE_STEP = 1e-7  # differences, as part of the state
+LAST_STAGE = 12  # stage of dop853 at the end of the step; the stage before is there too
+ARNOLDI_PRODUCTS = 6  # Jacobian-vector products of the Arnoldi iteration
+RANDOM_SHARE = 0.03  # random part of the starting vector
+DIFFERENCE_STEP = 1e-7  # relative step of the finite differences
 
 
 def largest_eigenvalue(c: CompiledMechanism, clock: ex.StepState, pace: float) -> complex:
-    """Largest eigenvalue of the derivatives of (q, v, x)' by these at the state of a motion [1/s].
+    """Return the largest eigenvalue [1/s] of the Jacobian of (q, v, x)' at the present state of a motion.
 
-    x are states of controllers; modes are what they are. Where steps are as wide as is stable their last two stages
-    differ by what is fast, so that a few products find it. Nothing of the motion's own scratch is touched.
+    x are states of controllers; modes are held fixed. Where steps are as wide as stability allows, their last two
+    stages
+    differ by the fast modes, so that a few products find the eigenvalue. The workspace of the motion is not changed.
 
     Parameters
     ----------
-    c : Compiled
-    clock : Clock
-        Where the motion is, with the stages of its last step.
+    c : CompiledMechanism
+    clock : StepState
+        The present state of the motion, with the stages of its last step.
     pace : float
-        About how fast it could be [1/s]: by it velocities are compared with positions.
+        Estimated rate [1/s], by which velocities are scaled to positions.
     """
     s, y = c.structure, clock.y[ex.CURRENT]
     n, parts = s.nq + s.nv + len(s.controls) - len(s.sampled), [slice(0, s.nq), slice(s.nq, s.nq + s.nv)]
@@ -487,7 +498,7 @@ def largest_eigenvalue(c: CompiledMechanism, clock: ex.StepState, pace: float) -
 
     def product(x: np.ndarray) -> np.ndarray:
         way, out = x * unit, np.zeros(n)
-        for part in parts:  # each by itself: by rates of 1e6/s and more one would be lost beside another
+        for part in parts:  # one block at a time: with rates of 1e6/s and more, one block would be lost in the rounding of another
             most = np.max(np.abs(way[part]) / size[part], initial=0.0)
             if most > 0.0:
                 moved = y.copy()
@@ -499,9 +510,9 @@ def largest_eigenvalue(c: CompiledMechanism, clock: ex.StepState, pace: float) -
 
 
 def rate_change(clock: ex.StepState) -> float:
-    """By how much rates have changed over the last step, in units of the tolerance [1/s].
+    """Return by how much the rates have changed over the last step, in units of the tolerance [1/s].
 
-    Over the fastest rate: what swings as fast is about so large, or less.
+    Divided by the fastest rate this bounds the amplitude of an oscillation of that frequency.
     """
     y = clock.y
     return float(

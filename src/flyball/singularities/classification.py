@@ -1,14 +1,14 @@
 """Classification of a singular position by its branches: lock-up, passage, bifurcation or self-motion.
 
-With x(s) = n s + x2 s^2/2 + x3 s^3/6 + ... from the point,
+The Taylor coefficients of a branch x(s) = n s + x2 s^2/2 + x3 s^3/6 + ... from the point satisfy
 
     J n = 0,   J x2 + F''[n, n] = 0,   J x3 + 3 F''[n, x2] + F'''[n, n, n] = 0,   ...
 
-Each left null vector u of J turns one of these into a condition on what came before: of second order on the tangent
-(u^T F''[n, n] = 0: the algebraic bifurcation equations, H. B. Keller 1977), of third order on the part of x2 in the
-kernel, and so on. Where the second order leaves the branches open, positions are found on small spheres round the
-point by Newton's method; what they tend to are tangents of half-branches, two of which make a branch if tangent and
-curvature agree (branches that touch, or cross twice); one that has no other half ends here in a cusp.
+Each left null vector u of J turns these equations into conditions on lower coefficients: of second order on the tangent
+(u^T F''[n, n] = 0, the algebraic bifurcation equations, H. B. Keller 1977), of third order on the part of x2 in the
+kernel, and so on. Where the second order does not determine the branches, Newton's method finds positions on small
+spheres around the point. Their limits are tangents of half-branches. Two half-branches make a branch if tangent and
+curvature agree (branches that touch, or cross twice); a half-branch without a partner ends in a cusp.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from ..results.wording import BIFURCATION, LOCK_UP, PASSAGE, SELF_MOTION
 from .closure_equations import ClosureEquations, CurvePoint, JacobianRank, ReleasedMechanism
 from .continuation import CurveTracer, rank_limit
 
-VANISHING_FORM = 1e-7  # forms are of unit size where steps are: below this part they vanish
+VANISHING_FORM = 1e-7  # forms below this part of the size of the derivatives vanish
 SPHERE_STARTS = 400
 SPHERE_ITERATIONS = 60
-MAX_MULTIPLE_ZEROS = 12  # multiple zeros beyond which they are taken for a continuum
+MAX_MULTIPLE_ZEROS = 12  # beyond so many multiple zeros they are treated as a continuum
 
 
 class CommonZeros(NamedTuple):
-    """Unit vectors, one of each pair of opposites, on which forms vanish."""
+    """Unit vectors on which all forms vanish, one of each pair of opposites."""
 
-    single: list[np.ndarray]  # simple zeros: a curve leaves along each of them
-    several: list[np.ndarray]  # multiple zeros, up to some: the next order has a say
+    single: list[np.ndarray]  # simple zeros: a branch leaves along each
+    several: list[np.ndarray]  # multiple zeros (some of them): the next order decides
     endless: bool = False  # whether the multiple ones are a continuum
 
     @property
     def decided(self) -> bool:
-        """Whether the forms say all."""
+        """Whether the forms determine all directions."""
         return not self.several and not self.endless
 
 
@@ -79,7 +79,7 @@ def _binary_zeros(forms: np.ndarray, limit: float) -> CommonZeros:
 
 
 def _zeros_on_sphere(forms: np.ndarray, limit: float) -> CommonZeros:
-    """Newton's method on the sphere from many starts; zeros that lie on curves, or are multiple, decide nothing."""
+    """Common zeros by Newton's method on the sphere from many starts; multiple zeros and curves are undecided."""
     k = forms.shape[1]
     random = np.random.default_rng(0)
     single: list[np.ndarray] = []
@@ -111,22 +111,23 @@ def _newton_on_sphere(forms: np.ndarray, n: np.ndarray) -> np.ndarray:
 
 RADIUS = 0.1
 RADIUS_FRACTIONS = (1.0, 0.75, 0.5, 0.25)
-CIRCLE_STARTS = 160  # starts on a circle; as many in more dimensions
+CIRCLE_STARTS = 160  # starts on a circle; twice as many in more dimensions
 RADIUS_ITERATIONS = 14
-SAME_DIRECTION = 2e-3  # directions nearer than this are one, at the largest radius [1]
-ALIGNED, CUSP = 0.02, 0.5  # how far the tangents of the halves of a branch, of a cusp, may seem apart [1]
-MAX_HALVES = 24  # halves beyond which there is no end of them
-STATIONARY_DRIVER = 1e-4  # derivatives of the driver below this are none, here
+SAME_DIRECTION = 2e-3  # steps nearer than this are equal, relative to the largest radius [1]
+ALIGNED, CUSP = 0.02, 0.5  # largest difference of the tangents of two halves of a branch, and of a cusp [1]
+MAX_HALVES = 24  # beyond so many half-branches they count as infinitely many
+STATIONARY_DRIVER = 1e-4  # derivatives of the driver below this count as zero here
 
-HalfBranch = tuple[np.ndarray, np.ndarray, np.ndarray]  # tangent, half the curvature, steps (len(SHARES), columns)
+# tangent, half the curvature, steps (len(RADIUS_FRACTIONS), columns)
+HalfBranch = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 TouchingBranch = tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]
 
 
 def touching_branches(c: ClosureEquations, x: CurvePoint, N: np.ndarray) -> list[TouchingBranch] | None:
-    """Branches through x, whose kernel is N: Taylor coefficients of each; of a cusp also steps onto its halves.
+    """Branches through x with the kernel N: (Taylor coefficients, for a cusp also the steps onto its halves) each.
 
-    None if there are directions without end.
+    None if there are infinitely many directions.
     """
     around = _positions_around(c, x, N)
     if len(around) > MAX_HALVES:
@@ -150,14 +151,14 @@ def touching_branches(c: ClosureEquations, x: CurvePoint, N: np.ndarray) -> list
 
 
 def _cusp_coefficients(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Tangent and curvature of the middle of a cusp's halves, which are apart by odd powers of the root of distance."""
+    """Tangent and curvature of the mean of a cusp's halves, whose distance has odd powers of the square root of s."""
     h = RADIUS * np.array(RADIUS_FRACTIONS)
     fit = np.linalg.solve(np.vander(h, increasing=True), 0.5 * (one + other) / h[:, None])
     return _without_rounding(fit[0] / np.linalg.norm(fit[0])), _without_rounding(2.0 * fit[1])
 
 
 def _positions_around(c: ClosureEquations, x: CurvePoint, N: np.ndarray) -> list[np.ndarray]:
-    """Steps to all positions at the largest radius."""
+    """Steps from x to all closed positions at the largest radius."""
     k = N.shape[1]
     if k == 2:
         turns = 2.0 * np.pi * (np.arange(CIRCLE_STARTS) + 0.37) / CIRCLE_STARTS
@@ -176,7 +177,7 @@ def _positions_around(c: ClosureEquations, x: CurvePoint, N: np.ndarray) -> list
 
 
 def _at_radius(c: ClosureEquations, x: CurvePoint, N: np.ndarray, d: np.ndarray, h: float) -> np.ndarray | None:
-    """The step to the position next to x + d whose part in the kernel is of length h."""
+    """Step to the closed position near x + d whose component in the kernel has the length h; None if not found."""
     for _ in range(RADIUS_ITERATIONS):
         y = c.at(c.moved(x, d))
         part = N.T @ d
@@ -194,11 +195,11 @@ def _at_radius(c: ClosureEquations, x: CurvePoint, N: np.ndarray, d: np.ndarray,
 
 
 def _half_branch(c: ClosureEquations, x: CurvePoint, N: np.ndarray, d: np.ndarray) -> HalfBranch | None:
-    """Follow a position to smaller radii: its tangent and curvature at x."""
+    """Follow a position to smaller radii; returns its tangent and curvature at x, and the steps."""
     steps = [d]
     for before, share in itertools.pairwise(RADIUS_FRACTIONS):
         guess = steps[-1] * share / before
-        if len(steps) > 1:  # straight on, from two directions
+        if len(steps) > 1:  # extrapolated linearly from two directions
             a, b = steps[-2] / (RADIUS * RADIUS_FRACTIONS[len(steps) - 2]), steps[-1] / (RADIUS * before)
             guess = (b + (b - a) * (before - share) / (RADIUS_FRACTIONS[len(steps) - 2] - before)) * RADIUS * share
         found = _at_radius(c, x, N, guess, RADIUS * share)
@@ -226,32 +227,32 @@ def _branch_coefficients(n: np.ndarray, one: np.ndarray, other: np.ndarray) -> t
 
 
 def _without_rounding(d: np.ndarray) -> np.ndarray:
-    """Without what is but rounding in the driver's part."""
+    """Set the driver's component to 0 if it is rounding."""
     d = d.copy()
     d[-1] = d[-1] if abs(d[-1]) > STATIONARY_DRIVER else 0.0
     return d
 
 
-ZERO_COEFFICIENT = 1e-7  # a Taylor coefficient of the driver below this, of unit steps, is none
+ZERO_COEFFICIENT = 1e-7  # Taylor coefficients of the driver below this (for unit steps) count as zero
 DRIVES = ("a'", "a'' > 0", "a'' < 0")
-MAX_ORDER = 6  # up to which the driver's coefficients are looked at
+MAX_ORDER = 6  # highest order of the driver's coefficients
 
 
 @dataclass(frozen=True)
 class BranchCurve:
-    """One branch: Taylor coefficients x1 = n, x2, ... of unit steps (derivatives, not divided by factorials)."""
+    """One branch: derivatives x1 = n, x2, ... by a unit step (not divided by factorials)."""
 
     x: tuple[np.ndarray, ...]
-    ends: tuple[np.ndarray, ...] = ()  # of a cusp, which goes one way only: a step onto each half
+    ends: tuple[np.ndarray, ...] = ()  # for a cusp, which leaves in one direction only: a step onto each half
 
     @property
     def driver(self) -> np.ndarray:
-        """The driver's derivatives along it."""
+        """Derivatives of the driver's coordinate along the branch."""
         return np.array([c[-1] for c in self.x])
 
     @property
     def half(self) -> bool:
-        """Whether it goes one way only."""
+        """Whether the branch leaves in one direction only (a cusp)."""
         return bool(self.ends)
 
     @property
@@ -268,12 +269,12 @@ class BranchCrossing:
     kernel: np.ndarray  # (columns, k) of J
     left: np.ndarray  # (rows, l)
     curves: list[BranchCurve]
-    decided: bool  # whether the second order told all of them
-    endless: tuple[str, ...]  # drives (see `DRIVES`) that infinitely many directions answer
+    decided: bool  # whether the second order determined all branches
+    endless: tuple[str, ...]  # driver motions (see `DRIVES`) that infinitely many directions allow
 
 
 def branches_through(c: ClosureEquations, x: CurvePoint, limit: float) -> BranchCrossing:
-    """The branches through x; singular values of J below ``limit`` are zero there."""
+    """Find the branches through x; singular values of J below ``limit`` count as zero."""
     r = c.rank(x)
     kept = int((r.values > limit).sum())
     N, U = r.V[:, kept:], r.U[:, kept:]
@@ -297,7 +298,7 @@ def branches_through(c: ClosureEquations, x: CurvePoint, limit: float) -> Branch
 def _possible_drives(
     c: ClosureEquations, x: CurvePoint, r: JacobianRank, retained: int, directions: list[np.ndarray]
 ) -> tuple[str, ...]:
-    """Which drives directions without end answer: all if the driver moves along some, else the signs of a''."""
+    """Driver motions that a continuum of directions allows: all if a' is not zero on it, else by the sign of a''."""
     if np.abs(r.V[-1, retained:]).max() > ZERO_COEFFICIENT:
         return DRIVES
     bends = [-(r.V[-1, :retained] / r.values[:retained]) @ (r.U[:, :retained].T @ c.second(x, n)) for n in directions]
@@ -307,7 +308,7 @@ def _possible_drives(
 
 
 def _sort_key(curve: BranchCurve) -> tuple:
-    """Those along which the driver moves, then those where it turns back, then self-motions."""
+    """Sort key: branches along which the driver moves, then those where it turns back, then self-motions."""
     return (curve.order or 99, -round(abs(float(curve.driver[0])), 6), *np.round(-curve.x[0], 6).tolist())
 
 
@@ -324,7 +325,7 @@ def quadratic_forms(c: ClosureEquations, x: CurvePoint, N: np.ndarray, U: np.nda
 def taylor_branch(
     c: ClosureEquations, x: CurvePoint, r: JacobianRank, retained: int, n: np.ndarray, order: int = 3
 ) -> BranchCurve:
-    """Taylor coefficients of the branch with tangent n; more of them where the driver's vanish."""
+    """Taylor coefficients of the branch with tangent n, up to the first order at which the driver moves."""
     n = _oriented(n)
     N, U = r.V[:, retained:], r.U[:, retained:]
     aside = N - np.outer(n, n @ N)
@@ -353,7 +354,7 @@ def taylor_branch(
 
 
 def _oriented(n: np.ndarray) -> np.ndarray:
-    """The same direction with the driver, or else its largest component, growing."""
+    """Unit vector in this direction, with the sign that makes the driver, or else its largest component, positive."""
     n = n / np.linalg.norm(n)
     lead = n[-1] if abs(n[-1]) > ZERO_COEFFICIENT else n[np.argmax(np.round(np.abs(n), 9))]
     n = n if lead > 0.0 else -n
@@ -361,12 +362,12 @@ def _oriented(n: np.ndarray) -> np.ndarray:
     return n
 
 
-SELF_MOTION_TOLERANCE = 1e-8  # the driver's coordinate does not change by more than this along a self-motion
-SELF_MOTION_STEPS = 6  # steps along it that make sure of that
+SELF_MOTION_TOLERANCE = 1e-8  # largest change of the driver's coordinate along a self-motion
+SELF_MOTION_STEPS = 6  # steps along the branch that verify this
 
 
 def classify(f: ReleasedMechanism, tracer: CurveTracer, x: CurvePoint, s: float, near: np.ndarray) -> Singularity:
-    """Tell what the singular position x is."""
+    """Classify the singular position x."""
     c = f.closure
     r = c.rank(x)
     cross = branches_through(c, x, rank_limit(r))
@@ -403,7 +404,7 @@ def classify(f: ReleasedMechanism, tracer: CurveTracer, x: CurvePoint, s: float,
 
 
 def _driver_order(tracer: CurveTracer, x: CurvePoint, curve: BranchCurve) -> int:
-    """Order of the driver's first derivative along a branch; 0 only if it stays where it is over some steps."""
+    """Order of the driver's first nonzero derivative along a branch; 0 if the driver rests over several steps."""
     if curve.order or curve.half:
         return curve.order
     try:
@@ -416,7 +417,7 @@ def _driver_order(tracer: CurveTracer, x: CurvePoint, curve: BranchCurve) -> int
 
 
 def _finite_motions(f: ReleasedMechanism, x: CurvePoint, k: int, curve: BranchCurve, order: int) -> list[Motion]:
-    """Finite motions along one branch: from a(t) = a1 s + a2 s^2/2 + a3 s^3/6 with s(t) to second order."""
+    """Finite motions along one branch, from a(t) = a1 s + a2 s^2/2 + a3 s^3/6 with s(t) to second order."""
     unit = f.closure.unit
     a = curve.driver * unit
     n, bend = curve.x[0], curve.x[1] if len(curve.x) > 1 else 0.0 * curve.x[0]
@@ -426,7 +427,7 @@ def _finite_motions(f: ReleasedMechanism, x: CurvePoint, k: int, curve: BranchCu
         v, w = f.rates(x, d), f.rates(x, d, e)
         return Motion(k, rate, acceleration, _by_label(f, v), _by_label(f, w))
 
-    if curve.half:  # from rest along one half and back along the other
+    if curve.half:  # starts from rest along one half, or along the other
         return [motion(0.0, float(np.sign(a[0])), 0.0, 1.0 / abs(a[0]))] * 2 if order == 1 else []
     if order == 1:
         out = [motion(1.0, 0.0, 1.0 / a[0], -a[1] / a[0] ** 3 if len(a) > 1 else 0.0)]
@@ -453,14 +454,14 @@ def _branch_result(f: ReleasedMechanism, x: CurvePoint, curve: BranchCurve, orde
 
 
 def _named_motion(f: ReleasedMechanism, x: CurvePoint, d: np.ndarray) -> dict[str, float]:
-    """A motion by names, the largest rate 1."""
+    """Rates by coordinate name, scaled to a largest rate of 1."""
     rates = f.rates(x, d)
     lead = rates[np.argmax(np.round(np.abs(rates) / np.abs(rates).max(), 9))]
     return _by_label(f, rates / lead)
 
 
 def _named_rows(f: ReleasedMechanism, u: np.ndarray) -> dict[str, float]:
-    """A combination of rows by names, the largest factor 1; rows in metres and in radians as they are."""
+    """Factors of the constraint rows by name, scaled to a largest factor of 1; rows in metres or radians."""
     s = f.closure.c.structure
     real = u * f.closure.row_scale[f.closure.used]
     real = real / real[np.argmax(np.round(np.abs(real) / np.abs(real).max(), 9))]

@@ -1,13 +1,13 @@
-"""Closure equations of a mechanism whose driver is released: F(x) = (g(q), c(q) - a) = 0 of x = (q, a).
+"""Closure equations of a mechanism with a released driver: F(x) = (g(q), c(q) - a) = 0 with x = (q, a).
 
-The driver's law gives way to the parameter a, the value of its coordinate c. Steps d = (velocities, a) are made
-without dimension: lengths are divided by the mechanism's, angles are in radians, and so are rows. F is a function
-of the step d from a point, F(x + d), on flat space; its first two derivatives at d = 0 are what the compiled system
-gives: J = [G | -e], and F''[d, d] = -gamma at the velocity d, since a velocity that stays constant is a straight
-step to second order. Higher ones come from F itself along a polynomial of d, sampled and fitted to rounding.
+The law of the driver is replaced by the parameter a, the value of its coordinate c. Steps d = (velocities, a) are
+dimensionless: lengths are divided by the mechanism's length, angles are in radians; rows are scaled likewise. F is a
+function of the step d from a point, F(x + d), on a flat space. The compiled system gives its first two derivatives at
+d = 0: J = [G | -e], and F''[d, d] = -gamma at the velocity d, since a constant velocity is a straight step to second
+order. Higher derivatives come from samples of F along a polynomial of d, fitted to rounding.
 
-All coordinates of joints and bodies become rows behind the mechanism's own, so that their values, gradients and
-accelerations come from the formulas that the motion uses, and every vector can be listed by names.
+Rows for all coordinates of joints and bodies are appended to the constraints. Their values, gradients and accelerations
+then come from the same formulas as the motion, and every vector can be listed by coordinate names.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from ..model.joint import Joint
 from ..model.model import Model, listing, suggest
 from ..tables.table_definitions import PLANAR
 
-CLOSURE_RESIDUAL = 1e-11  # what Newton's method may leave of F
+CLOSURE_RESIDUAL = 1e-11  # residual of F after Newton's method
 CLOSURE_ITERATIONS = 30
-SAMPLED_STEP = 0.3  # the largest part of a sampled step [1]
+SAMPLED_STEP = 0.3  # largest component of a sampled step [1]
 SAMPLES = 17
-ZERO_SINGULAR_VALUE = 1e-11  # a singular value below this part of the largest is none
+ZERO_SINGULAR_VALUE = 1e-11  # singular values below this part of the largest count as zero
 
 
 class CurvePoint(NamedTuple):
-    """A point of the curve: coordinates, the driver's coordinate in its own unit, turns and places on curves."""
+    """A point of the curve: coordinates, driver's coordinate in its own unit, and turn counters and curve positions."""
 
     q: np.ndarray
     a: float
@@ -54,12 +54,12 @@ class JacobianRank:
     V: np.ndarray
 
     def below(self, limit: float) -> int:
-        """How many dimensions the kernel has, values below ``limit`` counted as zero."""
+        """Dimension of the kernel if values below ``limit`` count as zero."""
         return int((self.values < limit).sum())
 
 
 class ClosureEquations:
-    """F, its derivatives, and Newton's method; the last component of every step is the driver's."""
+    """F, its derivatives, and Newton's method; the last component of every step belongs to the driver."""
 
     def __init__(self, c: CompiledMechanism, rows: int, drive: int) -> None:
         s = c.structure
@@ -70,7 +70,7 @@ class ClosureEquations:
         self.row_scale = np.array([1.0 / length if units[k] == "m" else 1.0 for k in range(len(s.rows))])
         self.used = np.r_[np.arange(rows), drive]
         self.turning = bool(s.rows[drive].wrap)
-        self.unit = 1.0 if self.turning or units[drive] != "m" else length  # of the driver's coordinate
+        self.unit = 1.0 if self.turning or units[drive] != "m" else length  # unit of the driver's coordinate
 
     @property
     def columns(self) -> int:
@@ -78,17 +78,17 @@ class ClosureEquations:
         return len(self.scale) + 1
 
     def moved(self, x: CurvePoint, d: np.ndarray) -> CurvePoint:
-        """The point a step d away."""
+        """The point after a step d."""
         q = x.q.copy()
         retract(self.c.values.system, q, d[:-1] * self.scale)
         return CurvePoint(q, x.a + float(d[-1]) * self.unit, x.z)
 
     def at(self, x: CurvePoint) -> CurvePoint:
-        """The point with its turns and places brought up to date."""
+        """The point with its turn counters and curve positions updated."""
         return self.evaluated(x, np.zeros(len(self.scale)))
 
     def evaluated(self, x: CurvePoint, v: np.ndarray) -> CurvePoint:
-        """The same with kinematics and rows at the velocities v left in the compiled system."""
+        """Like `at`; leaves kinematics and rows at the velocities v in the compiled system."""
         self.c.z = x.z.copy()
         self.c.at(0.0, x.q, v)
         return CurvePoint(x.q, x.a, self.c.z.copy())
@@ -120,7 +120,7 @@ class ClosureEquations:
         return JacobianRank(U, values, Vt.T)
 
     def second(self, x: CurvePoint, d: np.ndarray) -> np.ndarray:
-        """F''[d, d], exactly: minus gamma at the velocity d."""
+        """F''[d, d], exact: minus gamma at the velocity d."""
         self.evaluated(x, d[:-1] * self.scale)
         out = -self.c.work.rows.gamma[self.used] * self.row_scale[self.used]
         out[-1] *= 1.0 / self.unit / self.row_scale[self.drive]
@@ -141,9 +141,9 @@ class ClosureEquations:
         return _chebyshev_to_powers(SAMPLES) @ series / h ** np.arange(SAMPLES)[:, None]
 
     def close(self, x: CurvePoint, retained: int | None = None) -> tuple[CurvePoint, JacobianRank, float] | None:
-        """The nearest point of the curve, by Newton's method: it, its rank, and how far it was; None if there is none.
+        """Newton's method: (nearest point of the curve, rank there, distance), or None if it fails.
 
-        ``retained`` singular values count (all but one if not told), so that what redundancy leaves out is left out.
+        Only the ``retained`` largest singular values are used (by default all but one), which excludes redundant rows.
         """
         retained = self.columns - 1 if retained is None else retained
         total = 0.0
@@ -166,7 +166,7 @@ class ClosureEquations:
         return x, self.rank(x), total
 
     def way(self, x: CurvePoint, y: CurvePoint) -> np.ndarray:
-        """The step from x to y; whole turns do not count."""
+        """The step from x to y, without whole turns."""
         S = self.c.values.system
         d = np.append(tangent_step(self.c, x.q, y.q), y.a - x.a)
         for b in range(len(S.tree.parent)):
@@ -181,7 +181,7 @@ class ClosureEquations:
 
 
 def _chebyshev_to_powers(n: int) -> np.ndarray:
-    """Coefficients of powers from those of Chebyshev polynomials, (n, n)."""
+    """Matrix (n, n) from coefficients of Chebyshev polynomials to those of powers."""
     T = np.zeros((n, n))
     T[0, 0] = T[1, 1] = 1.0
     for k in range(2, n):
@@ -192,16 +192,16 @@ def _chebyshev_to_powers(n: int) -> np.ndarray:
 
 @dataclass
 class ReleasedMechanism:
-    """The equations, where the mechanism starts, and the names of what moves."""
+    """Closure equations with the start of the mechanism and the names of its coordinates."""
 
     model: Model
     driver: Driver
     closure: ClosureEquations
     start: CurvePoint
-    labels: list[str]  # of coordinates, then of the angular velocities of spatial bodies
-    units: list[str]  # of coordinates ("m" or "rad"); of angular velocities "rad"
+    labels: list[str]  # names of coordinates, then of angular velocities of spatial bodies
+    units: list[str]  # units of coordinates ("m" or "rad"), and "rad" for angular velocities
     row_of: list[int]  # row of each coordinate
-    coordinates: int  # how many labels are coordinates
+    coordinates: int  # number of labels that are coordinates
 
     @property
     def unit(self) -> str:
@@ -209,7 +209,7 @@ class ReleasedMechanism:
         return self.units[self.labels.index(self.driver.coordinate)]
 
     def values(self, x: CurvePoint, near: np.ndarray | None = None) -> np.ndarray:
-        """Values of the coordinates; angles are those next to ``near``."""
+        """Values of the coordinates; whole turns of angles are chosen nearest to ``near``."""
         self.closure.residual(x)
         out = self.closure.c.work.rows.value[self.row_of].copy()
         if near is not None:
@@ -235,7 +235,7 @@ class ReleasedMechanism:
         return np.r_[out, np.concatenate(turning)] if turning else out
 
     def outline(self, x: CurvePoint) -> list[tuple[str, str, np.ndarray]]:
-        """(body, joint, point in the world) of everything that a joint attaches to."""
+        """(body, joint, point in world axes) of every joint attachment."""
         self.closure.at(x)
         s = self.closure.c.structure
         names = {b: name for name, b in s.place.items()}
@@ -247,12 +247,12 @@ class ReleasedMechanism:
 
 
 def release_driver(model: Model, driver: str, t: float, parameters: Mapping[str, float] | None) -> ReleasedMechanism:
-    """Assemble as described, then take the driver's law away; the other drivers stay where they are at time t.
+    """Assemble as described, then release the driver; the other drivers are held at their values at time t.
 
     Raises
     ------
     ModelError
-        If there is no such driver, or constraints restrain velocities only.
+        If there is no such driver, or some constraints are on velocities only.
     AssemblyError
         If the start cannot be assembled.
     """
@@ -295,7 +295,7 @@ def release_driver(model: Model, driver: str, t: float, parameters: Mapping[str,
 
 
 def _coordinate_names(model: Model) -> list[str]:
-    """Every coordinate that a driver could drive: of joints, of bodies, and what drivers drive beside."""
+    """All coordinates that a driver can drive: of joints, of bodies, and those with a driver now."""
     axes = ("x", "y", "angle") if model.planar else ("x", "y", "z")
     out = [f"{j.name}.{what}" for j in model.joints for what in j.measured(model.planar)]
     out += [f"{b.name}.{axis}" for b in model.bodies for axis in axes]
@@ -307,7 +307,7 @@ def _is_named(name: str, drivers: list[Driver]) -> bool:
 
 
 def _stopped_driver(model: Model, d: Driver, t: float, env: Mapping[str, float]) -> Driver:
-    """A driver that stays at what it asks for at time t; one that follows sensors goes on doing so."""
+    """Driver fixed at its value at time t; if its law depends on sensors, only t is fixed."""
     law = model.law(d.law, LawOf(model.unit(d.coordinate, d)), f"law of {d.title}", driver=True)
     if law.names <= {"t", *env}:
         return replace(d, law=float(law.evaluate({**env, "t": t}, tables={x.name: x for x in model.tables})))
@@ -315,7 +315,7 @@ def _stopped_driver(model: Model, d: Driver, t: float, env: Mapping[str, float])
 
 
 def _with_whole_turns(f: ReleasedMechanism, a: Assembly, value: float, t: float, env: Mapping[str, float]) -> float:
-    """The driver's coordinate at the start with the whole turns of its law."""
+    """Driver's coordinate at the start, with the whole turns of its law."""
     law = f.model.law(f.driver.law, LawOf(f.unit), f"law of {f.driver.title}", driver=True)
     if f.unit != "rad" or not law.names <= {"t", *env}:
         return value

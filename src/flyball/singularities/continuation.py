@@ -1,13 +1,13 @@
 """Continuation of a driven mechanism's curve by pseudo-arc length, and location of the singular points on it.
 
-Prediction by tangent and curvature, correction by Newton's method at right angles. No step turns the tangent by
-more than a few degrees. Between two nodes the cubics through the values and the exact slopes of what vanishes at
-singular points (the driver's part of the tangent, the smallest singular value of J) say whether one may lie there,
-also where nothing changes its sign.
+Prediction uses tangent and curvature; correction uses Newton's method perpendicular to the tangent. No step turns the
+tangent by more than a few degrees. Two quantities vanish at singular points: the driver's component of the tangent and
+the smallest singular value of J. Between two nodes, cubics through their values and exact slopes show whether a
+singular point may lie there, also if no sign changes.
 
-Where the driver turns back (its component of the tangent vanishes, J keeps its rank) the root of that component is
-the point. Where J loses rank, the derivatives of the bifurcation function phi(y) = U^T F(x + N y + ...) vanish
-(Lyapunov and Schmidt's reduction); Newton's method on these converges also where no determinant changes its sign.
+Where the driver turns back (its component of the tangent vanishes, J keeps its rank) the point is the root of that
+component. Where J loses rank, the derivatives of the bifurcation function phi(y) = U^T F(x + N y + ...) vanish
+(Lyapunov-Schmidt reduction). Newton's method on these converges also where no determinant changes its sign.
 
 Source: H. B. Keller (1977); E. L. Allgower, K. Georg, Numerical Continuation Methods (1990), chapters 2, 6 and 8.
 """
@@ -22,18 +22,18 @@ import numpy as np
 from ..errors import NotConverged
 from .closure_equations import ClosureEquations, CurvePoint, JacobianRank
 
-LOST_RANK = 1e-7  # part of the largest singular value below which one counts as zero at a located point
+LOST_RANK = 1e-7  # singular values below this part of the largest count as zero at a located point
 LOCATION_ITERATIONS = 60
-LOCATION_RADIUS = 0.5  # Newton's method may not lead farther away than this [1]
+LOCATION_RADIUS = 0.5  # largest distance that Newton's method may move [1]
 
 
 def rank_limit(r: JacobianRank) -> float:
-    """What counts as zero among singular values."""
+    """Limit below which a singular value counts as zero."""
     return LOST_RANK * float(r.values[0])
 
 
 def locate_branch_point(c: ClosureEquations, x: CurvePoint, dropped: int = 1) -> CurvePoint | None:
-    """The point near x where J loses as many more dimensions of rank as told; None if there is none."""
+    """Point near x where J loses ``dropped`` more dimensions of rank; None if there is none."""
     start = x
     best: tuple[float, CurvePoint] | None = None
     last = np.inf
@@ -41,7 +41,7 @@ def locate_branch_point(c: ClosureEquations, x: CurvePoint, dropped: int = 1) ->
         r = c.rank(x)
         kept = c.columns - 1 - dropped
         U, V = r.U[:, kept:], r.V[:, kept:]
-        if not U.shape[1]:  # fewer rows than that would leave: freedoms, no singular position
+        if not U.shape[1]:  # not enough rows: additional freedoms, no singular position
             return None
         F = c.residual(x)
         aside = -r.V[:, :kept] @ ((r.U[:, :kept].T @ F) / r.values[:kept])
@@ -81,7 +81,7 @@ def _branch_point_residual(c: ClosureEquations, x: CurvePoint, dropped: int) -> 
 
 
 def interior_minimum(f0: float, g0: float, f1: float, g1: float, ds: float) -> tuple[float, float] | None:
-    """Place (0 to 1) and value of the least of the cubic through two values and slopes, if it lies between them."""
+    """Position (0 to 1) and value of the minimum of the cubic through two values and slopes; None if at an end."""
     a, b, c = 2 * (f0 - f1) + ds * (g0 + g1), 3 * (f1 - f0) - ds * (2 * g0 + g1), ds * g0
     for u in np.roots([3 * a, 2 * b, c] if abs(a) > 1e-14 else [2 * b, c] if abs(b) > 1e-14 else [1.0, 9.0]):
         if abs(u.imag) < 1e-12 and 0.0 < u.real < 1.0 and 6 * a * u.real + 2 * b > 0.0:
@@ -90,13 +90,14 @@ def interior_minimum(f0: float, g0: float, f1: float, g1: float, ds: float) -> t
     return None
 
 
-MAX_TURN = 0.12  # the most that a step may turn the tangent [rad]
-SHORTEST_STEP = 1e-7  # the shortest step [1]
-SAME_POINT = 1e-5  # points nearer than this are one [1]
-SMALL_SINGULAR_VALUE = 0.1  # part of the largest singular value below which others may vanish together with the least
-HALF_TURN = 3.0  # of a driver's angle [rad]
-STATIONARY_DRIVER = 1e-8  # a driver's part of the tangent below this is none
-AVOIDED_SINGULAR_VALUE = 1e-6  # singular values below this are avoided by changing the step
+MAX_TURN = 0.12  # largest rotation of the tangent in one step [rad]
+SHORTEST_STEP = 1e-7  # shortest step [1]
+SAME_POINT = 1e-5  # points nearer than this are equal [1]
+# Singular values below this part of the largest may vanish together with the smallest one.
+SMALL_SINGULAR_VALUE = 0.1
+HALF_TURN = 3.0  # change of a driver's angle [rad] that shows a whole turn
+STATIONARY_DRIVER = 1e-8  # driver's components of the tangent below this count as zero
+AVOIDED_SINGULAR_VALUE = 1e-6  # a step to a smaller singular value than this is changed
 
 BRANCH_LOST = "the curve cannot be followed away from a singular position along the branch chosen"
 
@@ -108,19 +109,19 @@ class CurveNode:
     s: float
     x: CurvePoint
     t: np.ndarray  # unit tangent
-    bend: np.ndarray  # x'' by arc length
-    value: float  # smallest singular value of J that does not belong to the tangent
+    bend: np.ndarray  # second derivative of x by arc length
+    value: float  # smallest singular value of J besides that of the tangent
     slope: float
 
     @property
     def drive(self) -> float:
-        """The driver's part of the tangent."""
+        """Driver's component of the tangent."""
         return float(self.t[-1])
 
 
 @dataclass
 class TracedCurve:
-    """One direction of the curve from a point: nodes, singular points (arc length, place), and why it ends."""
+    """One direction of the curve from a point: nodes, singular points (arc length, point), and why it ends."""
 
     nodes: list[CurveNode] = field(default_factory=list)
     found: list[tuple[float, CurvePoint]] = field(default_factory=list)
@@ -128,13 +129,13 @@ class TracedCurve:
 
 
 class CurveTracer:
-    """Follows the curve of a closure."""
+    """Follows the solution curve of closure equations."""
 
     def __init__(self, c: ClosureEquations, step: float) -> None:
         self.c, self.step = c, step
 
     def node(self, s: float, x: CurvePoint, r: JacobianRank, along: np.ndarray) -> CurveNode:
-        """A node at a point with the rank r, its tangent in the direction ``along``."""
+        """Node at a point with the rank r, with its tangent in the direction ``along``."""
         c = self.c
         n = c.columns - 1
         t = r.V[:, n] * (1.0 if r.V[:, n] @ along > 0.0 else -1.0)
@@ -145,7 +146,7 @@ class CurveTracer:
         return CurveNode(s, x, t, bend, float(r.values[n - 1]), slope)
 
     def step_from(self, node: CurveNode, h: float) -> CurveNode | None:
-        """The node at a distance h (or -h, backwards) from one, if it can be reached in one step."""
+        """Node at the distance h (backwards if negative) from another; None if one step does not reach it."""
         predicted = self.c.at(self.c.moved(node.x, h * node.t + 0.5 * h * h * node.bend))
         found = self.c.close(predicted)
         if found is None or found[2] > 0.3 * abs(h) + 1e-9:
@@ -157,7 +158,7 @@ class CurveTracer:
         return None if turned > 0.5 * MAX_TURN + 0.5 * abs(h) * MAX_TURN else new
 
     def off(self, x: CurvePoint, n: np.ndarray, bend: np.ndarray) -> CurveNode:
-        """A regular node a small step away from a point in the direction n of one of its branches."""
+        """Regular node a small step from a point, in the direction n of one of its branches."""
         for h in (0.02, 0.01, 0.005, 0.002, 0.03, 5e-4):
             found = self.c.close(self.c.at(self.c.moved(x, h * n + 0.5 * h * h * bend)))
             if found is not None and found[2] < 0.2 * h and found[1].values[self.c.columns - 2] > 1e-5 * h:
@@ -165,7 +166,7 @@ class CurveTracer:
         raise NotConverged(BRANCH_LOST)
 
     def onto(self, x: CurvePoint, d: np.ndarray) -> CurveNode:
-        """A regular node a step d away from a point."""
+        """Regular node a step d from a point."""
         found = self.c.close(self.c.at(self.c.moved(x, d)))
         if found is None:
             raise NotConverged(BRANCH_LOST)
@@ -174,7 +175,7 @@ class CurveTracer:
     def follow(
         self, first: CurveNode, within: Callable[[float], bool], steps: int, home: CurveNode | None
     ) -> TracedCurve:
-        """Go on from a node until the driver's coordinate leaves what it may be, or the curve closes."""
+        """Follow the curve from a node until the driver's coordinate leaves its range or the curve closes."""
         way = TracedCurve([first])
         h = self._longest(first)
         while True:
@@ -188,7 +189,8 @@ class CurveTracer:
             if not within(new.x.a):
                 way.end = "end of the range"
                 return way
-            again = home is not None and abs(new.x.a - home.x.a) < HALF_TURN  # a whole turn on is another value
+            # After a whole turn the driver has another value.
+            again = home is not None and abs(new.x.a - home.x.a) < HALF_TURN
             if home is not None and again and new.s - first.s > 4.0 * self.step and self._home(new, home):
                 way.end = "closed"
                 return way
@@ -251,7 +253,7 @@ class CurveTracer:
         return bool(max(np.linalg.norm(self.c.way(k.x, x)) for k in (m, n)) < 1.2 * ds + 1e-9)
 
     def _turned(self, m: CurveNode, n: CurveNode, way: TracedCurve) -> None:
-        """The root of the driver's part of the tangent, by secants that keep it between."""
+        """Root of the driver's component of the tangent, by bracketed secant steps."""
         from scipy.optimize import brentq
 
         def drive(s: float) -> float:
@@ -270,7 +272,7 @@ class CurveTracer:
             self._note(s, at[0].x, way)
 
     def _touched(self, m: CurveNode, n: CurveNode, way: TracedCurve) -> None:
-        """Where the driver's part of the tangent comes nearest to zero: two roots, a double one, or none."""
+        """Minimum of the driver's component of the tangent: two roots, a double one, or none."""
         low, high = m, n
         sign = 1.0 if m.drive > 0.0 else -1.0
         for _ in range(60):

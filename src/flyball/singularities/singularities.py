@@ -1,4 +1,4 @@
-"""Singular positions of driven mechanisms: found along the curve that the driver leads through, and classified.
+"""Singular positions of a driven mechanism: located along its motion curve, and classified.
 
 Source: H. Hahn, Rigid Body Dynamics of Mechanisms 1 (2002), section 3.1.3 (regular and singular positions of a
 slider-crank); theory of branching after H. B. Keller (1977).
@@ -31,13 +31,13 @@ from .continuation import (
     rank_limit,
 )
 
-START_TOLERANCE = 1e-4  # a start this near to a singular position is drawn there [1]
-RANGE_TOLERANCE = 1e-9  # of the range: how far beyond its ends a singular position may lie
+START_TOLERANCE = 1e-4  # a start nearer than this to a singular position is moved onto it [1]
+RANGE_TOLERANCE = 1e-9  # distance beyond the ends of the range allowed for a singular position, relative to the range
 
 
 @dataclass(frozen=True, kw_only=True)
 class SingularitiesOptions(Options):
-    """What `Mechanism.singularities` is asked."""
+    """Arguments of `Mechanism.singularities`."""
 
     driver: str
     range: Sequence[float | str]
@@ -65,7 +65,7 @@ def singularities(model: Model, o: SingularitiesOptions) -> Singularities:
 def _traced_singularities(
     f: ReleasedMechanism, tracer: CurveTracer, ends: tuple[float, float], branch: Branch | int | None, steps: int
 ) -> Singularities:
-    """The curve both ways from its start, and what is singular on it."""
+    """Trace the curve in both directions from its start, with its singular positions."""
     x, curve, first = _start_point(f, tracer, branch)
     low, high = min(*ends, x.a), max(*ends, x.a)
     room = RANGE_TOLERANCE * (high - low)
@@ -100,7 +100,7 @@ def _driver_range(
 def _start_point(
     f: ReleasedMechanism, tracer: CurveTracer, branch: Branch | int | None
 ) -> tuple[CurvePoint, BranchCurve | None, bool]:
-    """Where to start, along which curve if it is a singular position, and whether it is to be reported."""
+    """Start point, the branch to follow if it is a singular position, and whether that is to be reported."""
     c = f.closure
     if isinstance(branch, Branch):
         x, curve = branch.origin
@@ -125,7 +125,7 @@ def _start_point(
 
 
 def _snapped_to_singular(f: ReleasedMechanism, tracer: CurveTracer, x: CurvePoint) -> CurvePoint:
-    """The singular position that the start is drawn at, up to rounding; else the start."""
+    """The singular position at the start if it is that within the tolerance; else the start."""
     c = f.closure
     closed = c.close(x)
     if closed is not None and np.linalg.norm(c.way(x, closed[0])) < START_TOLERANCE:
@@ -146,7 +146,7 @@ def _snapped_to_singular(f: ReleasedMechanism, tracer: CurveTracer, x: CurvePoin
 def _traced_directions(
     tracer: CurveTracer, x: CurvePoint, curve: BranchCurve | None, ends: tuple[float, float], within, steps: int
 ) -> list[TracedCurve]:
-    """The curve from x forward, to where the range leads, and backward."""
+    """The curve from x forward, towards the end of the range, and backward."""
     c = tracer.c
     r = c.rank(x)
     toward = 1.0 if ends[1] > ends[0] else -1.0
@@ -168,7 +168,7 @@ def _traced_directions(
 
 
 def _ordered_nodes(tracer: CurveTracer, curves: list[TracedCurve], low: float, high: float) -> list[CurveNode]:
-    """All nodes in order; the last of each way is drawn back to the end of the range."""
+    """All nodes in order; the last node of each direction is moved back to the end of the range."""
     forward, back = (_cut_to_range(tracer, way, low, high) for way in curves)
     backward = [CurveNode(-n.s, n.x, -n.t, n.bend, n.value, -n.slope) for n in reversed(back)]
     if backward and forward and backward[-1].s == forward[0].s == 0.0:
@@ -187,7 +187,7 @@ def _cut_to_range(tracer: CurveTracer, way: TracedCurve, low: float, high: float
     def beyond(h: float) -> float:
         return (tracer.step_from(before, h) or last).x.a - goal if h > 0.0 else before.x.a - goal
 
-    if beyond(0.0) * (last.x.a - goal) >= 0.0:  # the last but one is the end
+    if beyond(0.0) * (last.x.a - goal) >= 0.0:  # the last but one node is the end
         return [*inside, before]
     h = brentq(beyond, 0.0, last.s - before.s, xtol=1e-13)
     return [*inside, before, tracer.step_from(before, h) or last]
@@ -200,7 +200,7 @@ def _refuse_unreachable(
     ends: tuple[float, float],
     places: list[tuple[float, CurvePoint]],
 ) -> None:
-    """Refuse a range that the curve never comes to."""
+    """Refuse a range that the curve does not reach."""
     least, most = min(ends), max(ends)
     values = [n.x.a for n in nodes] + [p.a for _, p in places] + [x.a]
     if min(values) <= most + RANGE_TOLERANCE and max(values) >= least - RANGE_TOLERANCE:
@@ -241,7 +241,7 @@ def _no_freedom_error(f: ReleasedMechanism) -> MobilityError:
 
 
 def _refuse_extra_freedoms(f: ReleasedMechanism, x: CurvePoint) -> None:
-    """Refuse freedoms besides the driver's: positions nearby have them too."""
+    """Refuse freedoms besides the driver's that exist at nearby positions, too."""
     c = f.closure
     r = c.rank(x)
     kept = int((r.values > rank_limit(r)).sum())
@@ -257,7 +257,7 @@ def _refuse_extra_freedoms(f: ReleasedMechanism, x: CurvePoint) -> None:
                 least, extra = free, near[1].V[:, c.columns - free :]
     if least == 1 or not extra.shape[1]:
         return
-    held = extra @ null_space(extra[-1:], 0.0)  # those that leave the driver where it is
+    held = extra @ null_space(extra[-1:], 0.0)  # freedoms that do not move the driver
     moving = np.max([np.abs(f.rates(x, d)) for d in held.T], axis=0)
     free_labels = [f.labels[k] for k in np.flatnonzero(moving > 1e-6 * moving.max())]
     joints = [k for k in free_labels if k.partition(".")[0] in {j.name for j in f.model.joints}]
@@ -272,7 +272,7 @@ def _refuse_extra_freedoms(f: ReleasedMechanism, x: CurvePoint) -> None:
 
 
 def _nearest_values(f: ReleasedMechanism, out: Singularities, x: CurvePoint, s: float) -> np.ndarray:
-    """Coordinates next to which those of a singular position are, for the whole turns of angles."""
+    """Coordinates of the node nearest to a singular position, for the whole turns of its angles."""
     k = int(np.argmin(np.abs(out.s - s)))
     return np.array([v[k] for v in out.values.values()])
 

@@ -1,4 +1,4 @@
-"""Closed contacts at a position: gap, normal, local form of the surfaces, and the forces that carry the load."""
+"""Closed contacts at a position: gap, normal, local shape of the surfaces, and the forces that carry the load."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from ..tables.contact_tables import ContactTables, contact_tables
 from ..tables.reference_configuration import BodyState
 from .stability import RestState
 
-CLOSED_GAP = 1e-6  # gap that is none, in parts of the smallest shape
+CLOSED_GAP = 1e-6  # largest gap of a closed contact, relative to the smallest shape
 
 
 @dataclass(frozen=True)
@@ -54,14 +54,14 @@ class StaticContact:
         ``"block-floor"``, with a number where there are several.
     shapes : tuple of int
     bodies : tuple of str
-        On either side; ``"ground"`` for what stands still.
+        Bodies on both sides; ``"ground"`` for fixed shapes.
     parts : tuple of str
-        The same by the names of parts of ground.
+        The same, with the names of ground parts instead of ``"ground"``.
     point, normal : ndarray (3,)
-        In the world; the normal leads from the first to the second.
+        In world axes; the normal points from the first body to the second.
     gap : float [m]
     friction : float
-        The coefficient of sticking.
+        Coefficient of static friction.
     """
 
     name: str
@@ -75,7 +75,7 @@ class StaticContact:
 
     @property
     def frame(self) -> np.ndarray:
-        """Rows: the normal and two tangents; in the plane the first of these lies in it."""
+        """Rows: the normal and two tangents; in a planar model the first tangent lies in the plane."""
         n = self.normal
         t = np.array([n[1], -n[0], 0.0]) if n[2] == 0.0 else np.array(axes_across(tuple(n))[0])
         return np.array([n, t, np.cross(n, t)])
@@ -83,16 +83,16 @@ class StaticContact:
 
 @dataclass(frozen=True)
 class ContactState:
-    """A position, and what touches there.
+    """A position with its closed contacts.
 
     Attributes
     ----------
     at : Assembly
         In absolute coordinates.
-    scene : Touching
+    scene : ContactTables
     bodies : dict
-        Name -> where its mass centre is, and its axes.
-    contacts : tuple of Closed
+        Name -> position of its mass centre, and its axes.
+    contacts : tuple of StaticContact
     """
 
     at: Assembly
@@ -102,19 +102,19 @@ class ContactState:
 
 
 def find_closed_contacts(model: Model, at: Assembly) -> ContactState:
-    """What touches at a position.
+    """Find the closed contacts at a position.
 
     Parameters
     ----------
     model : Model
-        With its contacts.
+        The model with its contacts.
     at : Assembly
-        Of this model.
+        An assembly of this model.
 
     Raises
     ------
     ModelError
-        If surfaces are such that statics does not know: belts, grains, friction against rolling.
+        If statics does not support a surface: belts, grains, rolling friction.
     """
     scene = contact_tables(model, at.compiled.values.given, [b.name for b in model.bodies])
     refuse_unknown_surfaces(scene)
@@ -144,7 +144,7 @@ def _carrier_name(scene: ContactTables, shape: int) -> str:
 
 
 def refuse_unknown_surfaces(scene: ContactTables) -> None:
-    """Refuse what statics does not know."""
+    """Refuse surfaces that statics does not support."""
     pair = scene.surfaces.pair
     pair = pair[~np.isnan(pair[..., su.STATIC])]
     what = (
@@ -178,22 +178,22 @@ def contact_rows(place: ContactState) -> np.ndarray:
 
 FLAT, EDGE, CORNER, BALL, DISK, ODD = "flat", "edge", "corner", "ball", "disk", "odd"
 SHARP = (FLAT, EDGE, CORNER)
-SHAPE_TOLERANCE = 1e-6  # parts of a unit vector, or of a shape, that are nothing
+SHAPE_TOLERANCE = 1e-6  # deviation of a unit vector, or relative to a shape, that counts as zero
 
 
 @dataclass(frozen=True)
 class SurfaceForm:
-    """One side of a contact.
+    """Local shape of one side of a contact.
 
     Attributes
     ----------
     form : str
-        ``"flat"``; ``"edge"`` or ``"corner"``, whose material point stays the same; ``"ball"`` about a centre;
+        ``"flat"``; ``"edge"`` or ``"corner"``, which touch at a fixed material point; ``"ball"`` about a centre;
         ``"disk"``, the sharp rim about an axle or one end of a cylinder; ``"odd"`` where its curvature is not known.
     centre : ndarray (3,)
-        Of a ball or disk, in the world.
+        Centre of a ball or disk, in world axes.
     axle : ndarray (3,)
-        Of a disk.
+        Axis of a disk.
     radius : float [m]
     """
 
@@ -204,14 +204,14 @@ class SurfaceForm:
 
 
 def surface_form(G: Geometry, M: Movers, shape: int, point: np.ndarray, normal: np.ndarray) -> SurfaceForm:
-    """A shape at a point of its surface.
+    """Local form of a shape at a point of its surface.
 
     Parameters
     ----------
     G, M : Geometry, Movers
     shape : int
     point, normal : ndarray (3,)
-        In the world; the normal leads out of the shape.
+        In world axes; the normal points out of the shape.
     """
     p, R = _shape_pose(G, M, shape)
     x, n = R.T @ (point - p), R.T @ normal
@@ -243,7 +243,7 @@ def _local_form(
     if kind == shape_kinds.BOX:
         return (FLAT, EDGE, CORNER)[min(2, int((np.abs(n) > SHAPE_TOLERANCE).sum()) - 1)], o, 0.0
     if kind == shape_kinds.CAPSULE:
-        z = float(x[2] - par[0] * n[2])  # of the place on the core
+        z = float(x[2] - par[0] * n[2])  # position on the core
         if abs(abs(z) - par[1]) <= SHAPE_TOLERANCE * (par[0] + par[1]):
             return BALL, np.sign(z) * par[1] * up, float(par[0])
         return ODD, o, 0.0
@@ -266,7 +266,7 @@ def _cone_form(par: np.ndarray, x: np.ndarray, n: np.ndarray) -> tuple[str, np.n
         return FLAT, o, 0.0
     if abs(x[2] - par[1]) <= SHAPE_TOLERANCE * par[1]:
         return CORNER, o, 0.0
-    slope = par[1] * n[2] - par[0] * np.hypot(n[0], n[1])  # 0 where the normal is that of the slope
+    slope = par[1] * n[2] - par[0] * np.hypot(n[0], n[1])  # 0 if the normal is that of the lateral surface
     if abs(x[2]) <= SHAPE_TOLERANCE * par[1] and slope < -SHAPE_TOLERANCE * par[1]:
         return DISK, o, float(par[0])
     return ODD, o, 0.0
@@ -275,7 +275,7 @@ def _cone_form(par: np.ndarray, x: np.ndarray, n: np.ndarray) -> tuple[str, np.n
 def _hull_form(
     G: Geometry, shape: int, kind: int, radius: float, x: np.ndarray, n: np.ndarray
 ) -> tuple[str, np.ndarray, float]:
-    """Of a hull or polygon by how many corners are farthest along the normal."""
+    """Form of a hull or polygon, by the number of corners that are farthest along the normal."""
     first, count = int(G.shape_i[shape, FIRST]), int(G.shape_i[shape, COUNT])
     corner = G.vertex[first : first + count]
     reach = corner @ n
@@ -289,24 +289,24 @@ def _hull_form(
     return (CORNER, far[0], 0.0) if radius == 0.0 else (BALL, far[0], radius)
 
 
-FRICTION_LIMIT = 1e-6  # a friction force that lacks less than this part is at its limit
-PARTING_LIMIT = 1e-6  # a normal force below this part of the largest is none
+FRICTION_LIMIT = 1e-6  # friction within this relative distance of its limit counts as at its limit
+PARTING_LIMIT = 1e-6  # a normal force below this part of the largest counts as zero
 
 
 @dataclass(frozen=True)
 class SupportForces:
-    """Reactions and contact forces.
+    """Reactions and contact forces that carry a mechanism at rest.
 
     Attributes
     ----------
     lam : ndarray
         Multipliers of the joints' rows.
     force : ndarray (n, 3) [N]
-        Of the contacts, along their frames, on the second side.
+        Contact forces on the second body, in the contact frames.
     unbalanced : float
-        The largest force or torque left, in parts of the largest that acts.
+        Largest residual force or torque, relative to the largest applied one.
     unique : bool
-        Whether no other forces would carry it too.
+        Whether these are the only forces that balance the load.
     """
 
     lam: np.ndarray
@@ -318,17 +318,16 @@ class SupportForces:
 def support_forces(
     place: ContactState, x: RestState, signs: Mapping[str, float], bears: Mapping[str, float] | None = None
 ) -> SupportForces:
-    """Forces that balance what acts, of those that contacts can bear.
+    """Find reactions and admissible contact forces that balance the applied forces.
 
     Parameters
     ----------
-    place : Place
-    x : Rest
-        There, of the model with stops that touch as drivers.
-    signs : mapping
-        Name of a stop -> +1 if its effort may push upwards only, -1 downwards, 0 either way.
+    place : ContactState
+    x : RestState
+        State at rest at this position, of the model with active stops as constraints.
+        Name of a stop -> +1 if its effort may only be positive, -1 if only negative, 0 for both.
     bears : mapping, optional
-        Name of what sticks -> the most that it bears [N] or [N m].
+        Name of a sticking element -> its friction capacity [N] or [N m].
     """
     c = x.c
     r = EquationDerivatives(MechanismState.resting(c, x.t, x.q)).block("r")
@@ -358,7 +357,7 @@ def support_forces(
 
 
 def _unbalanced_part(x: RestState, r: np.ndarray, found: ForceBalance) -> float:
-    """What is left, in parts of the largest that acts."""
+    """Residual relative to the largest applied force."""
     acts = np.abs(x.scale * force_magnitudes(EquationDerivatives(MechanismState.resting(x.c, x.t, x.q)))).max(
         initial=0.0
     )
@@ -367,14 +366,14 @@ def _unbalanced_part(x: RestState, r: np.ndarray, found: ForceBalance) -> float:
 
 
 def _is_unique(used: np.ndarray, G: np.ndarray, found: ForceBalance) -> bool:
-    """Whether the columns that are there are independent."""
+    """Whether the columns of the active forces are independent."""
     A = np.hstack([G, used.reshape(len(G), -1)])
     A = A[:, np.abs(A).max(axis=0, initial=0.0) > 0.0]
     return bool(np.linalg.matrix_rank(A, tol=1e-10 * max(np.abs(A).max(initial=0.0), 1e-300)) == A.shape[1])
 
 
 def contact_table(place: ContactState, force: np.ndarray) -> Contacts:
-    """The contacts of the place as a table of one time."""
+    """The contacts of a position as a table with one time."""
     scene, n = place.scene, len(place.contacts)
     names = [*scene.carriers.names, "ground"]
     number = {name: k for k, name in enumerate(names)}

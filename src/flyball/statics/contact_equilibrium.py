@@ -1,7 +1,7 @@
 """Equilibrium with contact: settling by impulse steps, the forces that carry the mechanism, and its stability.
 
-Whenever the kinetic energy has passed a peak all velocities are set to zero (kinetic damping: Cundall 1976), so
-that what swings settles in a few swings, and what sticks never moves. Laws see a constant time meanwhile.
+Whenever the kinetic energy has passed a peak, all velocities are set to zero (kinetic damping: Cundall 1976). An
+oscillation then settles within a few swings, and what sticks never moves. Time is constant for all laws meanwhile.
 """
 
 from __future__ import annotations
@@ -59,21 +59,22 @@ from .replacement_joints import (
 from .stability import RestState
 
 SETTLING_STEPS = 40_000
-SETTLING_TRAVEL = 20.0  # way in the mechanism's lengths after which nothing will hold it any more
-STEP_FRACTION = 0.04  # a step, in parts of the time in which the smallest shape would fall by its own size
-REST_ACCELERATION = 1e-7  # acceleration from rest, in parts of what it would be without contact
+SETTLING_TRAVEL = 20.0  # travel, in lengths of the mechanism, after which settling has failed
+# Step size relative to the time in which the smallest shape falls by its own size.
+STEP_FRACTION = 0.04
+REST_ACCELERATION = 1e-7  # acceleration at rest, relative to the acceleration without contact
 SETTLING_ITERATIONS = 400
 
 
 def settled_assembly(model: Model, base: Assembly, parameters: Mapping[str, float] | None) -> Assembly:
-    """The mechanism where it has come to rest; absolute coordinates.
+    """Let a mechanism settle; returns the assembly at rest, in absolute coordinates.
 
     Parameters
     ----------
     model : Model
-        With its contacts.
+        The model with its contacts.
     base : Assembly
-        Where it begins: as assembled.
+        The initial position, as assembled.
     parameters : mapping, optional
 
     Raises
@@ -114,16 +115,16 @@ def settled_assembly(model: Model, base: Assembly, parameters: Mapping[str, floa
 
 
 class _Settling:
-    """The way to rest.
+    """Settling of a mechanism by impulse steps.
 
     Parameters
     ----------
-    scene : Touching
+    scene : ContactTables
     stepper : Stepper
-    held : Held, optional
+    held : MechanismMotion, optional
     h : float [s]
     base : Assembly
-        Where it begins.
+        The initial position.
     """
 
     def __init__(
@@ -136,7 +137,7 @@ class _Settling:
         self.usual = float(np.abs(vdot * self.size / c.sizes).max(initial=0.0))  # acceleration without contact
 
     def walk(self, name: str) -> None:
-        """Step until nothing moves that begins at rest."""
+        """Step until a step from rest causes no motion."""
         before, rested, begun = 0.0, True, self.stepper.movers.pose[:, :3].copy()
         self._stop()
         for _ in range(SETTLING_STEPS):
@@ -165,7 +166,7 @@ class _Settling:
         s.run(1, self.h)
 
     def _stop(self) -> None:
-        """All velocities to zero."""
+        """Set all velocities to zero."""
         s = self.stepper
         s.workspaces.X.v[:], s.workspaces.X.wide[:], s.movers.twist[:] = 0.0, 0.0, 0.0
         if self.held:
@@ -185,12 +186,12 @@ class _Settling:
         return self.held.start.assembly.compiled  # type: ignore[union-attr]
 
     def _mechanism_velocities(self) -> np.ndarray:
-        """Velocities of the mechanism."""
+        """View of the velocities of the mechanism."""
         own = self._mechanism().structure
         return self.stepper.joints.clock.y[0, own.nq : own.nq + own.nv]
 
     def _speeds(self) -> dict[str, float]:
-        """Of every body [m/s]: of its centre, and of turning at the radius of gyration."""
+        """Speed of every body [m/s]: of its centre, and of its rotation at the radius of gyration."""
         s, at = self.stepper, self.scene.carriers
         n = len(s.free.turn)
         v = s.workspaces.X.v[:n]
@@ -210,34 +211,35 @@ class _Settling:
         speed = self._speeds()
         who = max(speed, key=lambda k: speed[k])
         return NotConverged(
-            f"{name!r} does not come to rest: after {SETTLING_STEPS * self.h:.3g} s {who!r} still moves at {speed[who]:.3g} "
-            f"m/s: it falls, slides or rolls away. Hold it by friction, a stop or a spring, or begin nearer to "
-            f"where it rests",
+            f"{name!r} does not come to rest: after {SETTLING_STEPS * self.h:.3g} s {who!r} still moves at "
+            f"{speed[who]:.3g} m/s: it falls, slides or rolls away. Hold it by friction, a stop or a spring, "
+            f"or begin nearer to where it rests",
             speed,
         )
 
 
 HoldingParts = tuple[ActiveConstraints, Mapping[str, float]]
-"""What holds besides contacts, and the most that each part that sticks bears."""
-CORRECTION_LIMIT = 0.02  # a way in parts of the mechanism's length, or radians, that what rests is put right by
-REST_BALANCE = 1e-6  # forces left, of those that act, above which it does not rest
+"""Active constraints besides contacts, and the capacity of each sticking part."""
+# Largest correction of the settled position by Newton's method [rad, or relative to the mechanism's length].
+CORRECTION_LIMIT = 0.02
+REST_BALANCE = 1e-6  # largest residual of a state at rest, relative to the applied forces
 
 
 def contact_equilibrium(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) -> Equilibrium:
-    """Where a mechanism comes to rest, and what carries it there.
+    """Find where a mechanism comes to rest, and the forces that carry it there.
 
     Parameters
     ----------
     model : Model
         With its contacts.
     begin : Assembly
-        Where it begins.
+        The initial position.
     parameters : mapping, optional
 
     Raises
     ------
     ModelError
-        If it has many bodies, or surfaces that statics does not know.
+        If the model has bulk material or surfaces that statics does not support.
     NotConverged
         If it does not come to rest.
     """
@@ -258,12 +260,12 @@ def contact_equilibrium(model: Model, begin: Assembly, parameters: Mapping[str, 
 
 
 def _rest_contacts(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) -> ContactState:
-    """Where it comes to rest: where it is described, if what holds it bears that; else by steps of impulses.
+    """Contacts at the position of rest: as described if forces balance there, else found by impulse steps.
 
     Raises
     ------
     NotConverged
-        If it does not rest there, and has parts that steps by impulses do not know.
+        If it does not rest as described and has parts that impulse stepping does not support.
     """
     place = find_closed_contacts(model, begin)
     bare, held = model_without_contacts(model, place.at)
@@ -282,14 +284,14 @@ def _rest_contacts(model: Model, begin: Assembly, parameters: Mapping[str, float
 
 
 def _rest_state(bare: Model, place: ContactState, parameters: Mapping[str, float] | None) -> RestState:
-    """The model with what holds as constraints, at rest at a place."""
+    """State at rest of the model without contacts, with active constraints, at a position."""
     c = compile_mechanism(bare, parameters=parameters)
     q, _ = c.take(place.at.compiled, place.at.t, place.at.q, 0.0 * place.at.v)
     return RestState(c, place.at.t, q, np.zeros(len(c.structure.rows)))
 
 
 def refuse_bulk_and_events(model: Model, analysis: str) -> None:
-    """Refuse many bodies, and events."""
+    """Refuse bulk material and events."""
     if model.events:
         without = ", ".join(f"{e.name!r}: None" for e in model.events)
         raise ModelError(
@@ -302,14 +304,14 @@ def refuse_bulk_and_events(model: Model, analysis: str) -> None:
 
 
 def contacts_as_described(model: Model, t: float, parameters: Mapping[str, float] | None) -> ContactState:
-    """What touches as described."""
+    """Contacts in the described position."""
     return find_closed_contacts(model, assemble(model, t=t, parameters=parameters))
 
 
 def _stability_with_joints(
     model: Model, bare: Model, place: ContactState, parameters: Mapping[str, float] | None
 ) -> tuple[ContactState, Equilibrium | None, str]:
-    """The place put right to rounding by the closed contacts as joints, and what these say of its stability."""
+    """Correct the position with closed contacts as joints; (position, its equilibrium or None, missing joints)."""
     joined, missing = model_with_contact_joints(bare, place)
     if missing:
         return place, None, missing_joints_text(missing)
@@ -370,7 +372,7 @@ def _contact_equilibrium_result(
 def touch_states(
     place: ContactState, found: SupportForces, x: RestState, held: ActiveConstraints, bears: Mapping[str, float]
 ) -> tuple[Touch, ...]:
-    """What every closed contact does, and all else that holds."""
+    """State of every closed contact and of every other active constraint."""
     out = []
     lam = {name: float(found.lam[x.c.structure.slices[name]].sum()) for name in held.signs}
     stops = {name: sign * lam[name] for name, sign in held.signs.items() if name not in bears}
@@ -393,7 +395,7 @@ def touch_states(
 
 
 def _equilibrium_notes(touches: tuple[Touch, ...], found: SupportForces, missing: str) -> tuple[str, ...]:
-    """What has to be said besides."""
+    """Notes for the result."""
     out = []
     for state, rule in (
         (ABOUT_TO_PART, "nothing is carried there; what is said holds while it stays closed"),

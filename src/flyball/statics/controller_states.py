@@ -1,18 +1,19 @@
 """Controllers in the linear equations: states as velocities of auxiliary bodies; sampled controllers.
 
-A state z with the rate f is the velocity v of an auxiliary body of mass m on a slide of its own, which nothing else
-touches, under the force p f. Where laws name z they name z_0 + s v, so that all bodies rest where small motions are
-asked about, and s m = p: then z' = f. The position of such a body has no meaning: its rows and columns are left out
-of what is reported. For an equilibrium the position stands for z = z_0 + s x: the body is at rest where f = 0.
+A controller state z with the rate f is represented by the velocity v of an auxiliary body of mass m. The body moves on
+its own slide, touches nothing, and carries the force p f. Laws that name z name z_0 + s v instead, so that all
+auxiliary bodies rest at the operating point; with s m = p this gives z' = f. The position of such a body has no
+meaning: its rows and columns are left out of the results. For an equilibrium the position x represents the state,
+z = z_0 + s x: the body is at rest where f = 0.
 
-The scales s and p make states and rates as large as what they are compared with, whatever their units: a change of
-a state is large if the forces that it makes are as large as what acts in the mechanism; a rate is large if large
-changes make it (equilibration: van der Sluis 1969). Errors about the auxiliary model are put in the terms of the
-user's model.
+The scales s and p bring states and rates to the size of the quantities they are compared with, whatever their units. A
+change of a state is large if the forces that it causes are as large as the forces in the mechanism; a rate is large if
+large changes cause it (equilibration: van der Sluis 1969). Errors about the auxiliary model are rewritten in the terms
+of the user's model.
 
-Between sampling instants x' = A x + B u with held signals among the states; at an instant signals take their values
-one after the other, then states all at once. Over one period that is the zero-order-hold model (Astrom and
-Wittenmark, *Computer-Controlled Systems*, 1997, sections 2.3 and 8.4).
+Between sampling instants x' = A x + B u, with the held signals among the states. At an instant signals are updated one
+after the other, then all states at once. Over one period this is the zero-order-hold model (Astrom and Wittenmark,
+*Computer-Controlled Systems*, 1997, sections 2.3 and 8.4).
 """
 
 from __future__ import annotations
@@ -65,14 +66,14 @@ from .stability import RestState
 
 
 class StateScale(NamedTuple):
-    """What stands for a state and its rate.
+    """Scales of the auxiliary body of a controller state.
 
     Attributes
     ----------
     stride : float
-        Of the state, for a metre of its body's way or a metre per second of its speed.
+        Change of the state per metre of displacement, or per metre per second of speed, of its body.
     push : float [N]
-        Force on the body for a rate of one.
+        Force on the body per unit rate of the state.
     mass : float [kg]
     size : float
         A large change of the state.
@@ -86,7 +87,7 @@ class StateScale(NamedTuple):
 
 @dataclass(frozen=True)
 class AuxiliaryModel:
-    """A copy of a model with bodies in place of controllers.
+    """A copy of a model in which auxiliary bodies replace controllers.
 
     Attributes
     ----------
@@ -94,19 +95,19 @@ class AuxiliaryModel:
     slides : dict
         Name of the body of each state -> the state's name.
     added : tuple of str
-        These bodies, and one that stands still, if there is one.
+        Names of these bodies, and of the fixed body for output curves if there is one.
     outputs : dict
-        Signal that was asked for -> curve of the copy that it is.
+        Requested signal -> curve of the copy with its value.
     laws : dict
-        State or signal that is sampled -> curve of the copy that its value from the next instant on is.
+        Sampled state or signal -> curve of the copy with its value from the next instant on.
     at : dict
-        State -> its value where the bodies are drawn, a number or a formula.
+        State -> its value at the reference positions of the bodies, a number or a formula.
     held : frozenset of str
-        States and signals that are sampled.
+        Sampled states and signals.
     scales : dict
-        State -> what stands for it.
+        State -> scales of its body.
     words : dict
-        Texts that messages about the copy have -> what the user wrote in their place.
+        Text in messages about the copy -> text of the user's model.
     """
 
     model: Model
@@ -121,12 +122,12 @@ class AuxiliaryModel:
 
 
 def refuse_sampled_controllers(model: Model, analysis: str) -> None:
-    """Refuse controllers whose signals are held between instants.
+    """Refuse sampled controllers, whose signals are constant between sampling instants.
 
     Raises
     ------
     ModelError
-        Naming them.
+        With their names.
     """
     held = [e.title for e in model.controllers if e.sampled]
     if held:
@@ -137,7 +138,7 @@ def refuse_sampled_controllers(model: Model, analysis: str) -> None:
 
 
 def initial_state_formulas(model: Model) -> dict[str, str]:
-    """What the states begin with, as formulas of the parameters."""
+    """Initial values of the controller states, as formulas of the parameters."""
     out = {}
     for e in model.controllers:
         n = resolve(e, model.environment())
@@ -157,27 +158,27 @@ def auxiliary_model(
     scales: Mapping[str, StateScale] | None = None,
     board: float = 1.0,
 ) -> AuxiliaryModel:
-    """The copy.
+    """Build a copy of a model in which auxiliary bodies replace controllers.
 
     Parameters
     ----------
     model : Model
     at : mapping
-        State of a controller -> its value where small motions are asked about, a number or a formula of parameters.
+        Controller state -> its value at the operating point, a number or a formula of parameters.
     outputs : sequence of str
-        Signals and states of controllers that are asked for, besides curves of other parts.
+        Requested signals and states of controllers; curves of other parts are ignored.
     places : bool
-        Whether places stand for states; else velocities.
+        Whether positions represent the states; else velocities.
     scales : mapping, optional
-        State -> what stands for it; if not given, a metre or a metre per second for one, a newton for a rate of one.
+        State -> scales of its body; by default all scales are 1.
     board : float [kg]
-        Mass of the body that stands still, if there is one.
+        Mass of the fixed body for output curves, if there is one.
     """
     return _AuxiliaryModelBuilder(model, at, places, scales or {}).made(outputs, board)
 
 
 class _AuxiliaryModelBuilder:
-    """A copy in the making."""
+    """Builder of an auxiliary model."""
 
     def __init__(
         self, model: Model, at: Mapping[str, float | str], places: bool, scales: Mapping[str, StateScale]
@@ -195,13 +196,13 @@ class _AuxiliaryModelBuilder:
         self.board = ""
 
     def _free(self, name: str) -> str:
-        """A name that nothing has."""
+        """An unused name that begins with ``name``."""
         while any(k.startswith(name) for k in (*self.new.by_name, *self.new.parameters)):
             name += "_"
         return name
 
     def made(self, outputs: Sequence[str], board: float) -> AuxiliaryModel:
-        """The copy, with curves for these signals."""
+        """Build the copy, with curves for these signals."""
         self.heavy = board
         for name, body in self.body.items():
             self.new.add(
@@ -226,26 +227,26 @@ class _AuxiliaryModelBuilder:
         return AuxiliaryModel(self.new, slides, added, found, laws, self.at, held, self.scales, self.words)
 
     def _stride(self, name: str) -> str:
-        """What the sensor of a state is multiplied by."""
+        """Factor of the sensor of a state, as text."""
         return _factor(self.scales[name].stride)
 
     def _solid(self, name: str, mass: float) -> Body:
-        """A body where one is already, so that the mechanism is as large as before."""
+        """Auxiliary body, placed at an existing body so that the mechanism's length does not change."""
         return Body(name, mass=mass, position=self._place(), inertia=mass if self.new.planar else (mass,) * 3)
 
     def _push(self, x: ConnectedState) -> str:
-        """The force on a state's body: its rate. What is held stays, and rests where a sample changes nothing."""
+        """Force on a state's body: its rate; for sampled states 0, or for an equilibrium the next change."""
         if not x.controller.sampled:
             return self.text(x.law)
         return f"({self.text(x.law)}) - {self.known[x.name]}" if self.places else "0"
 
     def _place(self) -> Any:
-        """Where bodies are drawn."""
+        """Reference position of the auxiliary bodies."""
         first = self.old.bodies[0].position
         return first if any(isinstance(x, str) for x in first) else tuple(np.array(first, float).tolist())
 
     def _held(self, mass: float) -> str:
-        """What keeps the weight of a body along its slide."""
+        """Term of a force that balances the weight of a body along its slide, as text."""
         g = self.old.gravity[0]
         if isinstance(g, str) and not is_number_text(g):
             return f" - {_factor(mass)}({g})"
@@ -253,7 +254,7 @@ class _AuxiliaryModelBuilder:
         return f" - ({weight!r})" if weight else ""
 
     def text(self, law: Expression) -> str:
-        """A law of the model's as one of the copy."""
+        """Translate a law of the model to the copy."""
         for name in sorted(law.names):
             if "." in name and name not in self.known:
                 sensor = self._free(name.replace(".", "_"))
@@ -263,7 +264,7 @@ class _AuxiliaryModelBuilder:
         return expression_text(law.tree, self.known)
 
     def _laws(self) -> None:
-        """Formulas in the laws that name controllers."""
+        """Replace laws that name controllers by formulas of auxiliary bodies."""
         for e in [*self.old.forces, *self.old.limits]:
             changed: dict[str, Any] = {}
             for field, of in fields_with(e.__class__, LawOf).items():
@@ -285,14 +286,14 @@ class _AuxiliaryModelBuilder:
         return text
 
     def _own(self, name: str) -> bool:
-        """Whether a curve is of a controller."""
+        """Whether a curve belongs to a controller."""
         e = self.old.find(name.partition(".")[0])
         if isinstance(e, Sensor):
             return self._own(e.of)
         return isinstance(e, Controller)
 
     def _output(self, name: str, k: int) -> str:
-        """A curve of the copy for a signal."""
+        """Curve of the copy for a signal of a controller."""
         e = self.old.find(name.partition(".")[0])
         if isinstance(e, Sensor):
             return self._output(e.of, k)
@@ -304,7 +305,7 @@ class _AuxiliaryModelBuilder:
         return self._curve(f"output_{k}_", self.text(signal_law(self.old, e, what)))
 
     def _curve(self, name: str, text: str) -> str:
-        """A formula as a curve of the copy: a force on a body that stands still, which another one takes away again."""
+        """Curve of the copy with the value of a formula: a force on the fixed body, cancelled by an opposite force."""
         if not self.board:
             self.board = self._free("board")
             self.new.add(
@@ -316,19 +317,19 @@ class _AuxiliaryModelBuilder:
 
 
 def _factor(x: float) -> str:
-    """What a formula is multiplied by, as a text."""
+    """Factor in front of a formula, as text."""
     return "" if x == 1.0 else f"{x!r}*"
 
 
 def states_by_positions(other: AuxiliaryModel, at: Mapping[str, float], x: RestState) -> list[float]:
-    """The states where places stand for them, by how far the added bodies are from where they are drawn."""
+    """Controller states represented by positions, from the displacements of the auxiliary bodies."""
     now = x.c.moving(x.t, x.q, np.zeros(x.c.structure.nv))
     way = [float(now[body].p[0] - x.c.values.bodies[body].c[0]) for body in other.slides]
     return [at[name] + other.scales[name].stride * w for name, w in zip(other.slides.values(), way, strict=True)]
 
 
 def auxiliary_state(other: AuxiliaryModel, x: MechanismState, coordinates: str) -> MechanismState:
-    """The state of the copy in which its bodies are as those of the model are, and the added ones at rest as drawn."""
+    """State of the copy: bodies of the model as in ``x``, auxiliary bodies at rest in their reference positions."""
     c = compile_mechanism(other.model, parameters=x.c.parameters)
     bodies, hints = x.c.moving(x.t, x.q, x.v), x.c.hints | x.c.turned(x.q)
     for name in other.added:
@@ -345,15 +346,15 @@ def auxiliary_state(other: AuxiliaryModel, x: MechanismState, coordinates: str) 
 def without_auxiliary_positions(
     dense: StateSpace, uncertainty: MatrixUncertainty, other: AuxiliaryModel
 ) -> tuple[StateSpace, Spectrum]:
-    """The equations of the states themselves, called by their own names, and their eigenvalues.
+    """Linear equations in the controller states, by their own names, and their eigenvalues.
 
     Parameters
     ----------
     dense : StateSpace
-        Of the copy.
-    uncertainty : Doubt
-        What is uncertain of it.
-    other : Slid
+        State space of the copy.
+    uncertainty : MatrixUncertainty
+        Uncertainty of its matrix A.
+    other : AuxiliaryModel
         The copy.
     """
     slides = other.slides
@@ -382,7 +383,7 @@ def without_auxiliary_positions(
 def without_auxiliary_coordinates(
     r: ReducedEquations, f: FreeCoordinates, slides: Mapping[str, str]
 ) -> ReducedEquations:
-    """Reduced equations without inputs and without the places of bodies that stand for states."""
+    """Reduced equations without inputs and without the positions of auxiliary bodies."""
     left = [k for k, name in enumerate(f.labels) if not is_auxiliary(name, slides)]
     left += range(len(f.labels), len(r.rate))
     assert r.uncertainty is not None
@@ -399,47 +400,48 @@ def without_auxiliary_coordinates(
 
 
 def _remaining_uncertainty(uncertainty: MatrixUncertainty, indices: Sequence[int]) -> MatrixUncertainty:
-    """The same of the equations that are left."""
+    """Uncertainty of the equations that remain."""
     return MatrixUncertainty(uncertainty.by[indices], uncertainty.size[:, indices])
 
 
 def auxiliary_velocities(other: AuxiliaryModel, s: Structure) -> list[int]:
-    """Which velocity of the copy is that along each state's slide."""
+    """Index of the velocity along the slide of each state."""
     where = {n.name: k for k, n in enumerate(velocity_names(s))}
     return [where[f"{b}.x" if f"{b}.x" in where else f"{b}_slide.displacement"] for b in other.slides]
 
 
 def is_auxiliary(name: str, slides: Mapping[str, str]) -> bool:
-    """Whether a velocity of the copy is of a body that stands for a state."""
+    """Whether a velocity of the copy belongs to an auxiliary body."""
     return any(_belongs_to(name, body) for body in slides)
 
 
 def _belongs_to(name: str, body: str) -> bool:
-    """Whether a state of the linear equations is of a body, or of its slide."""
+    """Whether a state of the linear equations belongs to a body or its slide."""
     return name.startswith((f"{body}.", f"{body}_slide."))
 
 
-POSITION_RANGE = 100.0  # natural sizes of a state for a large step of its place: these are limited in length
+# Stride of a position relative to the natural size of the state per length: steps are limited in length.
+POSITION_RANGE = 100.0
 
 
 def state_scales(model: Model, at: Mapping[str, float], x: MechanismState, *, places: bool) -> dict[str, StateScale]:
-    """What stands for states of controllers in a copy with bodies in their place (`controller_states.auxiliary_model`).
+    """Scales of the auxiliary bodies that represent controller states (see `auxiliary_model`).
 
     Parameters
     ----------
     model : Model
-        With controllers.
+        The model with controllers.
     at : mapping
         State -> its value.
-    x : State
-        Of the model, where its Jacobian is looked at.
+    x : MechanismState
+        State of the model at which its Jacobian is taken.
     places : bool
-        Whether places of bodies are to stand for states, or velocities.
+        Whether positions represent the states; else velocities.
 
     Raises
     ------
     AnalysisError
-        If limits of a controller cross there.
+        If the lower limit of a controller exceeds the upper one.
     """
     x.c.at(x.t, x.q, x.v)
     refuse_contradicting_limits(x.c, x.t)
@@ -449,9 +451,9 @@ def state_scales(model: Model, at: Mapping[str, float], x: MechanismState, *, pl
 
 
 class _StateSizes:
-    """Sizes by the Jacobian of a copy in which places stand for states, a metre for one and a newton for a rate of one.
+    """Natural sizes of n controller states, from the Jacobian of a copy in which positions represent states.
 
-    Everything is in units of energy; n states.
+    In this copy all scales are 1 (a metre per unit of a state, a newton per unit of a rate). All in units of energy.
     """
 
     def __init__(self, other: AuxiliaryModel, e: EquationDerivatives, z: np.ndarray) -> None:
@@ -460,13 +462,13 @@ class _StateSizes:
         own = np.array([not is_auxiliary(n.name, other.slides) for n in velocity_names(c.structure)])
         K, M = e.by_position[e.at["r"]].tocsr(), e.by_acceleration[e.at["r"]].diagonal()
         self.names, self.z, self.length = list(other.slides.values()), z, c.values.length
-        self.rate = np.abs(e.state.vdot[at])  # of a newton on 1 kg
+        self.rate = np.abs(e.state.vdot[at])  # acceleration of 1 kg by 1 N
         among = abs(K[own][:, own]).multiply(size[own]).multiply(size[own][:, None])
         inertia = float((size**2 * M)[own].max(initial=0.0))
         pace = float(c.values.system.scales.rate.real)
         self.energy = _energy_scale(e, float(among.max() if among.nnz else 0.0), size * own) or inertia * pace**2 or 1.0
         self.speed = np.sqrt(self.energy / inertia) if inertia > 0.0 else 1.0  # [1/s]
-        self.forces = _largest_entries(abs(K[own][:, at]).multiply(size[own][:, None]), 0)  # by each state
+        self.forces = _largest_entries(abs(K[own][:, at]).multiply(size[own][:, None]), 0)  # forces per unit state
         self.moved = _largest_entries(
             abs(K[at][:, own]).multiply(size[own]), 1
         )  # rates by large steps of the mechanism
@@ -476,12 +478,12 @@ class _StateSizes:
         self.heaviest = self.energy / (self.length * weight) if weight > 0.0 else np.inf
 
     def scales(self, places: bool) -> dict[str, StateScale]:
-        """What stands for the states."""
+        """Scales of all states."""
         state = self._states()
         rate = self._rates(state)
         push = self.energy / (self.length * np.where(rate > 0.0, rate, 1.0))
         stride = state / (self.length * self.speed)
-        push = np.minimum(push, self.heaviest / stride)  # a weight that no other is lost beside
+        push = np.minimum(push, self.heaviest / stride)  # keeps weights small beside the other forces
         mass = push * stride
         if places:
             stride = POSITION_RANGE * state / self.length
@@ -496,7 +498,7 @@ class _StateSizes:
         return np.where(np.isnan(out), 1.0, out)
 
     def _propagated(self, out: np.ndarray) -> np.ndarray:
-        """Large changes of states by those that are known; nan of those that have nothing to do with them."""
+        """Large changes of states that act on states with known changes; NaN if they act on none."""
         for _ in range(len(out)):
             rate = self._rates(out)[:, None]
             most = np.where(rate > 0.0, self.between / np.where(rate > 0.0, rate, 1.0), 0.0).max(axis=0, initial=0.0)
@@ -507,12 +509,12 @@ class _StateSizes:
         return out
 
     def _rates(self, state: np.ndarray) -> np.ndarray:
-        """Large rates, by the states of which large changes are known, (n,)."""
+        """Large rates caused by the mechanism and by states with known large changes, (n,)."""
         by_states = self.between * np.where(np.isnan(state), 0.0, state)
         return np.maximum(self.moved, by_states.max(axis=1, initial=0.0))
 
     def _isolated(self) -> np.ndarray:
-        """The same of states that have nothing to do with the mechanism: what they are, and lack; nan if nothing."""
+        """Large changes of states that do not act on the mechanism: value plus distance to rest; NaN if zero."""
         itself = np.diag(self.between)
         lack = np.where(itself > 0.0, self.rate / np.where(itself > 0.0, itself, 1.0), 0.0)
         size = np.abs(self.z) + lack
@@ -520,7 +522,7 @@ class _StateSizes:
 
 
 def _energy_scale(e: EquationDerivatives, stiff: float, size: np.ndarray) -> float:
-    """What acts or resists [J], 0 if what there is of it is rounding; ``stiff`` is what resists a large step."""
+    """Energy scale [J] of forces and stiffness ``stiff``; 0 if they are rounding."""
     acts = force_magnitudes(e)
     loads = float((size * acts).max(initial=0.0))
     if loads > stiff:
@@ -538,11 +540,11 @@ NUMBER_PATTERN = r"[-+]?(?:\d[\d.]*(?:e[-+]?\d+)?|inf|nan)"
 
 @contextmanager
 def errors_in_user_terms(other: AuxiliaryModel) -> Iterator[None]:
-    """Have errors that are raised within name states and signals as the user does.
+    """Context manager that rewrites errors about the copy in the terms of the user's model.
 
     Parameters
     ----------
-    other : Slid
+    other : AuxiliaryModel
         The copy.
     """
     try:
@@ -556,7 +558,7 @@ def errors_in_user_terms(other: AuxiliaryModel) -> Iterator[None]:
 
 
 def in_user_terms(text: str, other: AuxiliaryModel) -> str:
-    """A text about the copy as one about the model."""
+    """Rewrite a text about the copy in the terms of the model."""
     for theirs, own in sorted(other.words.items(), key=lambda x: -len(x[0])):
         text = text.replace(theirs, own)
     for body, name in other.slides.items():
@@ -572,13 +574,13 @@ def in_user_terms(text: str, other: AuxiliaryModel) -> str:
 
 
 def controlled_search_failure(x: RestState, other: AuxiliaryModel) -> NotConverged:
-    """What remains where the search for a position at rest ended.
+    """The error for a failed search of an equilibrium with controllers, with the residuals.
 
     Parameters
     ----------
-    x : Rest
-        Of the copy.
-    other : Slid
+    x : RestState
+        State of the copy at the end of the search.
+    other : AuxiliaryModel
         The copy.
     """
     best = RestState.at(x.c, x.t, x.q)
@@ -586,25 +588,25 @@ def controlled_search_failure(x: RestState, other: AuxiliaryModel) -> NotConverg
     rows = auxiliary_velocities(other, x.c.structure)
     left = np.abs(best.r)
     own = {name: value for name, value in error.residuals.items() if not is_auxiliary(name, other.slides)} | rates
-    if not rows or left[rows].max() < left.max():  # controllers without states are at rest by themselves
+    if not rows or left[rows].max() < left.max():  # controllers without states have no residuals
         return NotConverged(in_user_terms(error.args[0], other), own)
     k = int(np.argmax(left[rows]))
     return NotConverged(
         f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, "
-        f"{rate_description(other, rates, [*rates][k])}, and nothing brings that to rest. Give a better guess, or look whether "
-        f"the controller can change what it measures, its limits considered",
+        f"{rate_description(other, rates, [*rates][k])}, and nothing brings that to rest. Give a better guess, or look "
+        f"whether the controller can change what it measures, its limits considered",
         own,
     )
 
 
 def remaining_rates(e: EquationDerivatives, other: AuxiliaryModel) -> dict[str, float]:
-    """State -> its rate; of what is sampled by how much the next sample changes it."""
+    """State -> its rate; for sampled states the change at the next sample."""
     left = e.block("r")[auxiliary_velocities(other, e.state.c.structure)]
     return {name: -float(r) / other.scales[name].push for name, r in zip(other.slides.values(), left, strict=True)}
 
 
 def rate_description(other: AuxiliaryModel, rates: Mapping[str, float], name: str) -> str:
-    """What a state does that does not rest, in words."""
+    """Text that describes how a state changes."""
     if name in other.held:
         return f"the next sample changes {name!r} by {rates[name]:.3g}"
     return f"{name!r} changes by {rates[name]:.3g} in a second"
@@ -612,20 +614,20 @@ def rate_description(other: AuxiliaryModel, rates: Mapping[str, float], name: st
 
 @dataclass
 class AuxiliaryInstant:
-    """The model and its copy at an instant.
+    """A model and its auxiliary model at one time.
 
     Attributes
     ----------
-    here : State
-        Of the model.
-    other : Slid
-        The copy, in which velocities stand for states.
-    state : State
-        Of the copy.
+    here : MechanismState
+        State of the model.
+    other : AuxiliaryModel
+        The copy, in which velocities represent the states.
+    state : MechanismState
+        State of the copy.
     at : dict
         State -> its value.
     off : ndarray (nv,)
-        Speeds that are large, of the bodies that stand for states.
+        Large speeds of the auxiliary bodies, 0 for all other velocities.
     """
 
     here: MechanismState
@@ -635,33 +637,33 @@ class AuxiliaryInstant:
     off: np.ndarray
 
     def errors_in_user_terms(self) -> AbstractContextManager[None]:
-        """Have errors that are raised within name states and signals as the user does."""
+        """Context manager that rewrites errors in the terms of the user's model."""
         return errors_in_user_terms(self.other)
 
 
 def auxiliary_instant(
     model: Model, here: MechanismState, coordinates: str, outputs: Sequence[str], *, frozen: bool
 ) -> AuxiliaryInstant:
-    """The copy at an instant.
+    """Build the auxiliary model at the time of a state.
 
     Parameters
     ----------
     model : Model
-        With controllers.
-    here : State
+        The model with controllers.
+    here : MechanismState
     coordinates : str
-        That the copy is to be in.
+        Coordinates of the copy.
     outputs : sequence of str
-        Curves that are asked for.
+        Requested curves.
     frozen : bool
-        Whether states that do not rest will do.
+        Whether controller states may change with time.
 
     Raises
     ------
     ModelError
-        If something holds at times, too.
+        If the model has switching elements, too.
     AnalysisError
-        If a state changes.
+        If a controller state is not constant and ``frozen`` is false.
     """
     at = dict(zip((x.name for x in here.c.structure.controls), here.z.tolist(), strict=False))
     scales = state_scales(model, at, here, places=False)
@@ -681,7 +683,7 @@ def auxiliary_instant(
 
 
 def _refuse_changing_states(other: AuxiliaryModel, x: MechanismState, off: np.ndarray) -> None:
-    """Refuse a mechanism at rest whose controllers are not."""
+    """Refuse a mechanism at rest whose controller states change."""
     e = EquationDerivatives(x)
     own = auxiliary_velocities(other, x.c.structure)
     left = remaining_accelerations(x, e, off)[own]
@@ -690,34 +692,35 @@ def _refuse_changing_states(other: AuxiliaryModel, x: MechanismState, off: np.nd
     rates = remaining_rates(static_equations(e), other)
     name = [*rates][int(np.argmax(left))]
     raise AnalysisError(
-        f"the controllers are not in equilibrium where the mechanism is: {rate_description(other, rates, name)}. Find an "
-        f"equilibrium first and linearise about it: about=m.equilibrium(); or ask about the end of a motion that has "
-        f"settled"
+        f"the controllers are not in equilibrium where the mechanism is: {rate_description(other, rates, name)}. Find "
+        f"an equilibrium first and linearise about it: about=m.equilibrium(); or ask about the end of a motion that "
+        f"has settled"
     )
 
 
-PERIOD_TOLERANCE = 1e-9  # of a period: what periods may be off a common one
-MAX_INSTANTS = 10_000  # common parts of a period, and instants of a cycle, at most
-SETTLED_TOLERANCE = 1e-6  # part of its size, or of a large change of it, by which what is held is what its law says
+PERIOD_TOLERANCE = 1e-9  # relative deviation allowed from a common period
+MAX_INSTANTS = 10_000  # largest denominator of a ratio of periods, and largest number of instants in a cycle
+# Largest deviation of a held value from its law at rest, relative to its size or a large change of it.
+SETTLED_TOLERANCE = 1e-6
 
 EXPONENTIAL_ROUNDING = (
     4.0 * np.finfo(float).eps
-)  # of the largest number of an equation: what exponentials leave uncertain
+)  # uncertainty of matrix exponentials, relative to the largest entry of a row
 
 
 class SampledSignal(NamedTuple):
-    """A signal or a state that is taken at instants.
+    """A sampled signal or state.
 
     Attributes
     ----------
     name : str
-        Of the state of the linear equations that holds it.
+        Name of the state of the linear equations that stores its held value.
     output : int
-        Which output of the linear equations its law is.
+        Index of the output of the linear equations with the value of its law.
     clock : tuple of float
         Period and offset [s].
     signal : bool
-        Whether it is known before others of the same instant are.
+        Whether it is a signal, which is updated before the states of the same instant.
     """
 
     name: str
@@ -729,7 +732,7 @@ class SampledSignal(NamedTuple):
 def sampling_instants(
     clocks: Sequence[tuple[float, float]],
 ) -> tuple[float, list[tuple[float, list[tuple[float, float]]]]]:
-    """Length of the cycle [s], and its instants from the first on, with the clocks that are due at each.
+    """Length of the cycle [s], and its instants with the clocks that sample at each.
 
     Raises
     ------
@@ -765,7 +768,7 @@ def sampling_instants(
             found[-1][1].append(clock)
         elif cycle - t > PERIOD_TOLERANCE * least:
             found.append((t, [clock]))
-        else:  # it begins the cycle but for rounding
+        else:  # equal to the start of the cycle, within rounding
             found[0][1].append(clock)
     return cycle, found
 
@@ -773,7 +776,7 @@ def sampling_instants(
 def refuse_unsettled(
     samples: Sequence[SampledSignal], at: np.ndarray, law: np.ndarray, sizes: np.ndarray, name: str
 ) -> None:
-    """Refuse a state in which what is held is not what it will be; ``sizes`` are large changes of it."""
+    """Refuse a state in which a held value changes at the next sample; ``sizes`` are its large changes."""
     for s, held, next_one, size in zip(samples, at.tolist(), law.tolist(), sizes.tolist(), strict=True):
         if not abs(next_one - held) <= SETTLED_TOLERANCE * max(size, abs(held)):
             raise ModelError(
@@ -785,9 +788,10 @@ def refuse_unsettled(
 def cycle_equations(
     space: StateSpace, samples: Sequence[SampledSignal], outputs: int
 ) -> tuple[StateSpace, Spectrum, float]:
-    """The equations from the begin of one cycle to that of the next, their multipliers, its length [s]; see `SampledSignal`.
+    """Difference equations over one cycle, their eigenvalues (multipliers), and the length of the cycle [s].
 
-    The state is that just before the first instant, outputs and inputs are those from this instant on.
+    The state is that just before the first instant of the cycle; outputs and inputs are those just after it. See
+    `SampledSignal`.
     """
     cycle, due = sampling_instants([s.clock for s in samples])
     n, m = len(space.A), space.B.shape[1]
@@ -815,13 +819,13 @@ def cycle_equations(
 
 
 def _update_groups(due: list[SampledSignal]) -> Iterator[list[SampledSignal]]:
-    """Signals each for itself, then all states at once."""
+    """Groups that are updated together: each signal by itself, then all states."""
     yield from ([s] for s in due if s.signal)
     yield [s for s in due if not s.signal]
 
 
 def _advanced_by_exponential(space: StateSpace, h: float, X: np.ndarray, U: np.ndarray) -> np.ndarray:
-    """The state a time later, inputs being held."""
+    """Advance the state by a time ``h`` with constant inputs."""
     from scipy.linalg import expm
 
     n, m = space.B.shape
@@ -830,7 +834,7 @@ def _advanced_by_exponential(space: StateSpace, h: float, X: np.ndarray, U: np.n
 
 
 def _needed_states(A: np.ndarray, C: np.ndarray, held: Sequence[int]) -> np.ndarray:
-    """States without those held ones that nothing depends on: signals that are taken anew as the cycle begins."""
+    """Indices of states without unused held ones: signals that are sampled anew at the start of the cycle."""
     left = np.ones(len(A), bool)
     while True:
         gone = [i for i in held if left[i] and not A[left, i].any() and not C[:, i].any()]

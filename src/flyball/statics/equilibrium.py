@@ -1,6 +1,6 @@
 """Static equilibrium from a guess, with controllers, preloads or steady rotation, and its stability.
 
-With controllers no state of theirs may change either: the auxiliary model of `linear.controllers` is searched. A
+With controllers, their states must be constant, too; the auxiliary model of `controller_states` is searched. A
 preload is the force offset that makes the reference configuration an equilibrium.
 """
 
@@ -53,21 +53,21 @@ from .equilibrium_search import (
 from .equilibrium_search import find_steady_motion as turn
 from .stability import RestState, stability, stability_by_eigenvalues
 
-SCALING_PASSES = 4  # searches, each in the natural sizes of where the one before ended
-SINGULAR_STIFFNESS = 1e-8  # singular values below this part of the largest are none
+SCALING_PASSES = 4  # searches, each with scales taken at the end of the previous one
+SINGULAR_STIFFNESS = 1e-8  # singular values below this part of the largest count as zero
 NEWTON_METHOD, FOLLOWING_METHOD = "Newton's method", "following the forces and the controllers"
-SIMILAR_SCALES = 30.0  # times that natural sizes may differ from those that were searched in
+SIMILAR_SCALES = 30.0  # largest factor between the scales of two searches that counts as similar
 
 
 def auxiliary_rest(
     model: Model, at: dict[str, float], x: MechanismState, scales: dict[str, StateScale], outputs: Sequence[str] = ()
 ) -> tuple[AuxiliaryModel, RestState]:
-    """The copy in which places stand for states, with curves for signals that are asked for, and where it is.
+    """Auxiliary model in which positions represent controller states, with its state at rest.
 
     Raises
     ------
     ModelError
-        If something holds at times, too.
+        If the model has switching elements, too.
     """
     other = auxiliary_model(model, {name: repr(z) for name, z in at.items()}, outputs, places=True, scales=scales)
     if has_switching_elements(other.model):
@@ -82,24 +82,24 @@ def auxiliary_rest(
 def controlled_rest(
     model: Model, c: CompiledMechanism, t: float, q: np.ndarray, at: dict[str, float]
 ) -> tuple[np.ndarray, str]:
-    """Positions at rest near some, and what found them; the states there are left in ``c``.
+    """Positions at rest near given ones, and the method that found them; the states are stored in ``c``.
 
-    A controller whose output is at a limit tells Newton's method nothing. Then limits are left out until it is where
-    they do not matter, and where they do the forces and the controllers lead.
+    A controller whose output is at a limit has no gradient for Newton's method. The search is then first made without
+    limits. If that fails, a pseudo-transient search follows the forces and the controllers.
 
     Parameters
     ----------
     model : Model
-    c : Compiled
-        Of it, in absolute coordinates.
+    c : CompiledMechanism
+        The compiled model, in absolute coordinates.
     t, q : float, ndarray
     at : dict
-        State -> its value where the search begins.
+        State -> its initial value.
 
     Raises
     ------
     NotConverged
-        With what is left.
+        With the residuals.
     """
     begin = _SearchPoint(c, t, q, at)
     try:
@@ -121,7 +121,7 @@ def controlled_rest(
 
 
 def without_limits(model: Model) -> Model | None:
-    """A copy whose controllers have no limits; None if they have none anyway."""
+    """Copy whose controllers have no limits; None if they have none anyway."""
     freed = [(e, e.unlimited()) for e in model.controllers]
     if all(a is b for a, b in freed):
         return None
@@ -134,7 +134,7 @@ def without_limits(model: Model) -> Model | None:
 
 @dataclass(frozen=True)
 class _SearchPoint:
-    """Where a search begins or ends: positions, and states of controllers."""
+    """Start or end of a search: positions and controller states."""
 
     c: CompiledMechanism
     t: float
@@ -142,12 +142,12 @@ class _SearchPoint:
     at: dict[str, float]
 
     def state(self) -> MechanismState:
-        """Of the model, the states written."""
+        """State of the model at rest, with these controller states."""
         self.c.z[: len(self.at)] = [*self.at.values()]
         return MechanismState.resting(self.c, self.t, self.q)
 
     def moved(self, other: AuxiliaryModel, x: RestState) -> _SearchPoint:
-        """Where a place of a copy with bodies for states is in the model."""
+        """The search point of the model that corresponds to a state of the auxiliary model."""
         q, _ = self.c.take(x.c, x.t, x.q, np.zeros(x.c.structure.nv))
         return _SearchPoint(self.c, self.t, q, dict(zip(self.at, states_by_positions(other, self.at, x), strict=True)))
 
@@ -155,7 +155,7 @@ class _SearchPoint:
 def _searched_rest(
     model: Model, place: _SearchPoint, search: Callable[[RestState], tuple[RestState | None, RestState]]
 ) -> _SearchPoint:
-    """Where a search ends, in the natural sizes of that place."""
+    """End of a search, repeated until the scales are those of the end point."""
     scales = None
     for _ in range(SCALING_PASSES):
         x = place.state()
@@ -172,7 +172,7 @@ def _searched_rest(
 
 
 def _with_saturation_note(error: NotConverged, model: Model, place: _SearchPoint) -> NotConverged:
-    """The error, with whose output is at a limit where a search ended."""
+    """Add the names of controllers with an output at its limit to the error."""
     shot = snapshot(place.state())
     held = [
         e.title
@@ -187,12 +187,12 @@ def _with_saturation_note(error: NotConverged, model: Model, place: _SearchPoint
 def determined_auxiliary_rest(
     model: Model, at_rest: Assembly, outputs: Sequence[str]
 ) -> tuple[AuxiliaryModel, RestState]:
-    """The copy where a mechanism rests, its states at rest as unknowns beside the positions.
+    """Auxiliary model at an equilibrium, with the controller states as unknowns beside the positions.
 
     Raises
     ------
     SingularityError
-        If something may be elsewhere and rest there too.
+        If the equilibrium is not isolated.
     """
     c = at_rest.compiled
     at = dict(zip((x.name for x in c.structure.controls), c.z.tolist(), strict=False))
@@ -218,7 +218,7 @@ def determined_auxiliary_rest(
 
 
 def _are_similar(a: dict[str, StateScale], b: dict[str, StateScale]) -> bool:
-    """Whether states and rates are as large here as there."""
+    """Whether two sets of scales are similar."""
     ratios = np.array([(a[k].stride / b[k].stride, a[k].push / b[k].push) for k in a])
     return bool((np.abs(np.log(ratios)) <= np.log(SIMILAR_SCALES)).all())
 
@@ -226,12 +226,12 @@ def _are_similar(a: dict[str, StateScale], b: dict[str, StateScale]) -> bool:
 LINEARIZE_DEFAULTS: dict[str, Any] = {
     "t": None, "parameters": None, "coordinates": "auto", "frozen": False, "inputs": (), "outputs": ()
 }  # fmt: skip
-"""What `linearize` is asked about an equilibrium, to judge it."""
+"""Arguments of `linearize` for the stability of an equilibrium."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EquilibriumOptions(Options):
-    """What `Mechanism.equilibrium` is asked."""
+    """Arguments of `Mechanism.equilibrium`."""
 
     t: float
     parameters: Mapping[str, float] | None
@@ -261,12 +261,12 @@ class EquilibriumOptions(Options):
 def rest_options(
     t: float, parameters: Mapping[str, float] | None, start: Equilibrium | Result | None = None, stable: bool = False
 ) -> EquilibriumOptions:
-    """What other analyses ask: where it rests."""
+    """Options with which other analyses compute an equilibrium."""
     return EquilibriumOptions(t=t, parameters=parameters, start=start, stable=stable, preload=(), turning=())
 
 
 def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
-    """A static equilibrium near the mechanism as described, or a steady motion: see `Mechanism.equilibrium`."""
+    """Find a static equilibrium near the described position, or a steady motion: see `Mechanism.equilibrium`."""
     if model.controllers:
         return _controlled_equilibrium(model, o)
     a = assemble(model, t=o.t, parameters=o.parameters)
@@ -282,7 +282,7 @@ def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
 
 
 def _controlled_equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
-    """Where a mechanism rests with its controllers: no state of theirs changes. Its stability is that of the motion."""
+    """Equilibrium with controllers: their states are constant. Its stability follows from the eigenvalues."""
     for name in ("stable", "preload", "turning"):
         if getattr(o, name):
             raise ModelError(f"{name}= is for mechanisms without controllers; leave it out")
@@ -293,7 +293,7 @@ def _controlled_equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     at = dict(zip((x.name for x in c.structure.controls), z, strict=False))
     q, way = controlled_rest(model.snapshot(), c, a.t, begin.q, at)
     out = equilibrium_result(RestState.at(c, a.t, q), {}, way)
-    from ..linear.linearize import LinearizeOptions, controlled_linear_model  # linear models stand on statics
+    from ..linear.linearize import LinearizeOptions, controlled_linear_model  # linear imports statics
 
     linear, out.stability = controlled_linear_model(model, LinearizeOptions(about=out, **LINEARIZE_DEFAULTS))
     out.judged_by = BY_MULTIPLIERS if linear.period else BY_EIGENVALUES
@@ -301,7 +301,7 @@ def _controlled_equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
 
 
 def _refuse_with_contact(o: EquilibriumOptions) -> None:
-    """Refuse what has no meaning where a mechanism comes to rest by falling."""
+    """Refuse options that have no meaning when a mechanism settles onto contacts."""
     for name in ("preload", "turning", "stable"):
         if getattr(o, name):
             raise ModelError(
@@ -310,7 +310,7 @@ def _refuse_with_contact(o: EquilibriumOptions) -> None:
 
 
 def _initial_guess(model: Model, o: EquilibriumOptions) -> Assembly | None:
-    """The other equilibrium, or the end of the motion, that is to be begun at; controllers' states with it."""
+    """The equilibrium or end of a motion to start from, with its controller states; None if not given."""
     if isinstance(o.start, Result):
         start = begin_motion(model, o.start.final[0], o.parameters, o.start, "absolute")
         s = start.assembly.compiled.structure
@@ -327,7 +327,7 @@ def _initial_guess(model: Model, o: EquilibriumOptions) -> Assembly | None:
 
 
 def _search_start(a: Assembly, guess: Assembly | None) -> Assembly:
-    """Where the search begins: as assembled, or where the guess is."""
+    """Start of the search: as assembled, or at the guess."""
     if guess is None:
         return a
     s = a.compiled.structure
@@ -338,15 +338,15 @@ def _search_start(a: Assembly, guess: Assembly | None) -> Assembly:
 
 
 def _searched_equilibrium(x: RestState, stable: bool) -> Equilibrium:
-    """By Newton's method, and by descent where that does not lead on or a stable one is wanted."""
+    """Search by Newton's method, and by descent if that fails or a stable equilibrium is wanted."""
     way, arrived, shaky = "Newton's method", None, None
     try:
         arrived = newton_search(x)
-    except SingularityError as error:  # the forces may lead elsewhere
+    except SingularityError as error:  # descent may lead elsewhere
         shaky = error
     unstable = arrived is not None and stability(arrived).kind == UNSTABLE
     if arrived is not None and unstable and not stable and _differ_by_long_step(x, arrived):
-        downhill = descent(x)  # Newton has led up a hill that the guess is not on
+        downhill = descent(x)  # Newton's method has moved away from the guess, against the forces
         below = None if downhill is None else newton_search(downhill)
         if below is not None and stability(below).kind != UNSTABLE:
             return equilibrium_result(below, {}, "descent")
@@ -360,12 +360,12 @@ def _searched_equilibrium(x: RestState, stable: bool) -> Equilibrium:
 
 
 def _differ_by_long_step(x: RestState, y: RestState) -> bool:
-    """Whether two positions are more than a long step apart."""
+    """Whether two positions differ by more than one longest step."""
     return bool(np.abs(tangent_step(x.c, x.q, y.q) / x.scale).max(initial=0.0) > LONGEST_STEP)
 
 
 def _steady_motion(a: Assembly, described: Assembly, names: Sequence[str]) -> Equilibrium:
-    """A steady motion; its stability by its eigenvalues, of which those of the turning itself are zero."""
+    """Steady motion, with stability by eigenvalues; those of the rotation itself are zero."""
     from ..linear.linearize import equations_without_inputs
 
     c = a.compiled
@@ -390,22 +390,22 @@ def _steady_motion(a: Assembly, described: Assembly, names: Sequence[str]) -> Eq
     )
 
 
-# Preload: what has to be added to forces for a mechanism to be in equilibrium where it is drawn.
+# Preload: the force offsets that make the reference configuration an equilibrium.
 
 
-PRELOAD_TOLERANCE = 1e-9  # forces left, of those that act
-PRELOAD_ROUNDING = 1e-13  # part of a force along the free motions that is none
+PRELOAD_TOLERANCE = 1e-9  # residual force relative to the applied forces
+PRELOAD_ROUNDING = 1e-13  # part of a force along the free motions that counts as zero
 
 
 def preloaded_rest(a: Assembly, names: Sequence[str]) -> tuple[RestState, dict[str, float]]:
-    """The mechanism at rest with the smallest preloads that balance it, and those.
+    """State at rest with the smallest preloads that balance the mechanism, and these preloads.
 
-    The forces along the free motions Z have to vanish: Z^T (f + sum b_k w_k) = 0.
+    The forces along the free motions Z must vanish: Z^T (f + sum b_k w_k) = 0.
 
     Raises
     ------
     ModelError
-        If there is no such force, or it has no law.
+        If a named force does not exist or has no law.
     NotConverged
         If these forces cannot balance it.
     """
@@ -424,7 +424,7 @@ def preloaded_rest(a: Assembly, names: Sequence[str]) -> tuple[RestState, dict[s
     by = np.array([e.by_law(i.parameter)[e.at["r"]] for i in inputs]).T
     along = Z.T @ by
     most = (np.abs(by) * own.scale[:, None]).sum(axis=0) / own.scale[own.chosen, None]
-    along[np.abs(along) <= PRELOAD_ROUNDING * most] = 0.0  # what the constraints carry balances nothing
+    along[np.abs(along) <= PRELOAD_ROUNDING * most] = 0.0  # a force carried by constraints balances nothing
     w = np.linalg.lstsq(along, -Z.T @ e.block("r"), rcond=1e-10)[0]
     changed = c.parameters | {i.parameter: float(value) for i, value in zip(inputs, w, strict=True)}
     loaded = compile_mechanism(model, parameters=changed)

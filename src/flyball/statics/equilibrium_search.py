@@ -1,13 +1,13 @@
 """Searches for equilibria and steady motions: Newton's method and pseudo-transient continuation.
 
-Newton's method on r(q, lam) = -f - G^T lam = 0, g(q) = 0 with the exact stiffness K (reactions turn with the
-bodies). Where it does not converge, pseudo-transient continuation: a motion without inertia, evenly damped, whose
-steps grow as it comes to rest (Kelley and Keyes 1998). It follows the forces, so it ends in stable equilibria.
-Positions that only the closing tolerance keeps from being singular (infinitesimal mechanisms) are refused.
+Newton's method solves r(q, lam) = -f - G^T lam = 0, g(q) = 0 with the exact stiffness K (reactions turn with the
+bodies). Where it does not converge, pseudo-transient continuation follows: a motion without inertia and with uniform
+damping, whose steps grow as it comes to rest (Kelley and Keyes 1998). It follows the forces, so it ends in stable
+equilibria. Positions that are nonsingular only because of the closing tolerance (infinitesimal mechanisms) are refused.
 
-A steady motion has some coordinates that turn evenly while all others stand still. In joint coordinates nothing
-then changes but those angles: r(q, v, 0, lam) = 0 and g(q) = 0 with v zero but for the speeds. A speed that no
-torque decides (a governor that turns freely) stays as described.
+In a steady motion some coordinates turn at constant speed and all others are constant. In joint coordinates only those
+angles change: r(q, v, 0, lam) = 0 and g(q) = 0 with v zero except for the speeds. A speed that no torque determines (a
+governor that turns freely) keeps its described value.
 """
 
 from __future__ import annotations
@@ -41,19 +41,19 @@ from ..tables.forest import coordinate_row
 from ..tables.structure_definition import Structure, velocity_names
 from .stability import RestState, stability
 
-REPORTED_COORDINATES = 6  # coordinates of the direction of least stiffness
+REPORTED_COORDINATES = 6  # reported coordinates of the direction of lowest stiffness
 
 
 def equilibrium_result(x: RestState, preload: dict[str, float], method: str) -> Equilibrium:
-    """The equilibrium there, judged.
+    """Result for an equilibrium, with its stability.
 
     Parameters
     ----------
-    x : Rest
+    x : RestState
     preload : dict
-        What was added to forces.
+        Preloads added to forces.
     method : str
-        What found it.
+        Name of the search method.
     """
     s = stability(x)
     names = velocity_names(x.c.structure)
@@ -76,34 +76,36 @@ def equilibrium_result(x: RestState, preload: dict[str, float], method: str) -> 
     )
 
 
-NEWTON_STEPS, DESCENT_STEPS = 40, 400  # steps
-MAX_TRAVEL = 15.0  # way in radians, or in the mechanism's lengths, after which nothing will hold it any more
-LAST_STEP = 1e-7  # Newton's last step: the next one would be its square
-LONGEST_STEP = 0.3  # a step in radians, or parts of the mechanism's length
-NEARLY_LINEAR = 1e-3  # of what is missing: less is left where everything on the way is nearly linear
-PUSH_STEP = 1e-2  # in the same
-FORCE_TOLERANCE = 1e-9  # forces left, of those that act
-GAP_TOLERANCE = 1e-10  # gaps that Newton's method leaves, of the mechanism's length
+NEWTON_STEPS, DESCENT_STEPS = 40, 400  # largest numbers of steps
+# Travel [rad, or lengths of the mechanism] after which the search has failed.
+MAX_TRAVEL = 15.0
+LAST_STEP = 1e-7  # size of Newton's last step: the error after it is about its square
+LONGEST_STEP = 0.3  # longest step [rad, or relative to the mechanism's length]
+# A longer step is accepted if the residual falls below this part: the equations are then nearly linear.
+NEARLY_LINEAR = 1e-3
+PUSH_STEP = 1e-2  # in the same units
+FORCE_TOLERANCE = 1e-9  # residual force relative to the applied forces
+GAP_TOLERANCE = 1e-10  # residual gap relative to the mechanism's length
 LEAST_DAMPING, FIRST_DAMPING, MAX_DAMPING = (
     1e-8,
     1e2,
     1e8,
-)  # dampings: where Newton takes over, where descent begins, where it gives up
+)  # damping at which Newton's method takes over, at the start of descent, and at failure
 
 
 def newton_search(x: RestState) -> RestState | None:
-    """Newton's method with steps of limited length; None where it does not settle.
+    """Newton's method with steps of limited length; None if it does not converge.
 
     Raises
     ------
     SingularityError
-        If it ends in a position in which no finite reactions carry the load.
+        If no finite reactions carry the load at the position found.
     """
     return newton_search_to(x)[0]
 
 
 def newton_search_to(x: RestState) -> tuple[RestState | None, RestState]:
-    """The same, and where it ended."""
+    """Like `newton_search`; returns also the last state."""
     for _ in range(NEWTON_STEPS):
         step, lam = x.step()
         longest = np.abs(step).max(initial=0.0)
@@ -116,7 +118,7 @@ def newton_search_to(x: RestState) -> tuple[RestState | None, RestState]:
 
 
 def _after_long_step(x: RestState, step: np.ndarray, lam: np.ndarray) -> RestState | None:
-    """Where a longer step than is taken blindly leads, if little turns on the way and nearly nothing is left there."""
+    """State after a step beyond the limit, if rotations stay small and the residual nearly vanishes; else None."""
     size = np.abs(step)
     if not size.max(initial=0.0) > LONGEST_STEP or (size > LONGEST_STEP)[x.turns].any():
         return None
@@ -125,7 +127,7 @@ def _after_long_step(x: RestState, step: np.ndarray, lam: np.ndarray) -> RestSta
 
 
 def equilibrium_there(x: RestState) -> RestState | None:
-    """The place itself if it is closed and all is balanced there; None if not.
+    """The state itself if its constraints are closed and all forces balance; None if not.
 
     Raises
     ------
@@ -134,7 +136,7 @@ def equilibrium_there(x: RestState) -> RestState | None:
     """
     if not x.open() <= GAP_TOLERANCE:
         return None
-    best = RestState.at(x.c, x.t, x.q)  # the smallest reactions: self-stress would hide what is left
+    best = RestState.at(x.c, x.t, x.q)  # smallest reactions: a self-stress would hide residuals
     if not best.settled(FORCE_TOLERANCE) or _is_balanced_by_jump(best):
         return None
     refuse_infinitesimal_mechanism(best)
@@ -142,22 +144,22 @@ def equilibrium_there(x: RestState) -> RestState | None:
 
 
 def _is_balanced_by_jump(x: RestState) -> bool:
-    """Whether other last digits alone balance it, because a force jumps there."""
+    """Whether forces balance only within rounding because a force jumps there."""
     return not is_balanced_beyond_rounding(x.equations, FORCE_TOLERANCE) and any(
         k.jump for k in nonsmooth_points(x.equations)
     )
 
 
 def pushed_off(x: RestState, changed: RestState | None = None) -> RestState:
-    """A little way along the direction of least stiffness.
+    """Move a small distance along the direction of lowest stiffness.
 
-    Under later values, if given, to the side that the forces push to: just beyond a limit point they are too small to
-    lead out of its neighbourhood.
+    If ``changed``, the state under later parameter values, is given, move it to the side that the forces push to. Just
+    beyond a limit point the forces alone are too small to lead away from it.
 
     Raises
     ------
     NotConverged
-        If nothing is free: nothing can give way then, and no branch end.
+        If the mechanism has no free motion.
     """
     direction = stability(x).direction
     largest = np.abs(direction).max(initial=0.0)
@@ -171,7 +173,7 @@ def pushed_off(x: RestState, changed: RestState | None = None) -> RestState:
 
 
 def descent(x: RestState) -> RestState | None:
-    """Pseudo-transient continuation on the constraints; None where it gets no further."""
+    """Pseudo-transient continuation along the constraints; None if it fails."""
     x = x.closed()
     damping, left, way = FIRST_DAMPING, np.abs(x.r).max(initial=0.0), 0.0
     for _ in range(DESCENT_STEPS):
@@ -180,7 +182,7 @@ def descent(x: RestState) -> RestState | None:
         step, lam = x.step(damping)
         longest = np.abs(step).max(initial=0.0)
         along = float(step @ -x.r)
-        if not along > 0.0 or longest > LONGEST_STEP:  # against the forces, or too far
+        if not along > 0.0 or longest > LONGEST_STEP:  # against the forces, or too long
             damping *= 4.0
             if damping > MAX_DAMPING:
                 return None
@@ -195,10 +197,10 @@ def descent(x: RestState) -> RestState | None:
 
 
 def follow_forces(x: RestState) -> tuple[RestState | None, RestState]:
-    """The same for what has no potential, as forces of controllers: (place or None, where it ended).
+    """Pseudo-transient continuation without a potential, as for controllers: (state or None, last state).
 
-    Implicit steps of a motion without inertia that lengthen as what is missing becomes less (switched evolution
-    relaxation); there is no hill to tell whether one leads down.
+    The implicit steps of a motion without inertia grow as the residual falls (switched evolution relaxation). Unlike in
+    `descent`, steps against the forces are accepted.
     """
     x = x.closed()
     damping, left = FIRST_DAMPING, x.missing()
@@ -221,7 +223,7 @@ def follow_forces(x: RestState) -> tuple[RestState | None, RestState]:
 
 
 def search_failure(x: RestState) -> NotConverged:
-    """What remains where the search ended."""
+    """The error for a failed search, with the residual forces at its end."""
     best = RestState.at(x.c, x.t, x.q)
     names = velocity_names(x.c.structure)
     left = best.equations.block("r")
@@ -247,38 +249,36 @@ def search_failure(x: RestState) -> NotConverged:
     )
 
 
-# Loads that nothing carries: positions at rest that only the closing tolerance keeps from being singular.
+# Infinitesimal mechanisms: positions at rest that are nonsingular only because of the closing tolerance.
 #
-# Where constraints lose rank without letting anything move, the structure can shake: w with G w = 0 for which the gaps
-# grow as kappa s^2 / 2 with the way s along it. Forces that do work along w are balanced by no finite reaction.
-# Newton's method ends beside the singular position, where G w = sigma u and the reaction is as large as the way
-# s = sigma / kappa is short. A way whose gaps are within the closing tolerance says nothing:
-# such reactions are made of it.
+# Where constraints lose rank without a finite motion, there is an infinitesimal motion w with G w = 0, along which the
+# gaps grow as kappa s^2 / 2 with the displacement s. No finite reaction balances forces that do work along w. Newton's
+# method ends beside the singular position, where G w = sigma u and the reaction is as large as s = sigma / kappa is
+# small. Reactions at a displacement whose gaps are within the closing tolerance are an artefact of the tolerance.
 
 
-DENSE_SIZE = 300  # rows or columns up to which all singular values are found
+DENSE_SIZE = 300  # up to so many rows or columns all singular values are computed
 WEAK_SINGULAR_VALUE, ZERO_SINGULAR_VALUE = (
     1e-3,
     1e-11,
-)  # singular values of rows of unit length that are looked at: smaller ones carry nothing
-PROBE_STEP = (
-    1e-3  # way along which it is seen how a singular value changes, in radians or parts of the mechanism's length
-)
-LOADED_FRACTION = 1e-4  # work of the forces along the shake, of what they could do: less is none
-PARTICIPATION = 1e-3  # of a dependency: elements with less have none in it
+)  # range of singular values of unit rows that are examined; smaller ones carry no load
+PROBE_STEP = 1e-3  # displacement [rad, or relative to the mechanism's length] for the change of a singular value
+# Work of the forces along the infinitesimal motion, relative to its possible maximum, that counts as none.
+LOADED_FRACTION = 1e-4
+PARTICIPATION = 1e-3  # elements with a smaller part in a dependency do not count
 
 
 def refuse_infinitesimal_mechanism(x: RestState) -> None:
-    """Refuse a position at rest whose reactions are made of the closing tolerance.
+    """Refuse a position at rest whose reactions exist only because of the closing tolerance.
 
     Raises
     ------
     SingularityError
-        Naming the elements whose constraints depend on each other there, and what they let shake.
+        With the names of the elements with dependent constraints, and of the coordinates that can move.
     """
     if not len(x.g):
         return
-    if min(x.G.shape) > DENSE_SIZE and clearly_independent(x.G):  # others bend too much to be shaky
+    if min(x.G.shape) > DENSE_SIZE and clearly_independent(x.G):  # others change their Jacobian too fast along w
         return
     U, d, Vt = np.linalg.svd(x.G.toarray(), full_matrices=False)
     force = x.scale * EquationDerivatives(MechanismState.resting(x.c, x.t, x.q)).block("r")
@@ -292,7 +292,7 @@ def refuse_infinitesimal_mechanism(x: RestState) -> None:
 
 
 def _infinitesimal_mechanism_error(x: RestState, u: np.ndarray, w: np.ndarray) -> SingularityError:
-    """The error that names what is shaky."""
+    """The error that describes an infinitesimal mechanism."""
     rows = x.c.structure.rows
     names = tuple(dict.fromkeys(r.element.name for r, part in zip(rows, u, strict=True) if abs(part) > PARTICIPATION))
     shakes = velocity_names(x.c.structure)[int(np.argmax(np.abs(w)))].name
@@ -306,8 +306,8 @@ def _infinitesimal_mechanism_error(x: RestState, u: np.ndarray, w: np.ndarray) -
 
 
 STEADY_ITERATIONS = 60
-STEADY_LONGEST_STEP = 0.2  # a step in radians, parts of the mechanism's length, or parts of a speed
-STEADY_TOLERANCE = 1e-9  # what is left of an equation of motion, of what acts in it
+STEADY_LONGEST_STEP = 0.2  # longest step [rad, or relative to the mechanism's length or a speed]
+STEADY_TOLERANCE = 1e-9  # residual of an equation of motion relative to its forces
 STEADY_LAST_STEP = 1e-7  # Newton's last step
 STEADY_SINGULAR_VALUE = 1e-11  # singular values below this part of the largest are none
 
@@ -324,12 +324,12 @@ class SteadyMotion:
 def find_steady_motion(
     a: Assembly, described: Assembly, names: Sequence[str], parameters: Mapping[str, float] | None
 ) -> SteadyMotion:
-    """Find the steady motion near an assembly in absolute coordinates, with the speeds of the described one at first.
+    """Find the steady motion near an assembly in absolute coordinates, starting from the described speeds.
 
     Raises
     ------
     ModelError
-        If a name is no coordinate of a joint, or of one that closes a loop.
+        If a name is no coordinate of a joint, or of a joint that closes a loop.
     NotConverged
         If there is none nearby.
     """
@@ -340,7 +340,7 @@ def find_steady_motion(
     v = np.zeros(c.structure.nv)
     v[at] = choose_coordinates(described, "joint", parameters)[0].v[at]
     start = MechanismState(c, b.t, b.q, v, c.z.copy(), 0.0 * v, np.zeros(len(c.structure.rows)), 0.0 * v)
-    found, _ = _steady_newton(start, at, [])  # with the speeds as they are, if anything balances at these
+    found, _ = _steady_newton(start, at, [])  # first with the speeds as described
     if found is None:
         found, start = _steady_newton(start, at, [d for d in at if s.tables["tree"].law[_body_of_velocity(s, d)] < 0])
     if found is None:
@@ -352,7 +352,7 @@ def find_steady_motion(
 
 
 def _steady_newton(x: MechanismState, at: list[int], free: list[int]) -> tuple[MechanismState | None, MechanismState]:
-    """Newton's method; None where it does not settle, and where it ended."""
+    """Newton's method: (state or None if it does not converge, last state)."""
     for _ in range(STEADY_ITERATIONS):
         x, size = _steady_step(x, at, free)
         if size < STEADY_LAST_STEP and _is_steady(x):
@@ -369,12 +369,12 @@ def _is_steady(x: MechanismState) -> bool:
 
 
 def _row_gaps(e: EquationDerivatives) -> np.ndarray:
-    """How far rows are from closed: of the mechanism's length, or in radians."""
+    """Constraint gaps, relative to the mechanism's length or in radians."""
     return np.abs(row_scales(e.state.c) * e.block("g"))
 
 
 def _rate_errors(e: EquationDerivatives) -> np.ndarray:
-    """By how much rows miss their rates, as a part of the fastest velocity or prescribed rate."""
+    """Errors of the constraint rates, relative to the fastest velocity or prescribed rate."""
     x, scale = e.state, row_scales(e.state.c)
     asked = scale * (e.block("n") - e.by_velocity[e.at["n"]] @ x.v)
     fastest = np.abs(x.v / x.c.sizes).max(initial=0.0) + np.abs(asked).max(initial=0.0)
@@ -382,10 +382,10 @@ def _rate_errors(e: EquationDerivatives) -> np.ndarray:
 
 
 def _velocity_of_coordinate(b: Assembly, name: str) -> int:
-    """The velocity of a joint's coordinate."""
+    """Index of the velocity of a joint coordinate."""
     s = b.compiled.structure
     floating = {n.name: d for d, n in enumerate(velocity_names(s)) if n.unit == "m"}
-    if name in floating:  # of a body that hangs on nothing: where a vehicle rolls along
+    if name in floating:  # coordinate of a free body, such as a rolling vehicle
         return floating[name]
     owner, _, what = name.partition(".")
     element = s.model.find(owner)
@@ -456,7 +456,7 @@ def _body_of_velocity(s: Structure, d: int) -> int:
 
 
 def _steady_failure(x: MechanismState, names: list[str]) -> NotConverged:
-    """The error for a search that did not settle: what is left of forces, or which constraints are not fulfilled."""
+    """The error for a failed search: residual forces, or the constraints that are not fulfilled."""
     s, e = x.c.structure, EquationDerivatives(x)
     left, known = e.block("r"), velocity_names(s)
     who = ", ".join(names)

@@ -1,8 +1,8 @@
 """Quasi-static series: equilibria over values of a parameter, along one branch for as long as it lasts.
 
-Steps from value to value are taken by Newton's method where it contracts from its first step on (Deuflhard 2004,
-"Newton Methods for Nonlinear Problems", 2.1); elsewhere the step is halved. Where steps have become tiny the branch
-has ended, at a limit point say, and the forces move the mechanism to another equilibrium.
+Steps from value to value are taken by Newton's method where it contracts from its first iteration on (Deuflhard 2004,
+"Newton Methods for Nonlinear Problems", 2.1); else the step is halved. If steps become tiny the branch has ended, for
+example at a limit point, and the forces move the mechanism to another equilibrium.
 """
 
 from __future__ import annotations
@@ -38,16 +38,18 @@ from .equilibrium_search import (
 )
 from .stability import RestState, stability
 
-MAX_HALVINGS = 16  # of a step between two values, before its branch is taken to have ended
-CONTROLLED_HALVINGS = 3  # the same with controllers, whose search costs more
-CONTRACTION = 0.6  # how much shorter Newton's steps have to become, each than the one before; at limit points 1/2
-JUMP_DISTANCE = 0.02  # in the same: a branch that goes on within this has not ended but is steep there
-SMALLEST_STEP = 1e-7  # steps, in radians or parts of the length, that rounding may keep from becoming shorter
+MAX_HALVINGS = 16  # halvings of a step before the branch counts as ended
+CONTROLLED_HALVINGS = 3  # the same with controllers, whose search is more expensive
+# Largest ratio of successive Newton steps; at limit points it is 1/2.
+CONTRACTION = 0.6
+# Distance below which a jump counts as a steep part of the branch [rad, or relative to the mechanism's length].
+JUMP_DISTANCE = 0.02
+SMALLEST_STEP = 1e-7  # step size [rad, or relative to the length] at which rounding limits contraction
 
 
 @dataclass(frozen=True, kw_only=True)
 class EquilibriaOptions(Options):
-    """What `Mechanism.equilibria` is asked."""
+    """Arguments of `Mechanism.equilibria`."""
 
     parameter: str
     values: Sequence[float] | np.ndarray
@@ -59,7 +61,7 @@ class EquilibriaOptions(Options):
 
 
 def equilibria(model: Model, o: EquilibriaOptions) -> EquilibriumSeries:
-    """Equilibria over values of a parameter, each following from the one before: see `Mechanism.equilibria`."""
+    """Compute equilibria over a parameter, each from the one before: see `Mechanism.equilibria`."""
     refuse_unsupported(model, "equilibria", controlled=True)
     if model.controllers and o.stable:
         raise ModelError("stable= is for mechanisms without controllers; leave it out")
@@ -97,7 +99,7 @@ def checked_values(
     t: float | None,
     parameters: Mapping[str, float] | None,
 ) -> np.ndarray:
-    """The values as an array; refuses unknown parameters, what is no number, and one value besides."""
+    """The values as an array; refuses unknown parameters, invalid values, and a parameter that is also fixed."""
     given = t if parameter == "t" else (parameters or {}).get(parameter)
     if given is not None:
         where = "t" if parameter == "t" else "parameters"
@@ -114,7 +116,7 @@ def checked_values(
 
 
 def series_error(done: Any, value: float, error: AnalysisError) -> NotConverged:
-    """The error of a series that cannot go on, with what was reached."""
+    """The error for a series that cannot continue, with the results so far."""
     n = len(done.values)
     reached = f"the last of {n} reached is {done.parameter} = {done.values[-1]:.6g}" if n else "none was reached"
     return NotConverged(
@@ -126,7 +128,7 @@ def series_error(done: Any, value: float, error: AnalysisError) -> NotConverged:
 
 @dataclass
 class _SeriesBranch:
-    """What stays the same along a series, and where it has jumped."""
+    """Constant data of a series, and its jumps."""
 
     model: Model
     parameter: str
@@ -142,19 +144,19 @@ class _SeriesBranch:
         return self.t, {**self.parameters, self.parameter: float(value)}
 
     def rest(self, e: Equilibrium) -> RestState:
-        """An equilibrium as a place to go on from."""
+        """State at rest of an equilibrium, as the start of a step."""
         a = e.assembly
         return RestState.at(a.compiled, a.t, a.q)
 
     def at(self, x: RestState, value: float) -> RestState:
-        """The same place under another value."""
+        """The same position with another value of the parameter."""
         t, parameters = self.given(value)
         c = compile_mechanism(self.model, parameters=parameters)
         q, _ = c.take(x.c, x.t, x.q, np.zeros(len(x.scale)))
         return RestState(c, t, q, x.lam)
 
     def follow(self, x: RestState, here: float, there: float, halvings: int) -> RestState:
-        """On from one value to another, along the branch or by a jump."""
+        """Step from one value to another, along the branch or by a jump."""
         y = _contracting_newton(self.at(x, there))
         if y is not None:
             return y
@@ -164,7 +166,7 @@ class _SeriesBranch:
         return self.jump(x, there, lambda: pushed_off(x, self.at(x, there)))
 
     def controlled(self, last: Equilibrium, here: float, there: float, halvings: int) -> Equilibrium:
-        """The equilibrium with controllers, whose search begins at the last one; nearer steps where that is far."""
+        """Equilibrium with controllers, searched from the last one; the step is halved if the result is far away."""
         try:
             found = single(self.model, rest_options(*self.given(there), last))
         except NotConverged:
@@ -181,13 +183,13 @@ class _SeriesBranch:
         return self.controlled(last, middle, there, halvings - 1)
 
     def settled(self, x: RestState, value: float) -> RestState:
-        """The place itself, or where it leads where it must be stable and is not."""
+        """The state itself, or the stable equilibrium it moves to if stability is required and it is unstable."""
         if self.stable and stability(x).kind == UNSTABLE:
             return self.jump(x, value, lambda: pushed_off(x))
         return x
 
     def jump(self, x: RestState, value: float, begin: Callable[[], RestState]) -> RestState:
-        """Where the forces lead from an equilibrium that has ceased to be."""
+        """Equilibrium that the forces lead to from one that no longer exists."""
         downhill = descent(begin())
         y = None if downhill is None else newton_search(downhill)
         if y is None:
@@ -200,19 +202,19 @@ class _SeriesBranch:
 
 
 def _rest_distance(x: RestState, y: RestState) -> float:
-    """How far the bodies are from one place to another, in parts of the length or by the entries of their rotations."""
+    """Largest displacement of the bodies between two states: relative to the length, or of rotation matrix entries."""
     return _assembly_distance(*(Assembly(r.c, r.t, r.q, np.zeros(len(r.scale))) for r in (x, y)))
 
 
 def _assembly_distance(x: Assembly, y: Assembly) -> float:
-    """The same from one assembly to another."""
+    """Largest displacement of the bodies between two assemblies, as in `_rest_distance`."""
     a, b = (r.compiled.moving(r.t, r.q, np.zeros_like(r.v)) for r in (x, y))
     length = x.compiled.values.length
     return max(max(np.abs(a[k].p - b[k].p).max() / length, np.abs(a[k].R - b[k].R).max()) for k in a)
 
 
 def _contracting_newton(x: RestState) -> RestState | None:
-    """Newton's method where it contracts from its first step on: what it finds is near; else None."""
+    """Newton's method; None unless it contracts from its first step on, which means that the solution is near."""
     last = LONGEST_STEP
     for k in range(NEWTON_STEPS):
         step, lam = x.step()

@@ -1,9 +1,10 @@
 """Replacement joints: closed contacts and active stops, ropes, latches and friction as joints and constraints.
 
-By these, linear equations and Newton's method know what holds a mechanism; exact to second order, as stiffness
-needs it. A sticking contact is a common point where one side is sharp, and rolls where it is round; a smooth one
-keeps its height. What may push one way only has a sign, friction has a capacity. The joints are given by their
-frames in the reference configuration, and stay constraint rows in any coordinates.
+With these joints the linear equations and Newton's method include what holds the mechanism, exactly to second order,
+as the stiffness requires. A sticking contact is a common point if one side is sharp, and rolls if it is round; a
+frictionless contact keeps its height. Constraints that can push in one direction only have a sign, friction has a
+capacity. The joints are defined by their frames in the reference configuration, and are constraint rows in any
+coordinates.
 """
 
 from __future__ import annotations
@@ -66,9 +67,9 @@ class ContactJoint(Joint):
     name : str
     body_i, body_j : str
     frames : two tuples of 12 numbers
-        F and M in the world as drawn: origin, rotation row by row.
+        F and M in world axes in the reference configuration: origin, then rotation row by row.
     radii : tuple of two numbers [m]
-        Of a disk, and of a ball; or the length of a link.
+        Radius of a disk, and of a ball; or the length of a link.
     """
 
     frames: tuple[tuple[float, ...], tuple[float, ...]]
@@ -78,7 +79,7 @@ class ContactJoint(Joint):
     drawn: ClassVar[str] = "point_in_plane"
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame]:
-        """Its frames."""
+        """World frames F and M of the joint."""
         F, M = (
             (np.array(x[:3], float), np.array(x[3:], float).reshape(3, 3)) for x in (self.frames[0], self.frames[1])
         )
@@ -87,7 +88,7 @@ class ContactJoint(Joint):
 
 @element
 class CommonPoint(ContactJoint):
-    """A sharp side sticks."""
+    """Sticking contact with a sharp side: a common point."""
 
     blocks: ClassVar = COMMON_POINT
     drawn: ClassVar[str] = "spherical"
@@ -95,7 +96,7 @@ class CommonPoint(ContactJoint):
 
 @element
 class PointOnFlat(ContactJoint):
-    """A point M slides on a plane z = 0 of F; a ball's centre above it at the radius of the ball."""
+    """Point M that slides on the plane z = 0 of F; for a ball, its centre at the height of its radius."""
 
     blocks: ClassVar = (IN_PLANE,)
 
@@ -106,7 +107,7 @@ class PointOnFlat(ContactJoint):
 
 @element
 class SlidingDisk(ContactJoint):
-    """A disk M slides on a plane z = 0 of F."""
+    """Disk M that slides on the plane z = 0 of F."""
 
     blocks: ClassVar[tuple[Row, ...]] = (ON_PLANE,)
 
@@ -117,7 +118,7 @@ class SlidingDisk(ContactJoint):
 
 @element
 class Rolling(SlidingDisk):
-    """A ball or disk M rolls on a plane z = 0 of F."""
+    """Ball or disk M that rolls on the plane z = 0 of F."""
 
     blocks: ClassVar[tuple[Row, ...]] = (ON_PLANE, no_slip("x"), no_slip("y"))
     drawn: ClassVar[str] = "rolling"
@@ -125,7 +126,7 @@ class Rolling(SlidingDisk):
 
 @element
 class Centres(ContactJoint):
-    """Two balls, or a ball and a corner, that slide on each other: their centres keep their distance."""
+    """Two balls, or a ball and a corner, that slide on each other: the distance of the centres is constant."""
 
     blocks: ClassVar = CONSTANT_DISTANCE
     drawn: ClassVar[str] = "link"
@@ -138,31 +139,31 @@ class Centres(ContactJoint):
 FRICTION_ITERATIONS, FRICTION_TOLERANCE = (
     30,
     1e-10,
-)  # rounds for friction that follows its load, and a part of it that is no change
+)  # iterations for load-dependent friction, and relative change that counts as none
 EITHER_SIGN = 0.0
-"""Sign of what may push either way."""
+"""Sign of a constraint that can push in both directions."""
 
 
 @element
 class HeldCoordinate(Coupler):
-    """One coordinate or more, whose weighted sum is held where it is."""
+    """Constraint that keeps the weighted sum of one or more coordinates constant."""
 
     def check(self, n: Any) -> None:
-        """Whatever it was made of was checked."""
+        """Check nothing: the element that it replaces was checked."""
 
 
 @dataclass
 class ActiveConstraints:
-    """What holds a mechanism somewhere.
+    """Constraints that hold a mechanism at a position.
 
     Attributes
     ----------
     parts : tuple of Element
-        The constraints that stand for what holds, by the names of these.
+        Constraints in place of the active elements, with the names of these elements.
     signs : dict
-        Name -> +1 if it may push its quantity up only, -1 down, 0 either way.
-    sticks : dict
-        Those of friction: name -> the element.
+        Name -> +1 if it can only push its quantity up, -1 only down, 0 both.
+    friction_elements : dict
+        Active friction elements: name -> element.
     """
 
     parts: list[Element] = field(default_factory=list)
@@ -171,12 +172,12 @@ class ActiveConstraints:
 
 
 def active_constraints(model: Model, at: Assembly) -> ActiveConstraints:
-    """What may hold a mechanism at rest at a place, as constraints.
+    """Constraints in place of the switching elements that are active at rest at a position.
 
     Raises
     ------
     ModelError
-        If something holds that has no constraint here.
+        If an active element has no equivalent constraint.
     """
     out = ActiveConstraints()
     parts = [e for e in unsupported_elements(model) if e.switches()]
@@ -204,16 +205,16 @@ def _is_rotation(model: Model, e: Element, w: Switch) -> bool:
 
 
 def _push_sign(kind: int, x: float, lower: float, upper: float, near: float) -> float | None:
-    """Which way a switch may push at rest; None if it is open."""
+    """Direction in which a switch can push at rest; None if it is inactive."""
     if kind == STOP:
         return 1.0 if abs(x - lower) <= near else -1.0 if abs(x - upper) <= near else None
-    if kind == RATCHET:  # a tooth, and the pitch
+    if kind == RATCHET:  # position of a tooth, and the pitch
         return 1.0 if abs(x - lower - upper * round((x - lower) / upper)) <= near else None
     return {FRICTION: EITHER_SIGN, LOCK: None, ONE_WAY: 1.0}.get(kind)
 
 
 def holding_constraint(e: Any, w: Switch, x: Values, value: float) -> Element:
-    """The constraint that holds a switch's quantity where it is."""
+    """Constraint that keeps the quantity of a switch at its present value."""
     if w.along:
         weights = e.switch_weights(x.numbers[e.name], w.label) if w.summed else (1.0,)
         return HeldCoordinate(e.name, w.along, weights=tuple(float(np.real(x)) for x in weights), value=value)
@@ -231,7 +232,7 @@ def holding_constraint(e: Any, w: Switch, x: Values, value: float) -> Element:
 
 
 def friction_capacity(model: Model, at: Assembly, e: Any, reaction: Callable[[str], tuple]) -> float:
-    """The most that something sticks with at rest [N] or [N m]; ``reaction`` of a joint: force and torque, (3,)."""
+    """Static friction capacity of an element [N] or [N m]; ``reaction`` gives a joint's force and torque, (3,) each."""
     c = compile_mechanism(model, parameters=at.compiled.parameters)
     q, v = c.take(at.compiled, at.t, at.q, 0.0 * at.v)
     c.at(at.t, q, v, MOTION)
@@ -250,7 +251,7 @@ def friction_capacity(model: Model, at: Assembly, e: Any, reaction: Callable[[st
 def support_with_friction(
     model: Model, place: ContactState, x: RestState, held: ActiveConstraints
 ) -> tuple[SupportForces, dict[str, float]]:
-    """What carries a mechanism at rest, and the most that each part that sticks bears under these loads."""
+    """Forces that carry a mechanism at rest, and the capacity of each sticking element under these loads."""
     found, bears = support_forces(place, x, held.signs), dict[str, float]()
     for _ in range(FRICTION_ITERATIONS):
         result = snapshot(MechanismState.resting(x.c, x.t, x.q, found.lam))
@@ -268,7 +269,7 @@ def support_with_friction(
 
 
 def _joint_reactions(result: Result) -> Callable[[str], tuple]:
-    """A joint's force and torque at the one time of a result."""
+    """Function that returns the force and torque of a joint in a result with one time."""
 
     def of(joint: str) -> tuple:
         return tuple(tuple(float(np.ravel(x)[0]) for x in part) for part in result.reactions.of(joint))
@@ -277,7 +278,7 @@ def _joint_reactions(result: Result) -> Callable[[str], tuple]:
 
 
 def model_without_contacts(model: Model, at: Assembly) -> tuple[Model, ActiveConstraints]:
-    """The model without contacts; what may hold at rest is a constraint there (`replacement_joints.active_constraints`)."""
+    """The model without contacts, with `active_constraints` in place of the elements active at rest, and these."""
     gone = {e.name: None for e in (*model.contacts, *unsupported_elements(model))}
     out, held = model.changed(gone), active_constraints(model, at)
     out.add(*held.parts)
@@ -285,13 +286,13 @@ def model_without_contacts(model: Model, at: Assembly) -> tuple[Model, ActiveCon
 
 
 def model_with_contact_joints(bare: Model, place: ContactState) -> tuple[Model, dict[str, str]]:
-    """A copy of the model without contacts in which closed contacts are joints.
+    """Copy of the model without contacts in which closed contacts are joints.
 
     Returns
     -------
     model : Model
     missing : dict
-        Contact -> why there is no joint that moves as it does.
+        Contact -> reason why no joint is equivalent to it.
     """
     out, missing = bare.copy(), dict[str, str]()
     M = movers_of_assembly(place.scene, place.at)
@@ -308,14 +309,14 @@ def model_with_contact_joints(bare: Model, place: ContactState) -> tuple[Model, 
 
 
 class _ReferenceFrames:
-    """Takes frames from where bodies are to where they are drawn."""
+    """Transforms frames from the present position of the bodies to the reference configuration."""
 
     def __init__(self, place: ContactState) -> None:
         self.axes = 2 if place.at.compiled.structure.model.planar else 3
         self.here, self.drawn = place.bodies, place.at.compiled.values.given.bodies
 
     def __call__(self, body: str, p: np.ndarray, R: np.ndarray) -> tuple[float, ...]:
-        """Origin and rotation of a frame on a body, as drawn."""
+        """Origin and rotation of a frame on a body in the reference configuration."""
         if body != GROUND:
             x, d = self.here[body], self.drawn[body]
             p, R = np.real(d.c) + np.real(d.R) @ (x.R.T @ (p - x.p)), np.real(d.R) @ (x.R.T @ R)
@@ -323,9 +324,9 @@ class _ReferenceFrames:
 
 
 def _contact_joint(c: StaticContact, a: SurfaceForm, b: SurfaceForm, at: _ReferenceFrames) -> ContactJoint | str:
-    """The joint that moves as a contact does, or why there is none."""
+    """The joint that is equivalent to a contact, or the reason why there is none."""
     bodies, up = c.bodies, c.normal
-    if b.form == FLAT and a.form != FLAT:  # the plane is F
+    if b.form == FLAT and a.form != FLAT:  # F is on the flat side
         a, b, bodies, up = b, a, (bodies[1], bodies[0]), -c.normal
     kind, centre, radii = _joint_kind(c.friction > 0.0, a, b)
     if kind is None:
@@ -341,7 +342,7 @@ def _contact_joint(c: StaticContact, a: SurfaceForm, b: SurfaceForm, at: _Refere
 def _joint_kind(
     sticks: bool, a: SurfaceForm, b: SurfaceForm
 ) -> tuple[type[ContactJoint] | None, np.ndarray | None, tuple[float, float]]:
-    """Which joint, where its second origin is (None: where they touch), its radii; ``a`` is flat if one of them is."""
+    """Joint class, second origin (None: the contact point), and radii; ``a`` is flat if one side is."""
     forms = {a.form, b.form}
     if sticks:
         if CORNER in forms or forms <= set(SHARP):
@@ -361,18 +362,18 @@ def _joint_kind(
 
 
 def _normal_axes(up: np.ndarray, c: StaticContact) -> np.ndarray:
-    """Axes of a frame: z along the normal; in the plane y is its normal."""
+    """Axes of a frame: z along the contact normal; in a planar model y is normal to the plane."""
     t = c.frame[1]
     return np.column_stack([t, np.cross(up, t), up])
 
 
 def _axes_with_z(z: np.ndarray) -> np.ndarray:
-    """Axes with this z."""
+    """Orthonormal axes with the given z axis."""
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
 
 
 def missing_joints_text(missing: Mapping[str, str]) -> str:
-    """Why contacts are not known, in words."""
+    """Text with the reasons why contacts have no equivalent joints."""
     return "; ".join(missing.values())

@@ -1,11 +1,10 @@
-"""The state at rest, and whether an equilibrium is stable.
+"""State at rest, and stability of an equilibrium.
 
-`RestState` has the forces left unbalanced at a position, the stiffness, and the steps of Newton's method;
-everything is in units of energy: translations count as parts of the mechanism's length. Stability follows from the
-constrained stiffness, direction by direction, each coordinate in units of the stiffness that acts on it
-(Sylvester's law of inertia). At nonsmooth points an equilibrium is stable if the potential rises on all sides, and
-unstable if it falls along a direction on the side where that direction leads. Forces without potential are judged
-by the eigenvalues.
+`RestState` has the residual forces at a position, the stiffness, and the steps of Newton's method. All quantities are
+energies: translations are divided by the mechanism's length. Stability follows from the constrained stiffness,
+direction by direction, with each coordinate in units of the stiffness that acts on it (Sylvester's law of inertia).
+At nonsmooth points an equilibrium is stable if the potential rises on all sides, and unstable if it falls along a
+direction that leads into a side where it falls. Forces without potential are judged by the eigenvalues.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ class RestState:
 
     Attributes
     ----------
-    c : Compiled
+    c : CompiledMechanism
         In absolute coordinates.
     t : float [s]
     q, lam : ndarray
@@ -58,41 +57,41 @@ class RestState:
     t: float
     q: np.ndarray
     lam: np.ndarray
-    known_stability: Any = field(default=None, repr=False)  # on its stability, once asked for
+    known_stability: Any = field(default=None, repr=False)  # stability, stored when first computed
 
     @classmethod
     def at(cls, c: CompiledMechanism, t: float, q: np.ndarray) -> RestState:
-        """With the multipliers that balance the forces best."""
+        """State with the multipliers that balance the forces best."""
         bare = cls(c, t, q, np.zeros(len(c.structure.rows)))
         return cls(c, t, q, bare.balancing_multipliers())
 
     @cached_property
     def equations(self) -> EquationDerivatives:
-        """The equations there."""
+        """Equations of motion and their derivatives at this state."""
         return EquationDerivatives(MechanismState.resting(self.c, self.t, self.q, self.lam))
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """Size of a step of one along every velocity: the mechanism's length, or a radian."""
+        """Natural size of a step along every velocity: the mechanism's length, or 1 rad."""
         return self.c.sizes
 
     @cached_property
     def G(self):
-        """All constraints, those on velocities too: none of them lets a displacement through. Unit rows; sparse."""
+        """Jacobian of all constraints, including those on velocities, with unit rows; sparse."""
         import scipy.sparse as sp
 
         return sp.diags(self.row_scale) @ self.equations.by_velocity[self.equations.at["n"]] @ sp.diags(self.scale)
 
     @cached_property
     def row_scale(self) -> np.ndarray:
-        """What makes the rows' length one."""
+        """Factors that scale the rows to unit norm."""
         G = self.equations.by_velocity[self.equations.at["n"]]
         size = np.sqrt(np.asarray((G.multiply(G)) @ (self.scale**2)).ravel())
         return 1.0 / np.where(size > 0.0, size, 1.0)
 
     @cached_property
     def K(self):
-        """Stiffness, scaled, sparse."""
+        """Scaled stiffness, sparse."""
         import scipy.sparse as sp
 
         d = sp.diags(self.scale)
@@ -100,40 +99,40 @@ class RestState:
 
     @cached_property
     def r(self) -> np.ndarray:
-        """What is left of the forces under these multipliers, scaled."""
+        """Scaled residual forces with these multipliers."""
         return self.scale * self.equations.block("r")
 
     @cached_property
     def g(self) -> np.ndarray:
-        """Constraints' violations, scaled as G; those on velocities have none."""
+        """Violations of the constraints, scaled like G; zero for constraints on velocities."""
         which = np.array([r.holonomic for r in self.c.structure.rows], bool)
         return np.where(which, self.row_scale * self.equations.block("g"), 0.0)
 
     @cached_property
     def size(self) -> float:
-        """The largest energy that acts or that stiffness makes of a step of one."""
+        """Largest energy of the forces, or of the stiffness, for a unit step."""
         most = np.abs(self.scale * force_magnitudes(self.equations)).max(initial=0.0)
         return float(max(most, np.abs(self.K.data).max(initial=0.0), 1e-300))
 
     @cached_property
     def turns(self) -> np.ndarray:
-        """Which velocities turn, (nv,) bool."""
+        """Which velocities are rotations, (nv,) bool."""
         return np.array([n.unit == "rad" for n in velocity_names(self.c.structure)], bool)
 
     def missing(self) -> float:
-        """What is left of the forces, of what acts, and the largest gap of the constraints."""
+        """Largest residual force relative to the applied forces, plus the largest constraint gap."""
         return float(np.abs(self.r).max(initial=0.0) / self.size + np.abs(self.g).max(initial=0.0))
 
     def settled(self, part: float) -> bool:
-        """Whether every equation is balanced, but for a part of what acts in it."""
+        """Whether every residual is below ``part`` of the forces in its equation plus rounding."""
         return is_balanced(self.equations, part)
 
     def unbalanced(self) -> float:
-        """The largest force that the best multipliers leave, of those that act in its equation."""
+        """Largest residual with the best multipliers, relative to the forces of its equation."""
         return unbalanced_fraction(RestState(self.c, self.t, self.q, self.balancing_multipliers()).equations)
 
     def pushed(self) -> str:
-        """The largest force that is left along a free coordinate, in words."""
+        """Text that names the largest residual force along a free coordinate."""
         f = free_coordinates(self.equations)
         force = -f.Zv.T @ self.equations.block("r")
         if not len(force):
@@ -144,22 +143,22 @@ class RestState:
         return f"{force[k]:.3g} {'N' if name.unit == 'm' else 'N*m'} push along {name.name}"
 
     def open(self) -> float:
-        """The largest gap, of the mechanism's length or in radians."""
+        """Largest gap, relative to the mechanism's length or in radians."""
         return float(np.abs(self.equations.block("g")).max(initial=0.0)) / self.c.values.length
 
     def balancing_multipliers(self) -> np.ndarray:
-        """Multipliers that leave the least of the forces."""
+        """Multipliers with the smallest residual forces."""
         if not len(self.g):
             return self.lam
         return self.lam + self.row_scale * minimum_norm_solution(self.G.T, self.r)
 
     def step(self, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Newton's step, scaled, and the change of multipliers; damped by so many times the identity.
+        """Scaled step of Newton's method and change of the multipliers, with ``damping`` times the identity added.
 
         Raises
         ------
         SingularityError
-            If a law has no value or no slope there.
+            If a law has no value or no derivative there.
         """
         try:
             return self._solve(self.r, self.g, damping)
@@ -169,12 +168,12 @@ class RestState:
             raise
 
     def solved(self, r: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Changes of positions along the velocities and of multipliers that make up for changes r and g."""
+        """Changes of positions and multipliers that compensate changes r and g of the equations."""
         step, lam = self._solve(self.scale * r, self.row_scale * g, 0.0)
         return self.scale * step, lam
 
     def _solve(self, r: np.ndarray, g: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
-        """The linear equations, every row and column by its own stiffness: soft directions beside stiff ones count."""
+        """Solve the linear equations, scaled by each row's own stiffness so that soft directions stay accurate."""
         import scipy.sparse as sp
 
         n = len(self.scale)
@@ -195,7 +194,7 @@ class RestState:
         return own * x[:n], rows * x[n:] * self.row_scale
 
     def _solve_dense(self, r: np.ndarray, g: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
-        """The same of a small mechanism, in arrays: sparse ones take longer to be made than to be solved."""
+        """Like `_solve` with dense matrices, which are faster for a small mechanism."""
         n = len(self.scale)
         K = self.K.toarray() + damping * self.size * np.eye(n)
         stiff = np.abs(K).max(axis=1, initial=0.0)
@@ -212,13 +211,13 @@ class RestState:
         return own * x[:n], rows * x[n:] * self.row_scale
 
     def moved(self, step: np.ndarray, lam: np.ndarray) -> RestState:
-        """A scaled step on."""
+        """State after a scaled step."""
         q = self.q.copy()
         retract(self.c.values.system, q, self.scale * step)
         return RestState(self.c, self.t, q, self.lam + lam)
 
     def closed(self) -> RestState:
-        """Back on the constraints, with the multipliers that balance best."""
+        """State projected onto the constraints, with the multipliers that balance best."""
         now = self
         for _ in range(8):
             if not len(now.g) or np.abs(now.g).max() < 1e-12 * self.c.values.length:
@@ -227,15 +226,15 @@ class RestState:
         return RestState.at(now.c, now.t, now.q)
 
 
-NEUTRAL_STIFFNESS = 1e-8  # stiffness below this part of what acts is none
+NEUTRAL_STIFFNESS = 1e-8  # stiffness below this part of its terms counts as zero
 
 
 @dataclass
 class ConstrainedStiffness:
-    """The constrained stiffness at a place, direction by direction.
+    """Constrained stiffness at a position and its principal directions.
 
-    ``matrix`` (f, f), ``along`` (nv, f) in scaled velocities, ``parts`` (f,) of what acts, and whether it is that of a
-    ``potential``; ``within`` is `across`.
+    ``matrix`` (f, f); ``along`` (nv, f) are the directions in scaled velocities; ``parts`` (f,) their stiffness
+    relative to its terms; ``potential`` tells whether the matrix is symmetric; ``within`` implements `across`.
     """
 
     matrix: np.ndarray
@@ -245,12 +244,12 @@ class ConstrainedStiffness:
     within: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]] = field(repr=False)
 
     def across(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """``along`` and ``parts`` of the motions that some normals (m, nv), in scaled velocities, say nothing of."""
+        """``along`` and ``parts`` for the motions orthogonal to some normals (m, nv), in scaled velocities."""
         return self.within(normals)
 
 
 def constrained_stiffness(x: RestState, f: FreeCoordinates) -> ConstrainedStiffness:
-    """The stiffness of the freedoms at a place."""
+    """Stiffness of the free motions at a position."""
     e = x.equations
     K = f.Zv.T @ e.by_position[e.at["r"]] @ f.Zv
     Z = f.Zv / x.scale[:, None]
@@ -275,22 +274,22 @@ def constrained_stiffness(x: RestState, f: FreeCoordinates) -> ConstrainedStiffn
     return ConstrainedStiffness(K, *within(np.zeros((0, len(Z)))), potential, within)
 
 
-NEUTRAL_ON_SIDE = 1e-5  # stiffness below this part of what acts is none, the way across considered
-MAX_NONSMOOTH = 6  # kinks of which all sides are looked at
-SIDE_OFFSET = 2e-6  # way to a side of a kink, in radians or parts of the mechanism's length
-GROWTH_LIMIT = 1e-4  # growth below this part of the fastest is none
-INSIDE_TOLERANCE = 1e-6  # a direction lies on a side, but for this part
+NEUTRAL_ON_SIDE = 1e-5  # the same limit for one side of a kink, where the offset adds error
+MAX_NONSMOOTH = 6  # largest number of kinks whose sides are all examined
+SIDE_OFFSET = 2e-6  # offset to one side of a kink [rad, or relative to the mechanism's length]
+GROWTH_LIMIT = 1e-4  # growth rate below this part of the fastest counts as zero
+INSIDE_TOLERANCE = 1e-6  # tolerance of the test whether a direction leads into a side
 
 
 def one_sided_stability(
     x: RestState, f: FreeCoordinates, found: Sequence[NonsmoothPoint]
 ) -> tuple[str, ConstrainedStiffness]:
-    """What all sides of kinks say together, and the stiffness of that with the least.
+    """Stability from all sides of the kinks, and the stiffness of the side with the lowest one.
 
     Raises
     ------
     SingularityError
-        If a force jumps, or the sides leave stability open.
+        If a force jumps, or stability does not follow from the sides.
     """
     if any(k.jump for k in found):
         raise nonsmooth_error(found, x.t, "whether it is stable there is open")
@@ -317,10 +316,11 @@ def one_sided_stability(
 
 
 def _stability_on_side(s: ConstrainedStiffness, normals: np.ndarray, x: RestState, f: FreeCoordinates) -> str:
-    """What one side of kinks says of stability; nothing if it leaves it open.
+    """Stability on one side of the kinks; empty if undetermined.
 
-    On a cone a quadratic form is least along a direction in which it is stationary within one of the cone's faces
-    (Kaplan 2000), so every face is asked for its own. Without a potential only a motion that stays on the side tells.
+    The minimum of a quadratic form on a cone lies along a direction that is stationary within one of the faces of the
+    cone (Kaplan 2000), so every face is examined. Without a potential only a growing motion that stays on the side is a
+    proof of instability.
     """
     if not s.potential:
         return UNSTABLE if _has_growing_motion(x, f, normals) else ""
@@ -337,13 +337,13 @@ def _stability_on_side(s: ConstrainedStiffness, normals: np.ndarray, x: RestStat
 
 
 def _lead_inside(along: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Which directions (nv, n), or their opposites, lead to the inside of normals, or along their border."""
+    """Which directions (nv, n), or their opposites, lead to the positive side of all normals, or along it."""
     inward = normals @ along / np.linalg.norm(normals, axis=1)[:, None]
     return (inward >= -INSIDE_TOLERANCE).all(axis=0) | (inward <= INSIDE_TOLERANCE).all(axis=0)
 
 
 def _has_growing_motion(x: RestState, f: FreeCoordinates, normals: np.ndarray) -> bool:
-    """Whether a straight motion grows that stays on a side: d e^(s t), of real s > 0 and d on the side."""
+    """Whether a growing straight motion stays on the side: d e^(s t) with real s > 0 and d on the side."""
     from scipy.linalg import eig
 
     e = x.equations
@@ -357,7 +357,7 @@ def _has_growing_motion(x: RestState, f: FreeCoordinates, normals: np.ndarray) -
 
 
 def _distinct_normals(normals: Sequence[np.ndarray]) -> np.ndarray:
-    """Normals of which none is along another."""
+    """Remove normals that are parallel to another one."""
     out: list[np.ndarray] = []
     for n in normals:
         n = n / np.linalg.norm(n)
@@ -367,7 +367,7 @@ def _distinct_normals(normals: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _interior_step(A: np.ndarray) -> np.ndarray | None:
-    """A step that leads to the inside of A step >= 0, of entries up to one; None if there is none."""
+    """A step with A step > 0 and entries of at most one; None if there is none."""
     from scipy.optimize import linprog
 
     m, n = A.shape
@@ -378,26 +378,26 @@ def _interior_step(A: np.ndarray) -> np.ndarray | None:
     return found.x[:n] if found.success and found.x[-1] > INSIDE_TOLERANCE else None
 
 
-NEGATIVE_DAMPING = 1e-12  # of the largest damping: what is negative beyond is no rounding
+NEGATIVE_DAMPING = 1e-12  # negative damping below this part of the largest is rounding
 
 
 @dataclass
 class Stability:
-    """What the stiffness says.
+    """Stability of an equilibrium, with the direction of lowest stiffness.
 
     Attributes
     ----------
     kind : str
         ``"stable"``, ``"marginal"`` or ``"unstable"``.
-    free : Free
+    free : FreeCoordinates
     stiffness : ndarray (f, f)
-        Of the freedoms; at a kink on the side where least of it is.
+        Stiffness of the free motions; at a kink that of the side with the lowest one.
     direction : ndarray (nv,)
-        Of least stiffness, in scaled velocities.
+        Direction of lowest stiffness, in scaled velocities.
     least : float
-        That stiffness, as part of what springs, weights and reactions do along it by themselves.
+        Lowest stiffness relative to the separate contributions of springs, weights and reactions.
     kinks : tuple of str
-        Forces with another slope on the other side of this place, in words.
+        Descriptions of forces with a kink at this position.
     """
 
     kind: str
@@ -409,12 +409,12 @@ class Stability:
 
 
 def stability(x: RestState) -> Stability:
-    """Stability of an equilibrium; where forces have kinks there, from all sides of them.
+    """Stability of an equilibrium; where forces have kinks, from all their sides.
 
     Raises
     ------
     SingularityError
-        If a force jumps there, or the sides of its kinks leave stability open.
+        If a force jumps there, or stability does not follow from the sides of its kinks.
     """
     if x.known_stability is None:
         x.known_stability = _computed_stability(x)
@@ -436,7 +436,7 @@ def _computed_stability(x: RestState) -> Stability:
     s = constrained_stiffness(x, f)
     k = int(np.argmin(s.parts))
     kind = UNSTABLE if s.parts[k] < -NEUTRAL_STIFFNESS else MARGINAL if s.parts[k] <= NEUTRAL_STIFFNESS else STABLE
-    if not s.potential:  # flutter shows in the motion
+    if not s.potential:  # flutter follows from the eigenvalues only
         refuse_nonsmooth(e, still, f.Zv)
         kind = _stability_by_motion(e, f)
     elif kind == STABLE and _has_negative_damping(e, f) and _stability_by_motion(e, f) == UNSTABLE:
@@ -445,27 +445,27 @@ def _computed_stability(x: RestState) -> Stability:
 
 
 def _has_negative_damping(e: EquationDerivatives, f: FreeCoordinates) -> bool:
-    """Whether forces that follow velocities give energy to some motion: a negative damper."""
+    """Whether velocity-dependent forces add energy to some motion (negative damping)."""
     D = f.Zv.T @ e.by_velocity[e.at["r"]] @ f.Zv
     d = np.linalg.eigvalsh(0.5 * (D + D.T))
     return bool(len(d) and d[0] < -NEGATIVE_DAMPING * np.abs(d).max())
 
 
 def stability_by_eigenvalues(eigenvalues: Spectrum, *, discrete: bool = False) -> str:
-    """Stability by the motion, each eigenvalue judged by what it is uncertain by itself.
+    """Stability from eigenvalues, each judged with its own uncertainty.
 
     Parameters
     ----------
     eigenvalues : Spectrum
     discrete : bool
-        Whether they are multipliers from one instant to the next, which must not exceed 1 in size.
+        Whether they are multipliers of a discrete system, which must not exceed 1 in magnitude.
     """
     most = largest_growth(eigenvalues.values, eigenvalues.uncertainty, discrete=discrete)
     return UNSTABLE if most > 0.0 else MARGINAL if most == 0.0 else STABLE
 
 
 def _stability_by_motion(e: EquationDerivatives, f: FreeCoordinates) -> str:
-    """Stability by the eigenvalues, damping included."""
+    """Stability from the eigenvalues, with damping."""
     none = np.zeros((len(f.scale),) * 2)
     r = reduced_equations(e, f, TurningFrame(np.zeros(3), none, none))
     return stability_by_eigenvalues(spectrum(r.A, r.uncertainty))

@@ -1,7 +1,7 @@
 """Studies: many runs of one model, grids and Monte Carlo samples, and comparison of formulations.
 
-`sampling` makes the points, `run_analyses` says what one run computes and what is read from it, `study` runs them
-on threads or an executor and keeps the file. A study imports every analysis that a run may ask for; no analysis
-imports a study. A new analysis of a study is a subclass of `run_analyses.RunAnalysis`, listed in
-`study.ANALYSES`.
+`sampling` creates the points, `run_analyses` defines what one run computes and which quantities are read from its
+result, `study` runs them on threads or an executor and stores them in a file. A study imports every analysis that a run
+can perform; no analysis imports a study. A new analysis of a study is a subclass of `run_analyses.RunAnalysis`, listed
+in `study.ANALYSES`.
 """

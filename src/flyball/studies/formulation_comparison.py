@@ -1,4 +1,4 @@
-"""One motion by several formulations of the same equations: drift, energy loss and cost of each."""
+"""One motion computed by several formulations of the same equations: drift, energy error and cost of each."""
 
 from __future__ import annotations
 
@@ -42,20 +42,28 @@ from ..simulation.simulate import clock_for, row_width, run_clock
 from ..simulation.solver_switching import CodeSelection
 from ..tables.law_inputs import nonsmooth_elements
 
-REFERENCE_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9)  # relative tolerances of the reference: the first that gets through
-MAX_REFERENCE_STEPS = 300_000  # steps after which a reference is given up: where a law chatters there is none
-STEP_LIMIT_FACTOR = 20  # times the steps of the reference: what takes more is given up
-REPEAT_SECONDS = 2.0  # seconds of runs of one formulation after which it is not run once more
+REFERENCE_TOLERANCES = (
+    1e-12,
+    1e-11,
+    1e-10,
+    1e-9,
+)  # relative tolerances of the reference; the first that succeeds is used
+# Steps after which a reference is abandoned: where a law chatters there is none.
+MAX_REFERENCE_STEPS = 300_000
+# Step limit of a formulation, relative to the steps of the reference.
+STEP_LIMIT_FACTOR = 20
+# Timing runs of one formulation are repeated up to this total duration [s].
+REPEAT_SECONDS = 2.0
 
 
 class FormulationChoice(NamedTuple):
-    """A formulation: choices of a simulation, and what to call them."""
+    """A formulation: simulation options and their name."""
 
     meaning: str
     stabilization: str = "projection"
     coordinates: str = "absolute"
     coupled: bool = False
-    method: str = ""  # an implicit one
+    method: str = ""  # implicit method
 
 
 EXPLICIT_FORMULATIONS = {
@@ -94,13 +102,13 @@ IMPLICIT_FORMULATIONS = {
         "a variational integrator on Lie groups, of order 2: symplectic", method=VARIATIONAL
     ),
 }
-"""Methods that hold motions to constraints themselves, by name."""
+"""Methods that enforce the constraints themselves, by name."""
 FORMULATIONS = EXPLICIT_FORMULATIONS | IMPLICIT_FORMULATIONS
 
 
 @dataclass(frozen=True, kw_only=True)
 class CompareOptions(Options):
-    """What `Mechanism.compare` is asked."""
+    """Arguments of `Mechanism.compare`."""
 
     t_end: float
     t_start: float | None
@@ -139,7 +147,7 @@ class CompareOptions(Options):
         self.integration_options(EXPLICIT_FORMULATIONS["baumgarte"])
 
     def integration_options(self, formulation: FormulationChoice, max_steps: int = MOST_STEPS) -> Integration:
-        """How a formulation is integrated; those with methods of their own take ``step`` if it is given."""
+        """Integration options of a formulation; those with their own method use ``step`` if it is given."""
         rates = (self.alpha, self.beta) if formulation.stabilization == "baumgarte" else (None, None)
         return Integration(
             coordinates=formulation.coordinates,
@@ -158,7 +166,7 @@ class CompareOptions(Options):
 
 @dataclass
 class _ComparisonTask:
-    """What all formulations have to do."""
+    """The motion that all formulations compute."""
 
     model: Model
     asked: CompareOptions
@@ -188,7 +196,7 @@ def compare(model: Model, o: CompareOptions) -> Comparison:
 def _run_all(
     job: _ComparisonTask, truth: Result | None, reference_text: str, report_progress: ReportProgress
 ) -> Comparison:
-    """Run all, first to see what becomes of the motion, then for their cost."""
+    """Run all formulations, first for the results, then for their cost."""
     starts: dict[str, InitialState] = {}
     rows = []
     names = job.asked.formulations or ()
@@ -219,7 +227,7 @@ def _checked_names(names: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def _reference(job: _ComparisonTask) -> tuple[Result | None, str]:
-    """The motion by projection at the finest tolerance that gets through singular positions, and what it is."""
+    """Reference motion by projection at the finest tolerance that succeeds, and its description."""
     why = "the tolerances asked for are as fine"
     usual = _integration(job, "projection")
     for rtol in REFERENCE_TOLERANCES:
@@ -233,12 +241,12 @@ def _reference(job: _ComparisonTask) -> tuple[Result | None, str]:
 
 
 def _initial_state(job: _ComparisonTask, formulation: FormulationChoice) -> InitialState:
-    """The start for one formulation.
+    """Initial state for one formulation.
 
     Raises
     ------
     AnalysisError
-        If there is no such formulation for this mechanism.
+        If the formulation does not exist for this mechanism.
     """
     a, rows = job.base.assembly, len(job.base.assembly.compiled.structure.rows)
     if formulation.method:
@@ -269,7 +277,7 @@ def _initial_state(job: _ComparisonTask, formulation: FormulationChoice) -> Init
 
 
 def _integrate(job: _ComparisonTask, start: InitialState, o: Integration) -> tuple[Result | None, str]:
-    """The motion, as far as it goes, and why it goes no further."""
+    """The motion as far as it could be computed, and the reason why it stopped."""
     clock, rows, _, failed = _run_loop(job, start, o, job.times)
     here = EventContext(start, clock)
     here.failed = failed
@@ -282,7 +290,7 @@ def _integrate(job: _ComparisonTask, start: InitialState, o: Integration) -> tup
 def _run_loop(
     job: _ComparisonTask, start: InitialState, o: Integration, times: np.ndarray
 ) -> tuple[ex.StepState, np.ndarray, float, Exception | None]:
-    """Run the compiled loop from the start. Returns (clock, rows, time of the processor [s], why it failed)."""
+    """Run the compiled loop from the start: (integrator state, rows, processor time [s], error)."""
     W = start.assembly.compiled.work
     W.counts[:] = 0
     W.options.position_violation = W.options.velocity_violation = 0.0
@@ -304,7 +312,7 @@ def _run_loop(
 
 
 def _formulation(job: _ComparisonTask, name: str, starts: dict[str, InitialState], truth: Result | None) -> Formulation:
-    """The motion by one formulation, and what can be said about it."""
+    """The motion by one formulation, with drift, error and steps."""
     way, nothing = FORMULATIONS[name], np.zeros(0)
     try:
         starts[name] = start = _initial_state(job, way)
@@ -334,7 +342,7 @@ def _state(c: CompiledMechanism, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _drifts(absolute: CompiledMechanism, c: CompiledMechanism, result: Result) -> tuple[np.ndarray, np.ndarray]:
-    """Largest |g| and |G v - nu| at every output time, by the rows of absolute coordinates."""
+    """Largest |g| and |G v - nu| at every output time, of the constraints in absolute coordinates."""
     g, gv = np.zeros(len(result.t)), np.zeros(len(result.t))
     if not len(absolute.structure.rows):
         return g, gv
@@ -352,8 +360,9 @@ def _drifts(absolute: CompiledMechanism, c: CompiledMechanism, result: Result) -
 
 
 def _motion_difference(absolute: CompiledMechanism, truth: Result, c: CompiledMechanism, result: Result) -> float:
-    """How far apart two motions are at most [m], at output times and at the end: ways of mass centres, and turns at the
-    mechanism's length.
+    """Largest distance of two motions [m] at output times and at the end.
+
+    Displacements of mass centres, and rotations times the mechanism's length.
     """
     there = absolute.moving(truth.final[0], *_state(absolute, truth.final[1]))
     here = c.moving(result.final[0], *_state(c, result.final[1]))
@@ -366,7 +375,7 @@ def _motion_difference(absolute: CompiledMechanism, truth: Result, c: CompiledMe
 
 
 def _pose_distance(p: np.ndarray, R: np.ndarray, length: float) -> float:
-    """The largest of ways [m], and of turns at that length, by differences of positions and of rotation matrices."""
+    """Largest displacement [m] or rotation times the length, from differences of positions and rotation matrices."""
     turn = 2.0 * np.arcsin(np.minimum(1.0, np.linalg.norm(R, axis=(1, 2)) / np.sqrt(8.0)))
     return float(np.maximum(np.linalg.norm(p, axis=1), length * turn).max(initial=0.0))
 
@@ -374,7 +383,7 @@ def _pose_distance(p: np.ndarray, R: np.ndarray, length: float) -> float:
 def _measure_costs(
     job: _ComparisonTask, rows: list[Formulation], starts: Mapping[str, InitialState], report_progress: ReportProgress
 ) -> None:
-    """Run those that reached the end again without outputs on the way, one after the other, for their cost."""
+    """Repeat the formulations that reached the end without intermediate outputs, to measure their cost."""
     end = job.times[-1:] * 0.0 + job.span[1]
     spent: dict[str, list[float]] = {f.name: [] for f in rows if f.success}
     repeats = job.asked.repeats

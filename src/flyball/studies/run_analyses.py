@@ -40,20 +40,20 @@ CURVE, END, FUNCTION, VALUE = "curve", "end", "function", "value"
 
 @dataclass(frozen=True)
 class StudyQuantity:
-    """One quantity of a study: ``how`` it is read off what is called ``name``, or off the answer by a function."""
+    """One quantity of a study: ``how`` it is read from ``name`` in the result, or computed by a function."""
 
     title: str
     how: str
     name: str
     unit: str
     function: Callable[[Any], Any] | None = None
-    of: tuple[Any, ...] = ()  # what else its name says
+    of: tuple[Any, ...] = ()  # further parts of its name
 
 
 def study_quantities(
     of: Sequence[str] | Mapping[str, Callable[[Any], Any]], named: Callable[[Any], StudyQuantity]
 ) -> tuple[StudyQuantity, ...]:
-    """What is asked for.
+    """The requested quantities.
 
     Raises
     ------
@@ -73,12 +73,12 @@ def study_quantities(
 
 
 def ends_only(quantities: Sequence[StudyQuantity]) -> bool:
-    """Whether nothing but the ends of motions is looked at."""
+    """Whether only the ends of motions are needed."""
     return all(r.how == END for r in quantities)
 
 
 def reduce_curve(reduction: str, t: np.ndarray, y: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """A curve at the times of the study (nan where the motion has ended before), or one number of it."""
+    """A curve at the times of the study (NaN after the end of the motion), or one number of it."""
     if reduction == CURVE and t is times:
         return y
     if reduction == CURVE:
@@ -106,14 +106,14 @@ CALL_NAME = re.compile(r"\s*(\w+)\s*\(.*\)\s*")
 
 
 class RunAnalysis:
-    """An analysis that a study asks, of one point.
+    """An analysis that a study performs at one point.
 
     Attributes
     ----------
     title : str
-        As it is called in ``analysis=``.
+        Its name in ``analysis=``.
     takes : tuple of str
-        Options that it has, besides those of every study.
+        Options that it accepts, besides those of every study.
     timed : bool
         Whether it has output times.
     """
@@ -123,22 +123,22 @@ class RunAnalysis:
     timed = False
 
     def refuse(self, model: Model) -> None:
-        """Refuse a model that it knows nothing of, before there are runs."""
+        """Refuse a model that the analysis does not support, before any run."""
 
     def options(self, known: Mapping[str, Any], times: np.ndarray, quantities: Sequence[StudyQuantity]) -> Options:
-        """What each run is asked, but for the parameters that are varied."""
+        """Options of each run, except the varied parameters."""
         raise NotImplementedError
 
     def run(self, model: Model, o: Any) -> Any:
-        """The answer at one point."""
+        """The result at one point."""
         raise NotImplementedError
 
     def remarks(self, found: Any) -> Sequence[object]:
-        """What a single run would say besides."""
+        """Remarks of a single run."""
         return ()
 
     def doubtful(self, found: Any) -> Sequence[str]:
-        """Reasons to think that the answer is not what its tolerance asks for."""
+        """Reasons why the result may not meet its tolerance."""
         return ()
 
     def named(self, model: Model, text: Any) -> StudyQuantity:
@@ -152,16 +152,16 @@ class RunAnalysis:
         raise NotImplementedError
 
     def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
-        """A quantity of an answer."""
+        """Value of a quantity in a result."""
         raise NotImplementedError
 
     def read(self, found: Any, quantities: Sequence[StudyQuantity], times: np.ndarray) -> list[np.ndarray]:
-        """What is asked for of one run: (times,) for a curve, else ()."""
+        """Requested quantities of one run: (times,) for a curve, else ()."""
         return [_function_value(r, found) if r.how == FUNCTION else self.value(found, r, times) for r in quantities]
 
 
 class TimedAnalysis(RunAnalysis):
-    """An analysis whose answer is a result over output times."""
+    """An analysis whose result has output times."""
 
     timed = True
 
@@ -177,7 +177,7 @@ class TimedAnalysis(RunAnalysis):
         return StudyQuantity(text, how, name, single_quantity(model, name).unit)
 
     def value(self, found: Any, r: StudyQuantity, times: np.ndarray) -> np.ndarray:
-        """Read off the curve."""
+        """Value of the quantity, from its curve."""
         return reduce_curve(r.how, found.t, found.curve(r.name)[1], times)
 
     def remarks(self, found: Any) -> Sequence[object]:

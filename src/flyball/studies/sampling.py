@@ -17,8 +17,8 @@ from ..model.units import same_kind
 
 LISTED_DESIGNS, SAMPLED_DESIGNS = ("grid", "list"), ("random", "latin", "sobol", "saltelli")
 DESIGNS = (*LISTED_DESIGNS, *SAMPLED_DESIGNS)
-MAX_RUNS = 20_000_000  # runs that a table is made for
-DISTRIBUTIONS = {  # name -> (what its arguments are, SciPy's distribution of them)
+MAX_RUNS = 20_000_000  # largest number of runs
+DISTRIBUTIONS = {  # name -> (meaning of its arguments, SciPy distribution)
     "uniform": ("low, high", lambda stats, a, b: stats.uniform(a, b - a)),
     "loguniform": ("low, high", lambda stats, a, b: stats.loguniform(a, b)),
     "normal": ("mean, standard deviation", lambda stats, a, b: stats.norm(a, b)),
@@ -35,7 +35,7 @@ def sample_points(
     Raises
     ------
     ModelError
-        If a parameter does not exist, or what is given for it makes no values.
+        If a parameter does not exist, or its specification is invalid.
     """
     env = model.environment()
     for name in vary:
@@ -71,7 +71,7 @@ def _refuse_many(n: int) -> None:
 
 
 def _listed_values(model: Model, name: str, given: Any) -> np.ndarray:
-    """Values of a parameter that are given one by one."""
+    """Values of a parameter that are given as a list."""
     if isinstance(given, str) or hasattr(given, "ppf") or not isinstance(given, (Sequence, np.ndarray)):
         raise ModelError(
             f"vary {name!r}: a grid takes a list of values, not {given!r}; ranges and distributions go with "
@@ -134,7 +134,7 @@ def _distribution(model: Model, name: str, given: Any) -> Any:
 
 
 def _check_distribution(name: str, kind: str, a: float, b: float) -> None:
-    """Refuse a distribution that there is not."""
+    """Refuse an invalid distribution."""
     if kind in ("uniform", "loguniform") and not a < b:
         raise ModelError(f"vary {name!r}: the lower end {a:g} must be smaller than the upper one {b:g}")
     if kind in ("loguniform", "lognormal") and not a > 0.0:
@@ -144,7 +144,7 @@ def _check_distribution(name: str, kind: str, a: float, b: float) -> None:
 
 
 def _unit_cube_points(design: str, n: int, d: int, seed: int) -> np.ndarray:
-    """Points of the unit cube (n, d), by SciPy's generators where they are not merely random."""
+    """Points of the unit cube (n, d); SciPy's generators for all designs but plain random ones."""
     rng = np.random.default_rng(seed)
     if design == "random":
         return rng.random((n, d))

@@ -54,14 +54,15 @@ from .run_analyses import (
 )
 from .sampling import DESIGNS, SAMPLED_DESIGNS, sample_points
 
-MIN_RUNS_FOR_CODE = 3  # runs for which it is not worth while to look whether code pays
+# With fewer runs it is not checked whether generated code is worthwhile.
+MIN_RUNS_FOR_CODE = 3
 
 
 @dataclass(frozen=True)
 class RunSpecification:
-    """What each run of a study is asked: the analysis and its options, and what is read of it.
+    """Specification of the runs of a study: the analysis with its options, and the quantities.
 
-    ``model`` is a snapshot, ``names`` are the parameters that are varied, ``times`` the output times [s].
+    ``model`` is a snapshot, ``names`` are the varied parameters, ``times`` the output times [s].
     """
 
     model: Model
@@ -77,15 +78,16 @@ class RunSpecification:
         return replace(self.options, parameters={**(self.options.parameters or {}), **values})
 
     def empty(self, n: int) -> RunResults:
-        """Answers of n runs that are not there yet."""
+        """Empty results of n runs."""
         shapes = [(n, len(self.times)) if r.how == CURVE else (n,) for r in self.asked]
         return RunResults([np.full(s, np.nan) for s in shapes], np.zeros(n, np.int8))
 
 
 @dataclass
 class RunResults:
-    """Values (runs, ...) of each quantity, how far each run is; by numbers of runs why they failed or are doubtful,
-    and remarks.
+    """Results of runs: values (runs, ...) of each quantity, and the status of each run.
+
+    By run number also the reasons of failures and doubts, and remarks.
     """
 
     values: list[np.ndarray]
@@ -93,10 +95,10 @@ class RunResults:
     reasons: dict[int, str] = field(default_factory=dict)
     remarks: dict[int, str] = field(default_factory=dict)
     doubtful: dict[int, str] = field(default_factory=dict)
-    seconds: float = 0.0  # that it took to find them
+    seconds: float = 0.0  # computation time
 
     def take(self, at: np.ndarray, other: RunResults) -> None:
-        """Write those of some runs, ``at`` being their numbers here."""
+        """Store the results of some runs at the run numbers ``at``."""
         for mine, its in zip(self.values, other.values, strict=True):
             mine[at] = its
         self.status[at] = other.status
@@ -105,16 +107,17 @@ class RunResults:
 
 
 def with_generated_code(question: RunSpecification, points: np.ndarray, runs: int) -> RunSpecification:
-    """The same for so many runs, of which some points are given: code for their mechanism is made once, where it pays.
+    """The specification with generated code for its mechanism, if that pays for the number of runs.
 
-    The runs that it serves take it, the others go through the tables; the results are the same to the last bit.
+    Runs for which the code is valid use it, the others use the tables; the results are bit for bit the same.
     """
     o, model = question.options, question.model
     if runs <= MIN_RUNS_FOR_CODE or not isinstance(question.single, MotionAnalysis) or o.specialize is False:
         return question
     if model.contacts or model.bulk or o.method not in (SUITABLE, *TABLEAUX):
         return question
-    for k in dict.fromkeys((0, len(points) // 2, len(points) - 1)):  # one may fail, and says why when its turn comes
+    # A point may fail here; its run then reports the reason.
+    for k in dict.fromkeys((0, len(points) // 2, len(points) - 1)):
         try:
             first = question.single.run(model, replace(question.at(points[k]), specialize=o.specialize is True))
         except FlyballError:
@@ -127,7 +130,7 @@ def with_generated_code(question: RunSpecification, points: np.ndarray, runs: in
 def compute_runs(
     question: RunSpecification, points: np.ndarray, stopped: Callable[[], bool] = lambda: False
 ) -> RunResults:
-    """The runs at some points; those that are left when ``stopped`` says so stay to be done."""
+    """Compute the runs at some points; when ``stopped`` returns true the rest stays open."""
     started = time.perf_counter()
     out = question.empty(len(points))
     for k, point in enumerate(points):
@@ -139,7 +142,7 @@ def compute_runs(
 
 
 def _compute_run(question: RunSpecification, point: np.ndarray, out: RunResults, k: int) -> None:
-    """One run, as number k: whatever it raises is its own, but an interrupt."""
+    """Compute one run as number k; an error fails this run only, except an interrupt."""
     single = question.single
     try:
         found = single.run(question.model, question.at(point))
@@ -157,20 +160,20 @@ def _compute_run(question: RunSpecification, point: np.ndarray, out: RunResults,
 
 def _failure_text(error: Exception) -> str:
     text = str(error) or type(error).__name__
-    text = text.replace("about=m.equilibrium()", "about='equilibrium'")  # which studies take
+    text = text.replace("about=m.equilibrium()", "about='equilibrium'")  # the form that studies accept
     return text if isinstance(error, FlyballError) else f"{type(error).__name__}: {text}"
 
 
-MAX_CACHED_SPECIFICATIONS = 4  # questions that a worker process keeps
+MAX_CACHED_SPECIFICATIONS = 4  # specifications cached in a worker process
 
 
 def pickled_specification(question: RunSpecification, runs: int) -> tuple[str, bytes]:
-    """For other processes, which compute so many runs together: bytes, and what they are known by.
+    """Pickle the specification for other processes that compute so many runs: (key, bytes).
 
     Raises
     ------
     ModelError
-        If it holds something that cannot be sent.
+        If it contains something that cannot be pickled.
     """
     try:
         data = pickle.dumps((question, runs))
@@ -180,7 +183,7 @@ def pickled_specification(question: RunSpecification, runs: int) -> tuple[str, b
 
 
 def _pickled_by_value(question: tuple[RunSpecification, int], pickling: Exception) -> bytes:
-    """With functions that have no name in a module, if what Dask brings for that is there."""
+    """Pickle functions without a module name, too, if cloudpickle (part of Dask) is installed."""
     try:
         import cloudpickle
     except ImportError:
@@ -196,7 +199,7 @@ _CACHE_LOCK = threading.Lock()
 
 
 def compute_remotely(key: str, data: bytes, points: np.ndarray) -> RunResults:
-    """Some runs in another process, which keeps what it made ready for the runs before."""
+    """Compute some runs in another process, which caches the specification."""
     with _CACHE_LOCK:
         question = _CACHE.get(key)
     if question is None:
@@ -214,7 +217,7 @@ def compute_remotely(key: str, data: bytes, points: np.ndarray) -> RunResults:
 @contextmanager
 def _without_start_warnings() -> Iterator[None]:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", StartWarning)  # remarks say it
+        warnings.simplefilter("ignore", StartWarning)  # the remarks contain it
         yield
 
 
@@ -222,18 +225,19 @@ MAX_TASK_RUNS, FIRST_TASK_RUNS, TASKS_PER_STUDY = (
     512,
     8,
     64,
-)  # most runs in a task; in the first ones; into how many these divide a study
-TASK_SECONDS = 0.5  # that a task should take
+    # Largest number of runs per task, number in the first tasks, and number of tasks that a study is split into.
+)
+TASK_SECONDS = 0.5  # target duration of a task
 LAST_TASK_DIVISOR = (
     10  # part of that which the last ones take at least: to read and judge runs has a price for each task
 )
-MAX_TASK_STATES = 100_000  # states that a task keeps at most
-QUEUED_TASKS_PER_WORKER = 4  # tasks that wait, for each worker that there may be
+MAX_TASK_STATES = 100_000  # largest number of states in memory per task
+QUEUED_TASKS_PER_WORKER = 4  # queued tasks per worker
 Task = Callable[[np.ndarray], "Future[RunResults]"]
 
 
 def available_cores() -> int:
-    """How many this process may use."""
+    """Number of cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
@@ -243,9 +247,9 @@ def available_cores() -> int:
 def results_as_completed(
     question: RunSpecification, points: np.ndarray, todo: np.ndarray, executor: Executor | None, threads: int
 ) -> Generator[tuple[np.ndarray, RunResults], None, None]:
-    """(numbers of runs, their answers), in the order in which they are done.
+    """Yield (run numbers, results) in the order of completion.
 
-    When the consumer stops, or is interrupted, runs that have not begun are given up.
+    When the consumer stops or is interrupted, runs that have not started are cancelled.
     """
     size, at = max(1, min(FIRST_TASK_RUNS, len(todo) // TASKS_PER_STUDY)), 0
     most = max(1, min(MAX_TASK_RUNS, MAX_TASK_STATES // len(question.times)))
@@ -276,7 +280,7 @@ def _completed_tasks(waiting: dict[Future[RunResults], np.ndarray]) -> Iterator[
 def _task_submitter(
     question: RunSpecification, points: np.ndarray, executor: Executor | None, threads: int
 ) -> Iterator[tuple[Task, int]]:
-    """(what computes some runs, how many workers there are)."""
+    """Context manager for (function that submits some runs, number of workers)."""
     if executor is not None:
         key, data = pickled_specification(question, len(points))
         yield (
@@ -289,13 +293,15 @@ def _task_submitter(
     try:
         yield lambda some: pool.submit(run, some, stop.is_set), threads
     finally:
-        stop.set()  # runs that go on end, others do not begin
+        stop.set()  # running runs finish, others do not start
         pool.shutdown(cancel_futures=True)
 
 
-SAVE_INTERVAL = 20.0  # seconds between two states of the file
-DEFAULT_OUTPUTS = 501  # output times, where motions are looked at between their ends
-ENERGY_OUTPUTS = 17  # the same, where they are not: their energy balance is
+SAVE_INTERVAL = 20.0  # seconds between two writes of the file
+# Default number of output times if quantities need the motion between its ends.
+DEFAULT_OUTPUTS = 501
+# Default number otherwise: enough for the energy balance.
+ENERGY_OUTPUTS = 17
 ANALYSES = {
     x.title: x
     for x in (
@@ -313,7 +319,7 @@ COMMON_OPTIONS = ("vary", "of", "analysis", "parameters", "design", "samples", "
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOptions(SimulateOptions):
-    """What `Mechanism.study` is asked."""
+    """Arguments of `Mechanism.study`."""
 
     vary: Mapping[str, Any]
     of: Sequence[str] | Mapping[str, Callable]
@@ -370,11 +376,11 @@ class StudyOptions(SimulateOptions):
 
     @property
     def single(self) -> RunAnalysis:
-        """What each run is."""
+        """The analysis of each run."""
         return FunctionAnalysis(self.analysis) if callable(self.analysis) else ANALYSES[self.analysis]
 
     def refuse_idle(self, model: Model) -> None:
-        """Refuse options that the analysis does not have: those that are not what the method has them for."""
+        """Refuse options that the analysis does not have, if they differ from their defaults."""
         usual = inspect.signature(type(model).study).parameters  # type: ignore[attr-defined]
         for f in fields(self):
             if f.name in (*COMMON_OPTIONS, *self.single.takes):
@@ -383,7 +389,7 @@ class StudyOptions(SimulateOptions):
                 raise ModelError(f"{f.name} does nothing with analysis={self.single.title!r}; leave it out")
 
     def question(self, model: Model) -> RunSpecification:
-        """What each run is asked."""
+        """The specification of the runs."""
         single = self.single
         single.refuse(model)
         if (
@@ -424,7 +430,7 @@ def study(model: Model, o: StudyOptions) -> Study:
     if found.analysis == "motion":
         found.start, found.options["method"] = o.start, o.method
     with progress_bar(o.progress, "studying") as tell, warnings.catch_warnings():
-        warnings.simplefilter("ignore", StartWarning)  # remarks of the runs say it
+        warnings.simplefilter("ignore", StartWarning)  # the remarks of the runs contain it
         _compute_missing(question, found, o, tell)
     found.seconds += time.perf_counter() - started
     if o.file is not None:
@@ -436,7 +442,7 @@ def study(model: Model, o: StudyOptions) -> Study:
 
 
 def _study_fingerprint(question: RunSpecification, points: np.ndarray) -> str:
-    """What tells the study from others."""
+    """Fingerprint that identifies the study."""
     o, asked = question.options, [(r.title, r.function) for r in question.asked]
     known = {f.name: getattr(o, f.name) for f in fields(o)} | {"analysis": question.single.title}
     own = getattr(question.single, "function", None)
@@ -448,7 +454,7 @@ def _study_fingerprint(question: RunSpecification, points: np.ndarray) -> str:
 def _blank_study(
     question: RunSpecification, o: StudyOptions, x: np.ndarray, axes: tuple[np.ndarray, ...], mark: str
 ) -> Study:
-    """A study of which nothing is computed."""
+    """A study without results."""
     env = question.model.environment(o.parameters)
     blank = question.empty(len(x))
     return Study(
@@ -470,7 +476,7 @@ def _blank_study(
 
 
 def _option_values(o: Any) -> dict[str, Any]:
-    """Options of the analysis, but those that the study has by itself."""
+    """Options of the analysis, except those of the study itself."""
     told = {f.name: getattr(o, f.name) for f in fields(o) if f.name not in ("outputs", "times", "progress", "start")}
     return told | {"parameters": dict(o.parameters or {})}
 
@@ -481,7 +487,7 @@ def _compute_missing(question: RunSpecification, found: Study, o: StudyOptions, 
     Raises
     ------
     AnalysisError
-        If the executor fails; the file holds what was done by then.
+        If the executor fails; the file contains the results so far.
     """
     todo = np.flatnonzero(found.status == NOT_RUN)
     if not len(todo):

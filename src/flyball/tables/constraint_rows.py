@@ -1,9 +1,8 @@
 """Constraint rows and measured quantities of joints, couplings, drivers, events and switches.
 
-Switches (stops, friction, ropes, ratchets, locks, contacts) are rows with modes of a fixed pattern, and guards:
-functions whose zeros end a mode. Only the tables of a motion have them (`Choices.switches`); for questions
-about positions they are no constraints. Events add rows that actions lock and release, and guards of their
-expressions.
+Switches (stops, friction, ropes, ratchets, locks, contacts) are rows with modes and a fixed sparsity pattern, and
+guards: functions whose zeros end a mode. Only the tables of a motion have them (`Choices.switches`); in analyses of
+positions they are no constraints. Events add rows that actions lock and release, and guards of their expressions.
 """
 
 from __future__ import annotations
@@ -62,7 +61,7 @@ from .table_definitions import (
 
 
 def add_constraint_rows(s: Structure, holds: Sequence[Initial]) -> None:
-    """Rows of joints, couplings, drivers and held coordinates; states that count the turns of angles."""
+    """Add rows of joints, couplings, drivers and held coordinates, and states that count the turns of angles."""
     for joint in s.model.joints:
         _add_joint_rows(s, joint)
     for coupling in s.model.couplings:
@@ -114,7 +113,7 @@ def _add_driver(s: Structure, driver: Driver) -> None:
 
 
 def _prescribed_row(s: Structure, driver: Driver) -> int | None:
-    """Row of the body table whose one coordinate a driver prescribes; none for coordinates that rows must drive."""
+    """Row of the body table whose one coordinate a driver prescribes; None for a coordinate that needs a row."""
     owner, what = s.model.coordinate(driver.coordinate, driver)
     if not isinstance(owner, Joint) or sum(d.coordinate == driver.coordinate for d in s.model.drivers) > 1:
         return None
@@ -122,7 +121,7 @@ def _prescribed_row(s: Structure, driver: Driver) -> int | None:
 
 
 def _add_coordinate_row(s: Structure, e: Driver | Initial, text: str, law: int) -> RowSpec:
-    """The row of a coordinate that follows a law."""
+    """Add the row of a coordinate that follows a law."""
     first = len(s.rows)
     term = coordinate_term(s, text, e, first)
     s.rows.append(RowSpec(e, text, law, wrap=term.formula.of_kind.turns))
@@ -140,7 +139,7 @@ def coordinate_frames(s: Structure, owner: Joint, what: str) -> tuple[int, int, 
 def coordinate_term(
     s: Structure, text: str, e: Element, row: int, *, with_turns: bool = False, measured: bool = False
 ) -> TermSpec:
-    """Add a coordinate to a row or to a measured quantity; ``with_turns``: with the whole turns of angles."""
+    """Add a coordinate to a row or to a measured quantity; ``with_turns``: including the whole turns of angles."""
     owner, what = s.model.coordinate(text, e)
     if isinstance(owner, Joint):
         F, M, c = coordinate_frames(s, owner, what)
@@ -156,7 +155,7 @@ def coordinate_term(
 
 
 def turn_state(s: Structure, owner: Any, what: str, F: int, M: int) -> int:
-    """The state that counts the turns of an angle."""
+    """State that counts the turns of an angle."""
     name = f"{owner.name}.{what}"
     known = name in s.state_at
     at = s.state(name)
@@ -166,8 +165,10 @@ def turn_state(s: Structure, owner: Any, what: str, F: int, M: int) -> int:
 
 
 def _count_joint_turns(s: Structure) -> None:
-    """In space the turns of every joint angle are counted; in the plane the bodies' own angles count them, unless
-    somebody says how many there are at the start. Angles that are coordinates of the forest count their own.
+    """Add states that count the turns of joint angles.
+
+    In space every joint angle needs one; in the plane only angles of drivers and `Initial` elements, as the bodies' own
+    angles count turns. Coordinates of the forest count their own turns.
     """
     told = {d.coordinate for d in s.model.drivers} | {i.name for i in s.model.initial}
     for joint in s.model.joints:
@@ -185,17 +186,17 @@ def measured_term(s: Structure, m: int, F: int, M: int, formula: Row, sign: floa
 
 
 def reacting_element(t: TermSpec) -> Element:
-    """The element that carries what the row of a term does: where an event locks a joint's coordinate, that joint."""
+    """Element that carries the reaction of a term's row: where an event locks a joint's coordinate, that joint."""
     return t.owner if isinstance(t.element, Event) and isinstance(t.owner, Joint) else t.element
 
 
 def term_from_side_M(s: Structure, k: int) -> int:
-    """Number of a term of a joint's rows, and the number of terms more where it is seen from the joint's other side."""
+    """Code of a term in `LoadTerms`: its number, plus the number of terms if it is seen from the joint's other side."""
     return k if s.frames[s.terms[k].M].role == "M" else len(s.terms) + k
 
 
 def sort_terms(s: Structure) -> None:
-    """Terms by kind, frames on ground first, those that no loop asks for last; offsets of every kind."""
+    """Sort terms by kind, and frames: on ground first, those that no loop uses last; set the offsets of every kind."""
     used = _used_frames(s)
     order = sorted(range(len(s.frames)), key=lambda k: 0 if s.frames[k].body < 0 else 1 if k in used else 2)
     new = np.empty(len(order), np.int64)
@@ -228,26 +229,26 @@ def sort_terms(s: Structure) -> None:
 
 
 def _user_formula(row: Row) -> CodeTable | None:
-    """The formula of a row of a user's own."""
+    """Formula of a user-defined row."""
     return code_table(type(row), SIGNATURES, SIGNATURES) if isinstance(row, ConstraintRow) else None
 
 
 def force_frames(s: Structure, e: Force) -> tuple[np.ndarray, ...]:
-    """Fields of the force table in which a force has frames; others have what is measured there."""
+    """Fields of the force table that hold frames; for other forces they hold measured quantities."""
     table: Forces = s.tables["forces"]
     return () if isinstance(e, Touch) else (table.M,) if hasattr(e, "effort") else (table.F, table.M)
 
 
 def _used_frames(s: Structure) -> set[int]:
-    """Frames that the compiled loops ask for; those of tree joints often only results do."""
+    """Frames that the compiled loops use; those of tree joints are often needed by results only."""
     used = {k for t in s.terms for k in (t.F, t.M)} | {k for angle in s.angles for k in angle[:2]}
     for k, e in enumerate(s.forces):
         used |= {int(column[k]) for column in force_frames(s, e)}
-    return used - {-1}  # forces along a measured quantity that have no frame of their own
+    return used - {-1}  # forces along a measured quantity have no frame of their own
 
 
 def _renumber_force_frames(s: Structure, new: np.ndarray) -> None:
-    """New numbers of frames in the force table."""
+    """Renumber the frames in the force table."""
     for k, e in enumerate(s.forces):
         for column in force_frames(s, e):
             if column[k] >= 0:
@@ -258,7 +259,7 @@ DIRECTIONS = {"rising": RISING, "falling": FALLING, "either": EITHER}
 
 
 def lock_switches(model: Model) -> list[tuple[Event, Switch]]:
-    """A row for each coordinate that some event locks or releases: the first of these events has it."""
+    """Lock switches: a row for each coordinate that events lock or release, owned by the first of these events."""
     out: dict[str, tuple[Event, Switch]] = {}
     for e in model.events:
         for a in e.do:
@@ -269,7 +270,7 @@ def lock_switches(model: Model) -> list[tuple[Event, Switch]]:
 
 
 def released_joints(model: Model) -> list[Joint]:
-    """Joints that some event releases: their own rows let go, so that they cannot be tree joints."""
+    """Joints that some event releases: their own rows are switched off, so they cannot be tree joints."""
     found = [lock_target(model, e, a).joint for e in model.events for a in e.do if isinstance(a, (Lock, Release))]
     return [model[name] for name in dict.fromkeys(found) if name]
 
@@ -280,7 +281,7 @@ def joint_row_name(joint: Joint, k: int) -> str:
 
 
 def measure_released_rows(s: Structure) -> None:
-    """Measure what the rows of joints that may let go hold."""
+    """Measure the quantities of joint rows that events may release."""
     for joint in released_joints(s.model):
         F, M = frame_index(s, joint, "F"), frame_index(s, joint, "M")
         for k, row in enumerate(joint.rows(s.model.planar)):
@@ -294,7 +295,7 @@ def measure_released_rows(s: Structure) -> None:
 
 
 def event_names(model: Model) -> dict[str, Event]:
-    """Every name in expressions of events, coordinates that they strike too, and an event that uses it."""
+    """Names in event expressions and coordinates with impacts, each with an event that uses it."""
     out: dict[str, Event] = {}
     for e in model.events:
         for where, law in e.laws():
@@ -306,7 +307,7 @@ def event_names(model: Model) -> dict[str, Event]:
 
 
 def add_event_guards(s: Structure) -> None:
-    """Watch the expressions of events; `Structure.events` says which guard is whose."""
+    """Add guards for the expressions of events; `Structure.events` maps guards to events."""
     for e in s.model.events:
         if not e.at_start:
             s.events[len(s.guards)] = e
@@ -324,7 +325,7 @@ GUARD_KINDS = {
     SLIP: (G_CONE, G_TURNS),
     EDGE: (G_EDGE,),
 }
-"""What is watched of each kind of switch."""
+"""Guards of each kind of switch."""
 
 
 @dataclass
@@ -339,16 +340,16 @@ class SwitchSpec:
     law: int = -1
     other: int = -1
     partner: int = -1
-    held: bool = False  # from the start
+    held: bool = False  # closed initially
 
 
 def declared_switches(model: Model) -> list[tuple[Element, Switch]]:
-    """All that the model's elements declare."""
+    """All switches that the model's elements declare."""
     return [*((e, w) for e in model.elements() for w in e.switches()), *lock_switches(model)]
 
 
 def switch_quantity(e: Element, w: Switch) -> str:
-    """Name of the quantity that a switch acts along, among what is measured."""
+    """Name of the measured quantity that a switch acts along."""
     if w.along and not w.summed:
         return w.along[0]
     return f"{e.name}:{w.label or 'length'}"
@@ -369,7 +370,7 @@ def measure_switches(s: Structure) -> None:
 
 
 def add_switch_rows(s: Structure) -> None:
-    """The rows, behind all others."""
+    """Add the rows of switches behind all others."""
     for e, w in declared_switches(s.model):
         if w.kind in (ELASTIC, EDGE):
             s.switches.append(SwitchSpec(e, w, -1, s.measured[switch_quantity(e, w)]))
@@ -400,7 +401,7 @@ def add_switch_rows(s: Structure) -> None:
 
 
 def fill_switch_tables(s: Structure) -> None:
-    """The integers of switches and guards, when forces are numbered."""
+    """Fill in the integers of switches and guards, once forces are numbered."""
     for k, spec in enumerate(s.switches):
         if spec.switch.slides:
             spec.force = next(i for i, f in enumerate(s.forces) if f is spec.element)
@@ -415,25 +416,25 @@ def fill_switch_tables(s: Structure) -> None:
 
 
 def _may_be_indeterminate(s: Structure) -> bool:
-    """Whether what holds by friction may have company: then how they share what they hold can be open."""
+    """Whether forces of friction may be indeterminate, because several constraints can be active together."""
     gaps = {x.other for x in s.switches if x.switch.kind == SLIP}
     holding = [x for k, x in enumerate(s.switches) if x.row >= 0 and k not in gaps and not -1 < x.partner < k]
     return len(holding) > 1 and any(x.switch.kind in (FRICTION, SLIP) for x in holding)
 
 
 def _guards_of(k: int, x: SwitchSpec) -> tuple[int, ...]:
-    """What is watched of a switch: of two tangents of a place, the first is watched for both."""
+    """Guards of a switch; of the two tangents of a contact point, the first has those of both."""
     if x.switch.kind == SLIP and -1 < x.partner < k:
         return ()
     return GUARD_KINDS.get(x.switch.kind, ())
 
 
 NUMBER_FIELDS = {SLIP: ("static_friction", "kinetic_friction"), RATCHET: ("tooth", "pitch", "restitution")}
-"""Which of `SwitchNumbers` an element's ``switched`` gives, by the kind of switch; others: the first of them."""
+"""Fields of `SwitchNumbers` that an element's ``switched`` gives, by the kind of switch; others: the first fields."""
 
 
 def fill_switch_numbers(s: Structure, of: Any, table: SwitchNumbers, asks: Any, separation: Any) -> None:
-    """Numbers of the switches, from those of their elements; ``separation``: how far points of each are apart."""
+    """Fill in the numbers of switches from those of their elements; ``separation``: distance of an element's points."""
     for k, spec in enumerate(s.switches):
         kind = spec.switch.kind
         if kind != BRANCH and not asks(spec.element):
@@ -444,7 +445,7 @@ def fill_switch_numbers(s: Structure, of: Any, table: SwitchNumbers, asks: Any, 
             else spec.element.switched(of[spec.element.name], spec.switch.label, separation(spec.element))
         )
         named = dict(zip(NUMBER_FIELDS.get(kind, SwitchNumbers._fields), given, strict=False))
-        if kind == RATCHET:  # it begins between these teeth
+        if kind == RATCHET:  # initially between these teeth
             named |= {"lower": named["tooth"], "upper": named["tooth"] + named["pitch"]}
         for name, column in zip(table._fields, table, strict=True):
             column[k] = named.get(name, {"lower": -np.inf, "upper": np.inf}.get(name, 0.0))

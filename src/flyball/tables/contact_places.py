@@ -1,9 +1,10 @@
-"""Places where bodies may touch, as far as constraint rows can express them exactly; rigid stops of coordinates.
+"""Contact points between bodies, as far as constraint rows can express them exactly; rigid stops of coordinates.
 
-A sphere or a corner on a plane keeps its height; a sphere on a rounded box its distance from the core
-(`constraints/touch`); a sharp corner on a sharp box its height above a face (`constraints/corner`). Shapes with
-corners or rounded ends touch a plane by these; in the plane two rectangles or rounded segments touch by the
-corners of either. Everything else is reported by name and left to impulse time stepping.
+For a sphere or a corner on a plane the gap is its height; for a sphere on a rounded box its distance from the core
+(`constraints/ball_on_box.py`); for a sharp corner on a sharp box its height above a face
+(`constraints/corner_on_box.py`). Shapes with corners or rounded ends touch a plane by these; in the plane two
+rectangles or rounded segments touch by the corners of either. Everything else is reported by name and left to impulse
+time stepping.
 """
 
 from __future__ import annotations
@@ -26,20 +27,20 @@ from .contact_tables import ContactTables, contact_tables
 from .element_numbers import ElementNumbers
 from .table_definitions import Surfaces
 
-MAX_PLACES = 256  # places that a motion of rows can have
-UNBOUNDED = 1e30  # half edge along which a core has no end
-NEGLIGIBLE = 1e-9  # cosines, and relative lengths, that are nothing
+MAX_PLACES = 256  # contact points that a motion with constraint rows can have
+UNBOUNDED = 1e30  # half edge of a core without end
+NEGLIGIBLE = 1e-9  # cosines, and relative lengths, that count as zero
 
 
 @dataclass(frozen=True)
 class ContactPlaces:
-    """Where bodies may touch.
+    """Contact points between bodies.
 
     Attributes
     ----------
     touches : tuple of Touch
     why_not : tuple of str
-        What rows do not know, by name; empty if they know all of it.
+        Contacts that rows cannot express, by name; empty if there are none.
     """
 
     touches: tuple[Touch, ...]
@@ -48,7 +49,7 @@ class ContactPlaces:
 
 @dataclass(frozen=True)
 class _PlacedShape:
-    """A shape as drawn: who bears it, its kind and parameters, where it is in the world."""
+    """A shape in the reference configuration: its bearer, kind, parameters and pose in the world."""
 
     body: str
     part: str
@@ -68,12 +69,12 @@ KIND_NAMES = {getattr(shape_kinds, n): n.lower() for n in dir(shape_kinds) if n.
 
 
 def contact_places(model: Model, given: ElementNumbers) -> ContactPlaces:
-    """All places of a model at some values of its parameters.
+    """All contact points of a model at some values of its parameters.
 
     Raises
     ------
     ModelError
-        If shapes or surfaces are not told well enough for any contact.
+        If shapes or surfaces are not sufficiently described for any contact.
     """
     if model.bulk:
         return ContactPlaces((), tuple(f"{e.title} is many bodies" for e in model.bulk))
@@ -102,7 +103,7 @@ def contact_places(model: Model, given: ElementNumbers) -> ContactPlaces:
 
 
 def _with_unique_names(model: Model, found: list[tuple[str, dict]]) -> list[tuple[str, dict]]:
-    """With a number behind names of several, and none that is taken."""
+    """Contact points with unique names: numbered where several have the same name, none that is taken."""
     count, at, out = Counter(name for name, _ in found), Counter[str](), []
     for name, fields in found:
         at[name] += 1
@@ -114,7 +115,7 @@ def _with_unique_names(model: Model, found: list[tuple[str, dict]]) -> list[tupl
 
 
 def _pair_properties(scene: ContactTables, i: int, j: int) -> np.ndarray | None:
-    """What the surfaces of two shapes are to each other, if they may touch."""
+    """Contact properties of the surfaces of two shapes, if they may touch."""
     x = scene.geometry.shape_i
     a, b = int(x[i, ct.MOVER]), int(x[j, ct.MOVER])
     apart = scene.geometry.apart
@@ -127,7 +128,7 @@ def _pair_properties(scene: ContactTables, i: int, j: int) -> np.ndarray | None:
 
 
 def _unsupported_surface(surfaces: Surfaces, row: np.ndarray, shapes: tuple[int, int]) -> str:
-    """What of the surfaces rows do not know."""
+    """Surface properties that rows cannot express."""
     if row[su.STIFFNESS] > 0.0 or row[su.MODULUS] > 0.0:
         return "{a} and {b} give way by a law of the overlap"
     if row[su.ROLLING] > 0.0 or row[su.SPINNING] > 0.0:
@@ -152,7 +153,7 @@ def _placed_shape(scene: ContactTables, k: int) -> _PlacedShape:
 
 
 def _pair_places(planar: bool, a: _PlacedShape, b: _PlacedShape) -> list[dict] | str:
-    """Fields of the places of two shapes, or what is not known of them."""
+    """Fields of the contact points of two shapes, or what rows cannot express of them."""
     for F, M in ((a, b), (b, a)):
         if F.kind == shape_kinds.PLANE:
             balls = _touching_spheres(M)
@@ -164,7 +165,7 @@ def _pair_places(planar: bool, a: _PlacedShape, b: _PlacedShape) -> list[dict] |
             if core is None or not balls:
                 return "{a} on {b}"
             if F.kind == shape_kinds.SPHERE and M.kind != shape_kinds.SPHERE:
-                continue  # the circle is a ball on the other
+                continue  # the circle is a sphere on the other shape
             out += [_on_core(F, M, core, x, 0) for x in balls]
         elif core is not None and M.kind == shape_kinds.SPHERE:
             out.append(_on_core(F, M, core, balls[0], 2))
@@ -174,7 +175,7 @@ def _pair_places(planar: bool, a: _PlacedShape, b: _PlacedShape) -> list[dict] |
 
 
 def _touching_spheres(s: _PlacedShape) -> list[tuple[np.ndarray, float]]:
-    """What of a shape touches anything flat: points in its axes, each with the radius about it."""
+    """Spheres by which a shape touches anything flat: centres in its axes, each with its radius."""
     o = np.zeros(3)
     if s.kind == shape_kinds.SPHERE:
         return [(o, float(s.par[0]))]
@@ -189,7 +190,7 @@ def _touching_spheres(s: _PlacedShape) -> list[tuple[np.ndarray, float]]:
 
 @dataclass(frozen=True)
 class _RoundedBox:
-    """A box that is rounded by a radius: its middle and axes in the world, half edges."""
+    """A box rounded by a radius: its centre and axes in the world, half edges."""
 
     p: np.ndarray
     R: np.ndarray
@@ -208,7 +209,7 @@ def _rounded_box(s: _PlacedShape) -> _RoundedBox | None:
 
 
 def _rectangle(s: _PlacedShape) -> _RoundedBox | None:
-    """A polygon that is a rectangle, a segment or a point; none for others."""
+    """Rounded box of a rectangle, a segment or a point; None for other shapes."""
     x = s.corners
     if len(x) == 1:
         return _RoundedBox(s.p + s.R @ x[0], s.R, np.zeros(3), float(s.par[0]))
@@ -236,7 +237,7 @@ def _place(F: _PlacedShape, M: _PlacedShape, frames: tuple, gap: Term, slips: tu
 
 
 def _on_plane(planar: bool, F: _PlacedShape, M: _PlacedShape, ball: tuple[np.ndarray, float]) -> dict:
-    """A ball or a corner on a plane: a height, and no slip along one or both axes of the plane."""
+    """Sphere or corner on a plane: a gap, and slips along one or both axes of the plane."""
     x, r = ball
     n = F.R[:, 2]
     axes = np.column_stack([(n[1], -n[0], 0.0), (0.0, 0.0, -1.0), n]) if planar else F.R
@@ -249,7 +250,7 @@ def _on_plane(planar: bool, F: _PlacedShape, M: _PlacedShape, ball: tuple[np.nda
 def _on_core(
     F: _PlacedShape, M: _PlacedShape, core: _RoundedBox, ball: tuple[np.ndarray, float], tangents: int
 ) -> dict:
-    """A ball or a corner on a rounded box."""
+    """Sphere or corner on a rounded box."""
     x, r = ball
     p = M.p + M.R @ x
     half = tuple(core.half.tolist())
@@ -275,7 +276,7 @@ def _on_core(
 
 @dataclass(frozen=True)
 class RigidStop:
-    """A stop of a coordinate: how far it goes [m or rad], inf where there is none, and how it bounces off."""
+    """Stop of a coordinate: bounds [m or rad], inf where there is none, and restitution."""
 
     element: Limit
     lower: float

@@ -1,8 +1,8 @@
-"""Which bodies may touch, and the contact properties of every pair of surfaces.
+"""Pairs of bodies that may touch, and the contact properties of every pair of surfaces.
 
-Owners of shapes that behave alike form a group; a contact holds for each pair of groups. Friction, restitution
-and compliance of two surfaces come from a contact that names bodies, else from a pair of materials, else from
-both materials and the contact for everything.
+Owners of shapes with the same contact partners form a group; a contact applies to each pair of groups. Friction,
+restitution and compliance of two surfaces come from a contact that names bodies, else from a pair of materials, else
+from both materials and the contact for everything.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from ..model.model import Model
 from . import table_definitions as su
 from .element_numbers import ElementNumbers
 
-MAX_GROUPS = 62  # groups, a bit of a whole number each
+MAX_GROUPS = 62  # maximum number of groups: each is one bit of an integer
 
 
 @dataclass(frozen=True)
 class ContactGroups:
-    """Owners of shapes by what they may touch.
+    """Owners of shapes, grouped by what they may touch.
 
     Attributes
     ----------
     of : dict
         Owner -> its group.
     holds : dict
-        Pair of groups -> the contact that holds for them; pairs that do not touch are not in it.
+        Pair of groups -> the contact that applies to them; pairs that do not touch are not in it.
     apart : set
-        Pairs of single bodies, the first the smaller, that do not touch for all that.
+        Pairs of single bodies, the first the smaller, that are nevertheless excluded.
     """
 
     of: Mapping[str, int]
@@ -45,17 +45,17 @@ class ContactGroups:
     apart: frozenset[tuple[str, str]]
 
     def meets(self, group: int) -> int:
-        """Groups that a group touches, as bits."""
+        """Groups that a group may touch, as bits."""
         return sum(1 << b for a, b in self.holds if a == group)
 
 
 def contact_groups(model: Model, owners: Iterable[Owner]) -> ContactGroups:
-    """Groups of owners.
+    """Group the owners of shapes.
 
     Raises
     ------
     ModelError
-        If there are too many.
+        If there are too many groups.
     """
     owners = list(owners)
     out = _Exclusions(model)
@@ -72,8 +72,8 @@ def contact_groups(model: Model, owners: Iterable[Owner]) -> ContactGroups:
     number = {s: k for k, s in enumerate(dict.fromkeys(signature.values()))}
     if len(number) > MAX_GROUPS:
         raise ModelError(
-            f"the contacts of {model.name!r} tell {len(number)} groups of bodies apart; {MAX_GROUPS} are possible. Name "
-            f"fewer bodies in between=, others= and exclude=, and give them materials where only friction differs"
+            f"the contacts of {model.name!r} tell {len(number)} groups of bodies apart; {MAX_GROUPS} are possible. "
+            f"Name fewer bodies in between=, others= and exclude=, and give them materials where only friction differs"
         )
     holds = {}
     for s, a in number.items():
@@ -86,14 +86,14 @@ def contact_groups(model: Model, owners: Iterable[Owner]) -> ContactGroups:
 
 
 def _with_ground_parts(names: tuple[str, ...] | None, every: set[str]) -> set[str] | None:
-    """Names, with the parts of ground in place of ground."""
+    """Names, with ground replaced by its parts."""
     if names is None:
         return None
     return set(names) - {GROUND} | (every if GROUND in names else set())
 
 
 def _contact_for(lists: list, s: tuple, t: tuple) -> Contact | None:
-    """The contact that holds for two signatures: one that names them before one for everything."""
+    """Contact that applies to two signatures: one that names them before one for everything."""
     found = None
     for k, (c, between, others) in enumerate(lists):
         if between is None:
@@ -107,7 +107,7 @@ def _contact_for(lists: list, s: tuple, t: tuple) -> Contact | None:
 
 
 class _Exclusions:
-    """Exclusions: between single bodies one by one, of ground and many bodies by groups."""
+    """Excluded pairs: of single bodies one by one, of ground and many bodies by groups."""
 
     def __init__(self, model: Model) -> None:
         every = [g.name for g in model.ground]
@@ -126,18 +126,18 @@ class _Exclusions:
         self.coarse = set(self._with)
 
     def of(self, name: str) -> set[str]:
-        """What it does not touch."""
+        """Owners that ``name`` does not touch."""
         return self._with.get(name, set())
 
     def met_by(self, name: str) -> frozenset[str]:
-        """The same, as part of a signature."""
+        """The same as a frozen set, as part of a signature."""
         return frozenset(self.of(name))
 
 
 def _excluded_pairs(
     model: Model, of: Mapping[str, int], holds: Mapping, out: _Exclusions
 ) -> frozenset[tuple[str, str]]:
-    """Single bodies that are excluded, or that a joint connects where the contact leaves such out."""
+    """Single bodies that are excluded, or connected by a joint where the contact excludes such pairs."""
     found = set(out.single)
     for j in model.joints:
         a, b = sorted((model.carrier(j.body_i, j), model.carrier(j.body_j, j)))
@@ -152,14 +152,14 @@ FLAT_KINDS = (shape_kinds.PLANE, shape_kinds.BOX, shape_kinds.HULL, shape_kinds.
 
 
 def add_compliance(row: np.ndarray, who: tuple, sources: Sequence[Any], materials: Sequence[Any]) -> None:
-    """The law of one pair: what a contact says that names bodies, else a pair of materials, else the contact for all.
+    """Compliance of a pair: from a contact that names bodies, else a pair of materials, else the contact for all.
 
-    Where it says no stiffness: 4/3 E*, 1/E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2 (Johnson 1985, equation 4.24).
+    Without an explicit stiffness: 4/3 E*, 1/E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2 (Johnson 1985, equation 4.24).
 
     Raises
     ------
     ModelError
-        If neither says how stiff it is.
+        If no source gives the stiffness.
     """
     n = next((x for x in sources if x.law is not None), None)
     if n is None or n.law == HARD:
@@ -187,12 +187,12 @@ def add_compliance(row: np.ndarray, who: tuple, sources: Sequence[Any], material
 
 
 def check_curvature(G: ct.Geometry, pair: np.ndarray, materials: Sequence[str], planar: bool) -> None:
-    """Refuse stiffness by elastic constants between shapes whose curvatures say none.
+    """Refuse stiffness from elastic constants between shapes whose curvatures do not determine it.
 
     Raises
     ------
     ModelError
-        If two of the shapes that it holds for are not a sphere and a sphere or something flat.
+        If two shapes of the pair are not a sphere and a sphere or something flat.
     """
     of = [set(G.shape_i[G.shape_i[:, ct.MATERIAL] == k, ct.KIND].tolist()) for k in range(len(pair))]
     balls = {shape_kinds.SPHERE}
@@ -220,12 +220,12 @@ UNSPECIFIED = SimpleNamespace(
 def surface_pairs(
     model: Model, given: ElementNumbers, groups: ContactGroups, known: Mapping[Surface, set[str]]
 ) -> np.ndarray:
-    """Numbers of each two surfaces (`Surfaces.pair`), of which it is known what carries them; nan: they never touch.
+    """Properties of all pairs of surfaces (`Surfaces.pair`), given the carriers of each; nan: they never touch.
 
     Raises
     ------
     ModelError
-        If nothing says the friction of a pair, or both sides have a grain.
+        If the friction of a pair is not given, or both sides have a grain.
     """
     out = np.full((len(known), len(known), su.SURFACE_COLUMNS), np.nan)
     told = {frozenset((x.first, x.second)): given.of[x.name] for x in model.material_pairs}
@@ -245,13 +245,13 @@ def surface_pairs(
 
 
 def _example(on: set[str], by: set[str]) -> str:
-    """Two of what bears two surfaces, for messages."""
+    """Two carriers of a pair of surfaces, for messages."""
     a, b = next((a, b) for a in sorted(on) for b in sorted(by) if a != b)
     return f"{a!r} on {b!r}"
 
 
 def _pair_row(who: tuple, sources: Sequence[Any], materials: Sequence[Any]) -> np.ndarray:
-    """Numbers of one pair: what a contact says that names bodies, else a pair of materials, else both materials."""
+    """Properties of one pair: from a contact that names bodies, else a pair of materials, else both materials."""
     row = np.zeros(su.SURFACE_COLUMNS)
     _friction(row, who, sources, materials)
     row[su.RESTITUTION] = _combined("restitution", sources, materials, lambda a, b: np.sqrt(a * b))
@@ -262,7 +262,7 @@ def _pair_row(who: tuple, sources: Sequence[Any], materials: Sequence[Any]) -> n
 
 
 def _friction(row: np.ndarray, who: tuple, sources: Sequence[Any], materials: Sequence[Any]) -> None:
-    """Of rest and of sliding along the grain, and how much greater across it."""
+    """Set static and kinetic friction along the grain, and the ratio of friction across it."""
     row[su.ACROSS] = 1.0
     direct = next((x for x in sources[:2] if x.friction is not None), None)
     if direct is not None:
@@ -290,7 +290,10 @@ def _static_friction(x: Any) -> Any:
 
 
 def _from_both(field: str, default: Any, materials: Sequence[Any]) -> list[Any] | None:
-    """Who says it on either side: the material, or the contact for all, or the other side; None if nobody does."""
+    """Source of a field on either side: the material, else the contact for all, else the other side.
+
+    None if none of them has it.
+    """
     known = [x if getattr(x, field) is not None else default for x in materials]
     said = [x for x in known if getattr(x, field) is not None]
     return [x if getattr(x, field) is not None else said[0] for x in known] if said else None
@@ -299,7 +302,7 @@ def _from_both(field: str, default: Any, materials: Sequence[Any]) -> list[Any] 
 def _combined(
     field: str, sources: Sequence[Any], materials: Sequence[Any], rule: Callable[[float, float], float]
 ) -> float:
-    """A number of a pair: what is said of the pair itself, else by the rule from both sides."""
+    """Value of a field: that of the pair itself, else combined from both sides by the rule."""
     direct = next((x for x in sources[:2] if getattr(x, field) is not None), None)
     if direct is not None:
         return float(np.real(getattr(direct, field)))
@@ -308,7 +311,7 @@ def _combined(
 
 
 def surface_motion(material: Material | None, of: Mapping[str, SimpleNamespace]) -> np.ndarray:
-    """Velocity of a surface and its grain (2, 3), in the axes of the body's reference frame."""
+    """Surface velocity and direction of grain (2, 3), in the axes of the body's reference frame."""
     out = np.zeros((2, 3))
     if material is not None:
         n = of[material.name]

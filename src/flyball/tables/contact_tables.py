@@ -1,6 +1,6 @@
-"""Contact of a model in arrays: the bodies that carry shapes, the shapes, and the properties of their surfaces.
+"""Contact tables of a model: the bodies that carry shapes, the shapes, and the properties of their surfaces.
 
-Shapes that are only described are finished here: hulls of points, closed surfaces in convex parts.
+Shapes given by a description are converted here: point sets to hulls, closed surfaces to convex parts.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .table_definitions import Surfaces
 
 @dataclass(frozen=True)
 class Carriers:
-    """Bodies, and many bodies, in the order in which they were asked for.
+    """Bodies, and many bodies, that carry shapes, in the requested order.
 
     A mover's origin is its centre of mass, its axes are those of its reference frame.
 
@@ -39,9 +39,9 @@ class Carriers:
     ----------
     names : tuple of str
     slices : dict
-        Name -> the movers that it is.
+        Name -> the movers of that name.
     movers : Movers
-        As drawn and told; velocities are those of the centres of mass.
+        Initial state; velocities are those of the centres of mass.
     mass : (n,) [kg]
     inertia : (n, 3, 3) [kg m^2]
         About the centre of mass, in the mover's axes.
@@ -57,7 +57,7 @@ class Carriers:
     com: dict[str, np.ndarray]
 
     def name(self, mover: int) -> str:
-        """What a mover is called in messages and results: ``"crank"`` or ``"balls[17]"``; ``"ground"`` for -1."""
+        """Name of a mover in messages and results: ``"crank"`` or ``"balls[17]"``; ``"ground"`` for -1."""
         for name, at in self.slices.items():
             if at.start <= mover < at.stop:
                 return name if name in self.single else f"{name}[{mover - at.start}]"
@@ -67,7 +67,7 @@ class Carriers:
 
 
 def contact_carriers(model: Model, given: ElementNumbers, names: Sequence[str]) -> Carriers:
-    """The bodies of these names, one after the other, each of many bodies at its place.
+    """Bodies of these names, in this order; of many bodies, each one.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def _single_body(name: str, given: ElementNumbers) -> tuple[tuple[np.ndarray, ..
 
 
 def _many_bodies(e: Bodies, model: Model, given: ElementNumbers) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """Lengths grow with the scale, masses with its cube, inertias with its fifth power."""
+    """Movers of many bodies: lengths grow with the scale, masses with its cube, inertias with its fifth power."""
     one = e.weight(given.of[e.name], given.env, model.planar)
     p, R, v, w = e.start(model.planar)
     s = e.sizes()
@@ -111,12 +111,12 @@ def _many_bodies(e: Bodies, model: Model, given: ElementNumbers) -> tuple[tuple[
 
 
 def finished_forms(form: ConvexPart) -> list[ConvexPart]:
-    """The form as the tables of contact take it: one or several.
+    """Convert a shape to the convex parts that contact uses: one or several.
 
     Raises
     ------
     ModelError
-        If points or a surface have no solid inside.
+        If points or a surface enclose no solid.
     """
     if form.kind == "HULL" and len(form.par) == 1:
         return [_hull_form(convex_hull(form.vertex), form, form.par[0])]
@@ -126,14 +126,14 @@ def finished_forms(form: ConvexPart) -> list[ConvexPart]:
 
 
 def outline_forms(form: ConvexPart) -> list[ConvexPart]:
-    """The same in a planar mechanism: each part as seen along z."""
+    """Convert a shape of a planar mechanism: each part projected along z."""
     if form.kind == "MESH":
         return [polygon_outline(h.vertices) for h in _convex_parts(form).hulls]
     return [form]
 
 
 def _hull_form(h: Hull, form: ConvexPart, rounding: float) -> ConvexPart:
-    """A hull about the middle of its corners."""
+    """Convex part of a hull, with the middle of its bounding box as origin."""
     middle = (h.vertices.min(axis=0) + h.vertices.max(axis=0)) / 2
     h = Hull(h.vertices - middle, h.normals, h.sides)
     face, edges = h.table(0)
@@ -151,14 +151,14 @@ def _hull_form(h: Hull, form: ConvexPart, rounding: float) -> ConvexPart:
 
 
 def _convex_parts(form: ConvexPart) -> ConvexParts:
-    """Convex parts of a surface; what they take is told where they are poor."""
+    """Convex parts of a surface; warns if they approximate it poorly."""
     v = np.ascontiguousarray(form.vertex, float)
     found = _cached_parts(v.tobytes(), np.ascontiguousarray(form.face, np.int64).tobytes())
     size = float(np.linalg.norm(np.ptp(v, axis=0)))
     if found.beyond > PART_TOLERANCE * size:
         warn_user(
-            f"a surface of {form.face.size // 3} triangles is {MAX_PARTS} convex parts where it touches others, and these "
-            f"still fill up to {found.beyond:.3g} m of its hollows; describe it by simpler shapes where that matters",
+            f"a surface of {form.face.size // 3} triangles is {MAX_PARTS} convex parts where it touches others, and "
+            f"these still fill up to {found.beyond:.3g} m of its hollows; describe it by simpler shapes where that matters",
             PerformanceNotice,
         )
     return found
@@ -171,20 +171,20 @@ def _cached_parts(vertices: bytes, faces: bytes) -> ConvexParts:
 
 @dataclass(frozen=True)
 class ContactTables:
-    """All that contact needs to know of a model.
+    """Contact tables of a model.
 
     Attributes
     ----------
-    geometry : contact.tables.Geometry
-    surfaces : contact.surfaces.Surfaces
+    geometry : collision.tables.Geometry
+    surfaces : tables.table_definitions.Surfaces
     carriers : Carriers
         The movers of the geometry.
     parts : tuple of str
-        Names of what the shapes are of.
+        Names of the shapes' owners.
     part : (ns,)
-        Of each shape, its place in ``parts``.
+        Of each shape, its index in ``parts``.
     code : list of CodeTable or None
-        Of each shape of a user's own, its support function: their addresses stand in the geometry.
+        Of each user-defined shape, its support function; their addresses are in the geometry.
     """
 
     geometry: ct.Geometry
@@ -195,27 +195,27 @@ class ContactTables:
     code: list[CodeTable | None]
 
     def name(self, shape: int) -> str:
-        """What carries a shape, for messages: ``"floor"``, ``"crank"``, ``"balls[17]"``."""
+        """Name of a shape's owner, for messages: ``"floor"``, ``"crank"``, ``"balls[17]"``."""
         mover = int(self.geometry.shape_i[shape, ct.MOVER])
         return self.parts[self.part[shape]] if mover < 0 else self.carriers.name(mover)
 
 
 def contact_tables(model: Model, given: ElementNumbers, names: Sequence[str]) -> ContactTables:
-    """Tables of a model's contact.
+    """Contact tables of a model.
 
     Parameters
     ----------
     model : Model
-    given : Numbers
+    given : ElementNumbers
         Numbers of its elements.
     names : sequence of str
-        Bodies and many bodies that move, in the order that their movers are to have. Shapes of others, and of ground,
-        are left out or stand still.
+        Bodies and many bodies that move, in the order that their movers are to have. Shapes of others, and of
+        ground, are left out or do not move.
 
     Raises
     ------
     ModelError
-        If a shape has no form that contact knows, what touches has no mass, or nothing says the friction of a pair.
+        If the form of a shape is not supported, a touching body has no mass, or the friction of a pair is not given.
     """
     at = contact_carriers(model, given, names)
     owners: list[Owner] = [*model.ground, *(e for name in names if isinstance(e := model.find(name), (Body, Bodies)))]
@@ -244,7 +244,7 @@ def contact_tables(model: Model, given: ElementNumbers, names: Sequence[str]) ->
 
 
 def _refuse_massless(owners: list[Owner], at: Carriers) -> None:
-    """Refuse what impulses would give any velocity."""
+    """Refuse bodies without mass, to which impulses would give arbitrary velocities."""
     for e in owners:
         if not isinstance(e, Ground) and not at.mass[at.slices[e.name].start] > 0.0:
             raise ModelError(
@@ -258,11 +258,11 @@ def _concatenated(parts: list[np.ndarray], empty: tuple[int, ...], dtype: type =
 
 
 class _ShapeRows:
-    """Rows of the shape tables, grown owner by owner."""
+    """Rows of the shape tables, added owner by owner."""
 
     def __init__(self, model: Model, given: ElementNumbers, at: Carriers, g: ContactGroups) -> None:
         self.model, self.given, self.at, self.groups = model, given, at, g
-        self.surfaces: dict[Surface, set[str]] = {}  # what carries each; of ground there is one
+        self.surfaces: dict[Surface, set[str]] = {}  # carriers of each surface; ground counts as one
         self.ints: list[np.ndarray] = []
         self.reals: list[np.ndarray] = []
         self.own: list[np.ndarray] = []
@@ -273,7 +273,7 @@ class _ShapeRows:
         self._corners = self._places = 0
 
     def add(self, k: int, e: Owner) -> None:
-        """The shapes of one owner; of many bodies, those of the first, of the second, and so on."""
+        """Add the shapes of one owner; of many bodies, those of the first, of the second, and so on."""
         where, movers, sizes, com = self._frame(e)
         forms = [(s, f) for s in e.shapes() if s.touches for f in self._forms(e, s)]
         count, n = len(movers), len(forms)
@@ -292,7 +292,7 @@ class _ShapeRows:
         self.code += [None if f.owner is None else code_table(f.owner, SUPPORT_SIGNATURES) for _, f in forms] * count
 
     def _frame(self, e: Owner) -> tuple:
-        """Frame in the world of what stands still, movers, sizes, centre of mass."""
+        """World frame of an owner that does not move, its movers, sizes, centre of mass."""
         if isinstance(e, Ground):
             return frame_of(e, self.given.of[e.name]), np.array([-1]), np.ones(1), np.zeros(3)
         at = self.at.slices[e.name]
@@ -300,7 +300,7 @@ class _ShapeRows:
         return None, np.arange(at.start, at.stop), sizes, self.at.com[e.name]
 
     def _forms(self, e: Owner, s: Solid) -> list[ConvexPart]:
-        """The parts of a shape, in the body's reference frame."""
+        """Convex parts of a shape, in the body's reference frame."""
         n = resolve(s, self.given.env)
         try:
             if isinstance(s, ConvexSolid):
@@ -313,7 +313,7 @@ class _ShapeRows:
             raise type(error)(f"{e.title}: {error}") from None
 
     def _ints(self, e: Owner, s: Solid, f: ConvexPart, sizes: np.ndarray) -> np.ndarray:
-        """Kind, places of corners and faces, groups and surface; corners of other sizes are corners of their own."""
+        """Integers of a shape: kind, first corners and faces, group and surface; each size has corners of its own."""
         group, material = self.groups.of[e.name], s.material or e.material
         row = np.zeros((len(sizes), 9), np.int64)
         row[:, ct.KIND] = getattr(shape_kinds, f.kind)
@@ -341,7 +341,7 @@ class _ShapeRows:
 
 
 def _shape_numbers(f: ConvexPart, com: np.ndarray, sizes: np.ndarray, places: int) -> np.ndarray:
-    """Origin from the mover's, axes, parameters, radius around it; the edges of a hull are counted from all faces."""
+    """Numbers of a shape: pose in the mover, parameters, radius; the edges of a hull are counted from all faces."""
     row = np.zeros((len(sizes), 24))
     row[:, ct.PLACE : ct.PLACE + 3] = sizes[:, None] * (np.real(f.place) - com)
     row[:, ct.AXES : ct.AXES + 9] = np.real(f.axes).ravel()

@@ -1,11 +1,10 @@
 """Choice of coordinates: which joints become tree joints, and the estimated cost of the equations.
 
-A joint is worth as many rows as its chain saves. In every loop the joint that saves least is cut (a maximum
-spanning tree, Prim 1957), and of equals the one farthest from ground, so chains stay short: cost grows with
-their length.
+A joint is worth as many rows as its chain saves. In every loop the joint that saves least is cut (a maximum spanning
+tree, Prim 1957), and among equals the one farthest from ground. Chains then stay short: cost grows with their length.
 
-Costs are nanoseconds of one right-hand side, computed from the tables; the weights are fitted to measured times
-of the examples in both coordinate layers (``benchmarks/costs.py``). They compare two forms of one mechanism;
+Costs are nanoseconds of one right-hand side, computed from the tables; the weights are fitted to measured times of the
+examples in absolute and in joint coordinates (``benchmarks/costs.py``). They compare two formulations of one mechanism;
 they do not predict the duration of a motion.
 """
 
@@ -25,17 +24,19 @@ from .law_inputs import forces_in_events
 from .structure_definition import Structure
 from .table_definitions import ARTICULATED, POINT, SCHUR
 
-MAX_FORESTS = 8  # choices that are kept of a mechanism
+MAX_FORESTS = 8  # choices that are cached for each mechanism
 
 
 def rows_saved(joint: Joint, planar: bool) -> int:
-    """How many rows a joint needs less where it is a tree joint."""
+    """Number of rows that a joint saves as a tree joint."""
     return len(joint.rows(planar)) - len(joint.loose(planar))
 
 
 def tree_candidates(model: Model, avoided: Collection[str] = ()) -> dict[str, int]:
-    """Joints that can be tree joints -> rows saved. Those whose reaction a friction or an event needs must be rows,
-    those that an event releases, and those of point masses, which turn with nothing.
+    """Joints that can be tree joints -> rows saved.
+
+    Excluded are joints whose reaction a friction or an event needs, those that an event releases, and those of point
+    masses, which have no rotation.
     """
     needed = {getattr(f, "joint", "") for f in model.forces if hasattr(f, "load")}
     needed |= {joint.name for joint in released_joints(model)} | {
@@ -84,7 +85,7 @@ def _spanning_forest(model: Model, avoided: Collection[str]) -> tuple[str, ...]:
 
 
 def _grow(near: dict, worth: dict[str, int], root: str, reached: set[str], chosen: set[str]) -> None:
-    """Hang on the root all that can be reached, the joints that save most first, of equals the nearest."""
+    """Connect all reachable bodies to the root: the joints that save most rows first, among equals the nearest."""
     reached.add(root)
     count = 0
     queue: list[tuple[int, int, int, str, str]] = []
@@ -106,11 +107,11 @@ def _grow(near: dict, worth: dict[str, int], root: str, reached: set[str], chose
 
 
 BODY_COST, LINK_COST, TERM_COST, ENTRY_COST, ARTICULATED_COST = 315.0, 112.0, 40.0, 28.0, 12.0
-FACTOR_COST = 1.0  # a product of the factorisation: seen only where a forest's matrix is dense and large
+FACTOR_COST = 1.0  # a product of the factorisation: matters only where a forest's matrix is dense and large
 
 
 def work_counts(s: Structure) -> dict[str, float]:
-    """How much there is of each kind of work."""
+    """Operation counts of each kind of work."""
     t = s.tables
     tree, solver = t["tree"], t["sizes"].solver
     column = np.diff(s.ldl.Lp).astype(float)
@@ -134,7 +135,7 @@ def right_hand_side_cost(s: Structure) -> float:
 
 
 def estimated_time(n: dict[str, float]) -> float:
-    """The same from the counts."""
+    """Estimated time of one right-hand side [ns] from the operation counts."""
     return (
         BODY_COST * n["bodies"]
         + LINK_COST * n["links"]
@@ -146,9 +147,9 @@ def estimated_time(n: dict[str, float]) -> float:
 
 
 def least_cost(model: Model, tree: Sequence[str]) -> float:
-    """What a right-hand side costs at least [ns] in a forest of these tree joints: links, and M and its factor.
+    """Lower bound of the time of one right-hand side [ns] with these tree joints: links, and M and its factor.
 
-    For each velocity M has those of all that its body hangs on: deep trees with many loops are seen from here, without
+    Each velocity has entries in M with those of all its ancestors, so deep trees with many loops are recognised without
     their tables.
     """
     s = Structure(model, False, tuple(tree))
@@ -156,7 +157,7 @@ def least_cost(model: Model, tree: Sequence[str]) -> float:
     table = s.tables["tree"]
     if len(tree) == len(model.joints):
         return 0.0
-    above = [0] * (len(table.parent) + 1)  # the last one: of ground
+    above = [0] * (len(table.parent) + 1)  # the last entry: ground
     entries = 0
     for b, (parent, n) in enumerate(zip(table.parent.tolist(), table.nv.tolist(), strict=True)):
         above[b] = above[parent] + n

@@ -1,6 +1,6 @@
-"""Fields of every element in SI units at some parameter values, and the bodies made of them.
+"""Fields of every element in SI units at some parameter values, and the bodies' numbers.
 
-Independent of the choice of coordinates. Only elements that name a changed parameter are evaluated again.
+They do not depend on the choice of coordinates. Only elements that name a changed parameter are evaluated again.
 """
 
 from __future__ import annotations
@@ -25,32 +25,34 @@ from ..model.inertia import mass_properties
 from ..model.model import Model
 from ..model.snapshot import ResultCache, exact_key
 
-EXACT_TYPES = (float, int, str, np.float64)  # kinds of values that their text tells apart to the bit
-MAX_CACHED = 4  # sets of values of the parameters that are kept
+EXACT_TYPES = (float, int, str, np.float64)  # types whose text identifies a value to the bit
+MAX_CACHED = 4  # sets of parameter values that are cached
 
 
 @dataclass(frozen=True)
 class ElementNumbers:
-    """Numbers of a mechanism in SI units."""
+    """Numbers of a mechanism's elements in SI units."""
 
     env: Mapping[str, Any]  # parameters
     of: Mapping[str, SimpleNamespace]  # element -> its fields
-    bodies: Mapping[str, SimpleNamespace]  # p, R, com: drawn reference frame, centre of mass in it
-    key: Hashable  # two with the same key are the same, to the bit
-    placed: dict[str, Any]  # element -> its frames in the world as drawn, found when asked for
-    since: ResultCache  # stands for the numbers that were found first
-    changed: frozenset[str] = frozenset()  # elements whose numbers are not those
-    world: dict[Hashable, Any] = field(default_factory=dict)  # the same of one frame, with its carrier
-    local: dict[Hashable, np.ndarray] = field(default_factory=dict)  # and on its body
+    # p, R, com: reference frame in the reference configuration, centre of mass in it
+    bodies: Mapping[str, SimpleNamespace]
+    key: Hashable  # equal keys mean equal numbers, to the bit
+    # element -> its frames in the world in the reference configuration, computed when first needed
+    placed: dict[str, Any]
+    since: ResultCache  # identifies the numbers that were computed first
+    changed: frozenset[str] = frozenset()  # elements whose numbers differ from those
+    world: dict[Hashable, Any] = field(default_factory=dict)  # frame -> the same, with its carrier
+    local: dict[Hashable, np.ndarray] = field(default_factory=dict)  # frame -> its pose on its body
 
     @cached_property
     def dtype(self) -> Any:
-        """Kind of numbers that tables of these are made of: expressions, else complex numbers, else floats."""
+        """Number type of tables made from these: expressions, else complex numbers, else floats."""
         return number_type(self.env.values())
 
 
 def number_type(values: Iterable[Any]) -> Any:
-    """Kind of numbers of an array that holds these."""
+    """Number type of an array that holds these values."""
     kinds = {object if hasattr(x, "called") else complex if isinstance(x, complex) else float for x in values}
     return next((k for k in (object, complex) if k in kinds), float)
 
@@ -61,7 +63,7 @@ def element_numbers(model: Model, parameters: Mapping[str, Any] | None = None) -
     Raises
     ------
     ModelError
-        If a number makes no sense, or there is no such parameter.
+        If a number is invalid, or a parameter does not exist.
     """
     model = model.snapshot()
     env, kind, told = _environment(model, parameters or {})
@@ -73,7 +75,7 @@ def element_numbers(model: Model, parameters: Mapping[str, Any] | None = None) -
 
 
 def _environment(model: Model, parameters: Mapping[str, Any]) -> tuple[Mapping[str, Any], Any, Hashable]:
-    """Values of all parameters, not to be changed; their kind, and their bits."""
+    """Values of all parameters (read-only), their number type, and a key of their bits."""
     if not all(type(x) in EXACT_TYPES for x in parameters.values()):
         return _with_bits(model.environment(parameters))
     written = tuple((name, type(x), repr(x)) for name, x in parameters.items())
@@ -86,15 +88,18 @@ def _with_bits(env: Mapping[str, Any]) -> tuple[Mapping[str, Any], Any, Hashable
 
 
 def _updated(model: Model, env: Mapping[str, Any], key: Hashable) -> ElementNumbers:
-    """From those that were found first, if files are as then; only what names a changed parameter is found anew."""
+    """Update the numbers that were computed first, if files are unchanged.
+
+    Only elements that name a changed parameter are evaluated again.
+    """
     first: ElementNumbers | None = model.kept.known("first numbers")
     if first is None or first.key[1] != key[1]:  # type: ignore[index]
         new = _evaluated(model, env, key)
         if new.dtype is not float:
             return new
-        model.kept.drop("first numbers", None)  # of files as they were
+        model.kept.drop("first numbers", None)  # outdated: files have changed
         model.kept.get("first numbers", None, 1, lambda: new)
-        return new  # another thread's may be there by now, with other values
+        return new  # another thread may have stored others in the meantime
     named = model.kept.get("named", None, 1, lambda: _parameters_of_elements(model))
     other = {k for k, x in env.items() if not _same_bits(x, first.env[k])}
     changed = [e for e in model.elements() if e.name in named and not other.isdisjoint(named[e.name])]
@@ -117,7 +122,7 @@ def _evaluated(model: Model, env: Mapping[str, Any], key: Hashable) -> ElementNu
 
 
 def _with_needed_elements(model: Model, of: dict[str, SimpleNamespace]) -> dict[str, SimpleNamespace]:
-    """The same, with the numbers of another element for the forces that depend on them."""
+    """The same numbers, with those of another element added for the forces that depend on it."""
     for e in model.forces:
         if name := e.needs():
             of[e.name] = SimpleNamespace(**{**vars(of[e.name]), "of": of[name]})
@@ -125,20 +130,20 @@ def _with_needed_elements(model: Model, of: dict[str, SimpleNamespace]) -> dict[
 
 
 def _checked_fields(e: Element, env: Mapping[str, Any]) -> SimpleNamespace:
-    """The fields of an element in numbers, which make sense at these values of the parameters."""
+    """Validated fields of an element in numbers at these values of the parameters."""
     n = resolve(e, env)
-    if number_type(env.values()) is float:  # a complex step is none to be compared
+    if number_type(env.values()) is float:  # values with a complex step cannot be compared
         e.check(n)
     return n
 
 
 def _same_bits(a: Any, b: Any) -> bool:
-    """To the bit: 0.0 and -0.0 are not."""
+    """Whether two values are equal to the bit: 0.0 and -0.0 are not."""
     return type(a) is type(b) and a == b and (a != 0.0 or str(a) == str(b))
 
 
 def _parameters_of_elements(model: Model) -> dict[str, frozenset[str]]:
-    """Element -> parameters that its numbers may depend on: all that some text in it names."""
+    """Element -> parameters that its numbers may depend on: all that its texts name."""
     found = {e.name: frozenset(names_in(e)) & model.parameters.keys() for e in model.elements()}
     for e in model.forces:
         if name := e.needs():
@@ -147,7 +152,7 @@ def _parameters_of_elements(model: Model) -> dict[str, frozenset[str]]:
 
 
 def names_in(value: Any) -> Iterator[str]:
-    """Every name in the texts of an element, of shapes and lists in it."""
+    """Names in the texts of an element, including shapes and lists in it."""
     if isinstance(value, str):
         yield from re.findall(r"[^\W\d]\w*", value)
     elif isinstance(value, (tuple, list)):
@@ -189,7 +194,7 @@ def shape_files(model: Model) -> tuple[str, ...]:
 
 
 def _file_state(path: str) -> tuple[int, int] | None:
-    """Which state of a file is there."""
+    """State of a file: it changes when the file does."""
     try:
         stat = os.stat(path)
     except OSError:
@@ -198,7 +203,7 @@ def _file_state(path: str) -> tuple[int, int] | None:
 
 
 def unused_parameters(model: Model, names: Sequence[str]) -> list[str]:
-    """Those of some parameters that nothing of the model has, by itself or through other parameters."""
+    """Those of the given parameters that no element of the model uses, directly or through other parameters."""
     todo = {*names_in(model.gravity), *(w for e in model.elements() for w in names_in(e))} & model.parameters.keys()
     used: set[str] = set()
     while todo:

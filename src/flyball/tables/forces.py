@@ -1,4 +1,4 @@
-"""The force table: frames or measured quantities, laws, states of work, loads of joints."""
+"""The force table: frames or measured quantities, laws, work states, loads of joints."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ from .table_definitions import FORCE_BY_ADDRESS, SLIDING, Forces
 
 
 def measure_quantities(s: Structure, names_in_use: Mapping[str, Event | Controller]) -> None:
-    """Number every quantity that a force acts along or that a law names; the slots in which laws find them.
+    """Number every quantity that a force acts along or that a law names, and the slots in which laws read them.
 
-    ``names_in_use``: names in expressions of events and controllers, curves such as A.angle among them, and whose they are.
+    ``names_in_use``: names in expressions of events and controllers (including curves such as A.angle), and their
+    elements.
     """
     for e in (*s.model.forces, *s.model.limits):
         if isinstance(e, CoordinateForce):
@@ -65,7 +66,7 @@ def _law_fields(e) -> dict[str, LawOf]:
 
 
 def _acting_quantity(s: Structure, e: CoordinateForce) -> int:
-    """The quantity that a force acts along."""
+    """Measured quantity that a force acts along."""
     text = e.coordinate_text() or f"{e.name}:length"
     if text in s.measured:
         return s.measured[text]
@@ -79,7 +80,7 @@ def _acting_quantity(s: Structure, e: CoordinateForce) -> int:
 
 
 def _sensed_quantity(s: Structure, e: Sensor | Event | Controller, kind: str, text: str) -> int:
-    """The quantity that a sensor measures, or that an event names."""
+    """Measured quantity of a sensor, or of a name in an event."""
     force = s.model[text] if kind == "force" else None
     if isinstance(force, CoordinateForce):
         return _acting_quantity(s, force)
@@ -90,7 +91,7 @@ def _sensed_quantity(s: Structure, e: Sensor | Event | Controller, kind: str, te
     if force is not None:
         measured_term(s, m, frame_index(s, force, "F"), frame_index(s, force, "M"), DISTANCE, 1.0, force)
     elif kind == "spin":
-        # about an axis of the world: that of ground seen from the body, reversed
+        # about an axis of the world: the angle of ground seen from the body, reversed
         owner, _, axis = text.partition(".")
         measured_term(s, m, frame_index(s, s.model[owner], "M"), 0, turning(axis), -1.0, e)
     else:
@@ -99,7 +100,7 @@ def _sensed_quantity(s: Structure, e: Sensor | Event | Controller, kind: str, te
 
 
 def fill_force_table(s: Structure) -> None:
-    """Force table, sorted by kind."""
+    """Fill in the force table, sorted by kind."""
     acting = [(f, user_formulas(type(f))) for f in s.model.acting() if _acts(s, f)]
     acting.sort(key=lambda x: FORCE_BY_ADDRESS if x[1] is not None else x[0].kind)
     s.forces, s.force_code = [f for f, _ in acting], [x for _, x in acting]
@@ -129,7 +130,7 @@ def fill_force_table(s: Structure) -> None:
 
 
 def user_formulas(cls: type[Force]) -> CodeTable | None:
-    """The formulas of a class that is not flyball's own, by address; None where it has those of a built-in element.
+    """Code table of a user-defined class; None where it inherits the formulas of a built-in element.
 
     Raises
     ------
@@ -146,7 +147,7 @@ def user_formulas(cls: type[Force]) -> CodeTable | None:
 
 
 def _refuse_names(cls: type[Force]) -> None:
-    """Refuse fields that have the names of what forces declare."""
+    """Refuse fields whose names are reserved for declarations of forces."""
     for c in cls.__mro__:
         if c.__module__.partition(".")[0] == "flyball":
             continue
@@ -162,12 +163,12 @@ def _refuse_names(cls: type[Force]) -> None:
 
 
 def _acts(s: Structure, e: Force) -> bool:
-    """Whether there is a force: of a place of contact if it has modes here, and friction."""
+    """Whether a force exists: that of a contact point only if it has modes here, and friction."""
     return not isinstance(e, Touch) or (bool(s.switches) and e.acts())
 
 
 def _axis_frame(s: Structure, e: CoordinateForce) -> int:
-    """The frame whose z is the axis of the coordinate that a force acts along."""
+    """Frame whose z axis is the axis of the coordinate that a force acts along."""
     joint, what = s.model.coordinate(e.along()[0], e)
     return coordinate_frames(s, joint, what)[0]
 

@@ -1,14 +1,14 @@
-"""The forest of bodies: which body is carried by which, through which tree joints; point masses; the body table.
+"""The forest of bodies: parents, tree joints, point masses and the body table.
 
-Bodies that no tree joint connects to ground are free bodies (FREE or PLANAR), one for each connected part, and
-point masses (POINT), each on its own.
+Bodies that no tree joint connects to ground are free bodies (FREE or PLANAR), one for each connected part, and point
+masses (POINT), each on its own.
 
-A point mass is a body without inertia whose orientation means nothing: it has no angular velocity. A body is
-one if its inertia is written as zero (a parameter may become something else) and everything that acts on it
-acts at its centre of mass and depends on that point's position only: ends of `Distance`, springs and ropes,
-ball joints, forces. If something is attached elsewhere, or constrains or drives its orientation, the body is a
-rigid body, which joints must keep from turning. The model's own numbers decide; `check_centred` refuses other
-values that would decide otherwise.
+A point mass is a body without inertia whose orientation is irrelevant: it has no angular velocity. A body is a point
+mass if its inertia is written as zero (a parameter may become something else) and everything that acts on it acts at
+its centre of mass and depends on that point's position only: ends of `Distance`, springs and ropes, ball joints,
+forces. If something is attached elsewhere, or constrains or drives its orientation, the body is a rigid body, and
+joints must restrain its rotation. The model's own numbers decide; `check_centred` refuses other values that would
+decide otherwise.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ if TYPE_CHECKING:
     from .structure_definition import Structure
 
 
-CENTRED = 1e-9  # part of the way to the world's origin by which an end may miss the centre
+CENTRED = 1e-9  # relative to the distance from the world's origin: by how much an end may miss the centre
 
 
 def point_mass_obstacles(model: Model) -> Mapping[str, str]:
-    """Bodies without inertia -> why each is no point mass; "" for one that is."""
+    """Bodies without inertia -> why each is no point mass; "" for a point mass."""
     model = model.snapshot()
     return model.kept.get("points", None, 1, lambda: _point_mass_obstacles(model))
 
 
 def point_masses(model: Model) -> frozenset[str]:
-    """Names of the point masses. They are all that structures take from values of parameters."""
+    """Names of the point masses: the only result that structures take from parameter values."""
     model = model.snapshot()
     return model.kept.get(
         "single", None, 1, lambda: frozenset(k for k, why in point_mass_obstacles(model).items() if not why)
@@ -83,14 +83,14 @@ def _is_zero(value: Any) -> bool:
         return bool(value == 0)
     try:
         if not is_number_text(value) and Expression.parse(value).names:
-            return False  # said here: a message about unknown names asks for all the world's units
+            return False  # decided here: the message about unknown names would look up all units
         return bool(si_numbers(value, {}, "kg*m^2", "inertia") == 0)
-    except FlyballError:  # no number
+    except FlyballError:  # not a number
         return False
 
 
 def _attachments(model: Model, among: Mapping[str, str]) -> Iterator[tuple[str, str, Element, bool]]:
-    """(body, role, element, whether it sees no more than the end's place) of all that acts on some bodies."""
+    """(body, role, element, whether it depends on the end's position only) of everything that acts on these bodies."""
     for joint in model.joints:
         rows = joint.rows(model.planar)
         for role, end in joint.ends().items():
@@ -112,12 +112,12 @@ def _attachments(model: Model, among: Mapping[str, str]) -> Iterator[tuple[str, 
 
 
 def sees_point(row: Row, role: str) -> bool:
-    """Whether a row depends on the place of its frame F or M only, and makes no torque about it."""
+    """Whether a row depends on the position of its frame F or M only, and makes no torque about it."""
     return role in row.of_kind.points
 
 
 def _acting_coordinates(model: Model) -> Iterator[tuple[str, Element]]:
-    """Coordinates that something acts along, by name."""
+    """Names of coordinates that something acts along."""
     for coupling in model.couplings:
         yield from ((text, coupling) for text in coupling.coupled())
     yield from ((d.coordinate, d) for d in model.drivers)
@@ -127,7 +127,7 @@ def _acting_coordinates(model: Model) -> Iterator[tuple[str, Element]]:
 
 
 class _Centres:
-    """Where ends and centres of mass are drawn, by the model's own numbers."""
+    """Positions of ends and centres of mass in the reference configuration, from the model's own numbers."""
 
     def __init__(self, model: Model) -> None:
         self.model, self.numbers = model, element_numbers(model)
@@ -156,7 +156,7 @@ class _Centres:
 
 
 def _written_place(e: Any, role: str) -> Any:
-    """The place of an end in the world as it stands in the description, if it does."""
+    """Position of an end in the world as written in the description, if it is."""
     at = getattr(e, "at", None)
     if at is None or not isinstance(at[0], tuple):
         return at
@@ -169,7 +169,7 @@ def check_centred(model: Model, name: str, element: Any, way: np.ndarray, length
     Raises
     ------
     ModelError
-        Naming both, and how far.
+        With the names of both, and the distance.
     """
     off = np.abs(way.real)
     if isinstance(element, (Joint, Force)) and (off > CENTRED * length.real).any():
@@ -185,22 +185,22 @@ TREE_KINDS = {"R": REVOLUTE, "P": PRISMATIC, "S": SPHERICAL}
 
 @dataclass(frozen=True)
 class TreeJoint:
-    """A joint whose freedoms are coordinates: where its chain stands in the body table."""
+    """A tree joint: a joint whose freedoms are coordinates, with its chain in the body table."""
 
     joint: Joint
-    reversed: bool  # the body beyond it carries frame F
-    links: tuple[int, ...]  # rows of the body table, from the parent on; all but the last are massless
-    primitives: tuple[Primitive, ...]  # in the order of the links; none for a weld
+    reversed: bool  # the body beyond the joint carries frame F
+    links: tuple[int, ...]  # rows of the body table, outwards from the parent; all but the last are massless
+    primitives: tuple[Primitive, ...]  # in the order of the links; empty for a weld
 
     @property
     def child(self) -> int:
-        """Row of the body beyond it."""
+        """Row of the body beyond the joint."""
         return self.links[-1]
 
 
 @dataclass(frozen=True)
 class TreeBody:
-    """A body and the joint that it hangs by: none for one that hangs on ground by FREE or PLANAR."""
+    """A body and its tree joint: None for one connected to ground by FREE, PLANAR or POINT."""
 
     body: str
     joint: Joint | None = None
@@ -214,7 +214,7 @@ def joint_bodies(model: Model, joint: Joint) -> tuple[str, str]:
 
 
 def tree_bodies(model: Model, tree: Sequence[str]) -> list[TreeBody]:
-    """Every body with what it hangs by, parents first.
+    """Bodies with their tree joints, parents first.
 
     Raises
     ------
@@ -243,7 +243,7 @@ def tree_bodies(model: Model, tree: Sequence[str]) -> list[TreeBody]:
 
 
 def _append_chains(near: dict, root: str, reached: set[str], out: list[TreeBody]) -> None:
-    """Append all that hangs on the root, one chain after the other."""
+    """Append all bodies reachable from the root, one chain after the other."""
     stack = [(root, iter(near[root]))]
     while stack:
         here, ways = stack[-1]
@@ -258,7 +258,7 @@ def _append_chains(near: dict, root: str, reached: set[str], out: list[TreeBody]
 
 
 def _central_body(near: dict, start: str) -> str:
-    """The body of a connected part from which the farthest is nearest: chains are shortest from there."""
+    """Central body of a connected part: the one whose farthest body is nearest, so that chains are shortest."""
 
     def farthest(root: str) -> list[str]:
         way, order = {root: root}, [root]
@@ -280,7 +280,7 @@ def _central_body(near: dict, start: str) -> str:
 
 
 def body_table(s: Structure) -> None:
-    """Decide rows of bodies and massless links, their coordinates and velocities."""
+    """Assign rows of bodies and massless links, with their coordinates and velocities."""
     model = s.model
     plain = PLANAR if model.planar else FREE
     s.points = point_masses(model)
@@ -309,14 +309,14 @@ def body_table(s: Structure) -> None:
 
 
 def tree_joint_steps(s: Structure) -> Iterator[tuple[TreeJoint, int, Primitive]]:
-    """Every step of every tree joint with its row of the body table."""
+    """Primitives of every tree joint with their rows of the body table."""
     for t in s.tree_joints.values():
-        for row, p in zip(t.links, t.primitives, strict=False):  # a weld has no step
+        for row, p in zip(t.links, t.primitives, strict=False):  # a weld has none
             yield t, row, p
 
 
 def coordinate_row(s: Structure, joint: str, coordinate: str) -> int | None:
-    """Row of the body table whose one coordinate is that coordinate of a joint, if there is one."""
+    """Row of the body table whose coordinate is that coordinate of a joint; None if there is none."""
     found = s.tree_joints.get(joint)
     if found is None:
         return None

@@ -1,14 +1,13 @@
-"""What laws read besides sensors: states of controllers, forces named by events, sides of nonsmooth points.
+"""Inputs of laws besides sensors: states of controllers, forces named by events, sides of nonsmooth points.
 
-States of controllers are the first of all states, each with the law of its rate. Forces that events name have
-columns after the loads of joints: a joint has eight (`quantities.WRENCH`), other elements two (the effort, and its
-negative); they are filled in `equations.readings` from the rows of `LoadTerms`. A nonsmooth point of a law
-where the state decides (`abs`, `max`, `where`, a table's knot) is a switch, whose guard is a law of its own;
-the law reads the side as if measured.
+States of controllers are the first of all states, each with the law of its rate. Forces that events name have columns
+after the loads of joints: a joint has eight (`quantities.WRENCH`), other elements two (the effort, and its negative).
+`loads.update_readings` fills them in from the rows of `LoadTerms`. A nonsmooth point of a law where the state decides
+(`abs`, `max`, `where`, a table's knot) is a switch, whose guard is a law of its own; the law reads the side like a
+measured quantity.
 
-Columns are known only when all quantities are numbered: until then, places stand in the bytecode as negative
-numbers, from `CONTROLLER_STATE_CODE` and `FORCE_READING_CODE` downwards; `resolve_columns` writes the final
-ones.
+Columns are known only when all quantities are numbered. Until then, the bytecode holds negative numbers in their place,
+from `CONTROLLER_STATE_CODE` and `FORCE_READING_CODE` downwards; `resolve_columns` writes the final columns.
 """
 
 from __future__ import annotations
@@ -38,18 +37,18 @@ from .constraint_rows import SwitchSpec, event_names, measured_term, term_from_s
 from .structure_definition import Structure, frame_index
 
 CONTROLLER_STATE_CODE = -1_000_000_000
-"""Place of the first state until columns are known; below those of switches' ways."""
+"""Code of the first controller state until columns are known; below the codes of sides."""
 
 
 def add_controller_states(s: Structure) -> None:
-    """Give every state of a controller its number, before all other states."""
+    """Number every state of a controller, before all other states."""
     s.controls = controller_states(s.model)
     for x in s.controls:
         s.state(x.name)
 
 
 def controller_names(model: Model) -> dict[str, Controller]:
-    """Every name in laws and signals of controllers, and a controller that uses it."""
+    """Names in laws and signals of controllers, each with a controller that uses it."""
     out: dict[str, Controller] = {}
     for e in model.controllers:
         laws = [x.law for x in controller_states(model) if x.controller is e] + [
@@ -61,12 +60,12 @@ def controller_names(model: Model) -> dict[str, Controller]:
 
 
 def add_controller_slots(s: Structure) -> None:
-    """Have laws find the states."""
+    """Add the slots in which laws read the states of controllers."""
     s.slots |= {x.name: CONTROLLER_STATE_CODE - k for k, x in enumerate(s.controls)}
 
 
 def add_controller_laws(s: Structure) -> None:
-    """The laws of the rates."""
+    """Compile the laws of the rates of controller states."""
     laws, s.sampled, s.ordered = [], [], []
     for k, x in enumerate(s.controls):
         at = s.law(x.law, (), None if x.controller.sampled else x.controller)
@@ -80,35 +79,35 @@ def add_controller_laws(s: Structure) -> None:
 
 
 def initial_controller_states(s: Structure, numbers: Mapping[str, Any]) -> list[Any]:
-    """What the states begin with; ``numbers`` are those of elements, by name."""
+    """Initial values of the controller states; ``numbers`` are those of elements, by name."""
     found = {e.name: {x.name: x.initial for x in e.states(numbers[e.name])} for e in s.model.controllers}
     return [found[x.controller.name].get(x.state, 0.0) for x in s.controls]
 
 
 FORCE_READING_CODE = -2_000_000_000
-"""Place of the first column until it is known; below those of controllers' states."""
+"""Code of the first force column until it is known; below the codes of controller states."""
 
 
 def forces_in_events(model: Model) -> dict[str, TransmittedForce]:
-    """Every name in expressions of events that is one of a force, and what it means."""
+    """Names in expressions of events that denote a force, each with its meaning."""
     found = {name: transmitted_force(model, name) for name in event_names(model) if "." in name}
     return {name: x for name, x in sorted(found.items()) if x is not None}
 
 
 def number_force_readings(s: Structure) -> None:
-    """Number the columns."""
+    """Number the columns of forces that events name."""
     for name, x in forces_in_events(s.model).items():
         first = s.reads.setdefault(x.element.name, force_reading_count(s))
         s.slots[name] = FORCE_READING_CODE - first - x.column
 
 
 def force_reading_count(s: Structure) -> int:
-    """How many columns there are."""
+    """Number of columns of forces that events name."""
     return sum(len(WRENCH if isinstance(s.model[name], Joint) else EFFORTS) for name in s.reads)
 
 
 def force_reading_entries(s: Structure) -> list[tuple[int, int]]:
-    """What each is made of: (column, term or other)."""
+    """Rows of `LoadTerms` for forces that events name: (column, term or code of another source)."""
     first = 2 * len(s.measured) + len(s.loads)
     return [(first + at, what) for name, at in s.reads.items() for what in _reading_terms(s, s.model[name])]
 
@@ -126,7 +125,7 @@ def _reading_terms(s: Structure, e: Element) -> list[int]:
 
 
 def element_laws(model: Model) -> Iterator[tuple[Element, Expression, tuple[str, ...]]]:
-    """The laws of forces, controllers and drivers: whose, and of which inputs besides time."""
+    """Laws of forces, controllers and drivers: (element, law, its inputs besides time)."""
     for x in controller_states(model):
         if not x.controller.sampled:
             yield x.controller, x.law, ()
@@ -142,7 +141,7 @@ def element_laws(model: Model) -> Iterator[tuple[Element, Expression, tuple[str,
 
 
 def nonsmooth_elements(model: Model) -> list[Element]:
-    """Elements whose laws have corners where the state decides."""
+    """Elements whose laws have nonsmooth points where the state decides."""
     return (
         model.kept.get("bent laws", None, 1, lambda: _nonsmooth_elements(model))
         if model.frozen
@@ -161,13 +160,13 @@ def _nonsmooth_elements(model: Model) -> list[Element]:
 
 
 def steep_law_names(model: Model) -> list[str]:
-    """The laws whose slope may be infinite somewhere, as messages name them."""
+    """Names, for messages, of laws whose slope may be infinite somewhere."""
     still = {"t", *model.parameters}
     return [law.where for _, law, _ in element_laws(model) if not calls_python(law) and may_be_steep(law.tree, still)]
 
 
 def _is_nonsmooth(model: Model, law: Expression) -> bool:
-    """Tables without corners are no reason to watch a law."""
+    """Whether a law has a nonsmooth point that needs a guard; tables with a smooth interpolation do not."""
     smooth = {x.name for x in model.tables if not len(table_corners(np.array(x.data()), 0))}
     if not law.tables or any(n.kind in _NONSMOOTH for n in law.tree.walk()):
         return True
@@ -178,14 +177,14 @@ _NONSMOOTH = frozenset({"where", "abs", "sign", "min", "max", "step", "step5"})
 
 
 class NonsmoothPoints:
-    """The corners of one structure."""
+    """Nonsmooth points of the laws of one structure."""
 
     def __init__(self, s: Structure) -> None:
         self.s = s
         self.known: dict[Any, int] = {}
 
     def quantities(self) -> None:
-        """Number the lengths and rates that bent laws of forces between frames depend on."""
+        """Number the lengths and rates that nonsmooth laws of forces between frames depend on."""
         for e in nonsmooth_elements(self.s.model):
             if not isinstance(e, TwoPointForce) or self.key(e) in self.s.measured:
                 continue
@@ -197,7 +196,7 @@ class NonsmoothPoints:
         return (e.coordinate_text() if isinstance(e, CoordinateForce) else "") or f"{e.name}:length"
 
     def of(self, e: Any, law: Expression, inputs: tuple[str, ...]) -> CornerLookup | None:
-        """Where the sides of a law's corners are found; None for what has none."""
+        """Function that finds the slot of each side in a law; None for an element without nonsmooth points."""
         if calls_python(law):
             return None
         s = self.s
@@ -226,7 +225,7 @@ class NonsmoothPoints:
         return corner
 
     def zigzag(self, name: str) -> list[float] | None:
-        """A curve that passes zero at each corner of a table, and only there; None where there are none."""
+        """Table that is zero at each knot of another table, and only there; None if that has no such knots."""
         table = next(x for x in self.s.model.tables if x.name == name)
         data = np.array(table.data())
         x = table_corners(data, 0)
@@ -234,7 +233,8 @@ class NonsmoothPoints:
             return None
         repeat = table.beyond == "repeat"
         if repeat:
-            x = np.r_[x, x + data[0]] if len(x) % 2 == 1 else x  # of an odd number the sign is back after two periods
+            # with an odd number of knots, the sign repeats after two periods
+            x = np.r_[x, x + data[0]] if len(x) % 2 == 1 else x
             x = np.r_[x, x[0] + data[0] * np.ceil((x[-1] - x[0]) / data[0] + 1e-12)]
         middle = 0.5 * (x[:-1] + x[1:])
         height = 0.5 * np.diff(x) * (-1.0) ** np.arange(len(middle))
@@ -248,7 +248,7 @@ class NonsmoothPoints:
 
 
 def _resolved(u: SyntaxNode, slots: dict[str, int]) -> tuple[Any, ...]:
-    """What a node means, with the places of what is measured for names."""
+    """Key of a node, with slots of measured quantities in place of names."""
     kind, value, *args = node_key(u)
     if kind == "name" and value in slots:
         return ("slot", slots[value])
@@ -256,7 +256,7 @@ def _resolved(u: SyntaxNode, slots: dict[str, int]) -> tuple[Any, ...]:
 
 
 def resolve_columns(s: Structure) -> None:
-    """Write the columns of ways, and of controllers' states, into the code, when all that is measured is numbered."""
+    """Write the final columns of sides and controller states into the code, once all quantities are numbered."""
     read = 2 * len(s.measured) + len(s.loads)
     first = read + force_reading_count(s)
 

@@ -1,7 +1,6 @@
 """Mass properties in the body table: masses, inertias, their inverses, and substitutes where one is zero.
 
-Where a principal inertia or a mass is zero, a small substitute makes the inverse exist; the solve takes it out
-again.
+Where a principal inertia or a mass is zero, a small substitute makes the inverse exist; the solve removes it again.
 """
 
 from __future__ import annotations
@@ -18,18 +17,18 @@ from .reference_configuration import Refresh
 from .structure_definition import Structure
 from .table_definitions import POINT, Bodies, zero_table
 
-NEGLIGIBLE = 1e-9  # principal inertias below this part of the body's size count as none
-SUBSTITUTE = 1e-6  # what is put in their place while factoring
+NEGLIGIBLE = 1e-9  # principal inertias below this fraction of the body's size count as zero
+SUBSTITUTE = 1e-6  # substitute for a zero value while factoring, relative to the body's size
 
 
 def typical_mass(masses: list[Any]) -> Any:
-    """What a body weighs as a rule: the mean of those that weigh anything; 1 kg where none does."""
+    """Typical mass: the mean of those that are not zero; 1 kg where all are zero."""
     heavy = [m for m in masses if m.real > 0.0]
     return sum(heavy) / len(heavy) if heavy else 1.0
 
 
 def inverse_inertia(J: np.ndarray, size: Any, planar: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Inverse of an inertia, and what was added to it before.
+    """Inverse of an inertia, and the substitute that was added to it before.
 
     Parameters
     ----------
@@ -43,9 +42,9 @@ def inverse_inertia(J: np.ndarray, size: Any, planar: bool) -> tuple[np.ndarray,
     Returns
     -------
     inverse : (3, 3)
-        Of ``J`` plus the excess; in the plane of the entry of z alone.
+        Inverse of ``J`` plus the excess; in the plane of the zz entry only.
     excess : (3, 3)
-        Brings principal inertias that are none up to ``STAND_IN`` times the size; else zero.
+        Raises zero principal inertias to ``SUBSTITUTE`` times the size; zero if there are none.
     """
     w, V = (np.diag(real_parts(J)), np.eye(3)) if planar else np.linalg.eigh(real_parts(J))
     used = np.array([not planar, not planar, True])
@@ -62,7 +61,7 @@ def inverse_inertia(J: np.ndarray, size: Any, planar: bool) -> tuple[np.ndarray,
 
 
 def _inverse_by_cofactors(J: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """Inverse by cofactors, for numbers that LAPACK does not know; in the plane of the entry of z alone."""
+    """Inverse by cofactors, for number types that LAPACK does not support; in the plane of the zz entry only."""
     if not used[0]:
         out = np.zeros((3, 3), object)
         out[2, 2] = 1.0 / J[2, 2]
@@ -72,14 +71,14 @@ def _inverse_by_cofactors(J: np.ndarray, used: np.ndarray) -> np.ndarray:
 
 
 def _rate_of_excess(J: np.ndarray, size: Any, w: np.ndarray, V: np.ndarray, weak: np.ndarray) -> np.ndarray:
-    """Imaginary part of size STAND_IN P - P J P, P the projector onto the directions without inertia.
+    """Imaginary part of size SUBSTITUTE P - P J P, P the projector onto the directions without inertia.
 
-    P turns as these do: dP = sum of (v_i v_j^T + v_j v_i^T) (v_i . dJ v_j) / (w_i - w_j) over v_i in it and v_j not
-    in it (Kato, *Perturbation Theory for Linear Operators*, 1966, chapter II).
+    P rotates with these directions: dP = sum of (v_i v_j^T + v_j v_i^T) (v_i . dJ v_j) / (w_i - w_j) over v_i in the
+    range of P and v_j not in it (Kato, *Perturbation Theory for Linear Operators*, 1966, chapter II).
     """
     dJ, P = J.imag, V[:, weak] @ V[:, weak].T
     between = weak[:, None] & ~weak
-    gap = w[:, None] - w  # none in the plane, where x and y count as without inertia; nothing leads to them there
+    gap = w[:, None] - w  # zero in the plane, where x and y count as without inertia; no entry couples to them there
     C = np.where(between, V.T @ dJ @ V / np.where(gap == 0.0, 1.0, gap), 0.0)
     dP = V @ (C + C.T) @ V.T
     across = dP @ J.real @ P
@@ -87,9 +86,9 @@ def _rate_of_excess(J: np.ndarray, size: Any, w: np.ndarray, V: np.ndarray, weak
 
 
 def mass_table(s: Structure, bodies: Mapping, places: np.ndarray, length: Any, refresh: Refresh) -> Bodies:
-    """The body table with its masses and inertias; ``places``: of all frames, from their bodies' mass centres.
+    """Fill in masses and inertias in the body table; ``places``: of all frames, from their bodies' mass centres.
 
-    Where a principal inertia or a mass is none, a stand-in that the solve takes out again.
+    Where a principal inertia or a mass is zero, a substitute is added that the solve removes again.
     """
     joint = s.tables["tree"].joint
     table = refresh.table("bodies", zero_table(Bodies, len(joint), places.dtype), places.dtype)
@@ -117,9 +116,9 @@ def mass_table(s: Structure, bodies: Mapping, places: np.ndarray, length: Any, r
 
 
 def _write_inertia(table: Bodies, b: int, J: np.ndarray, sizes: tuple[Any, Any], planar: bool) -> None:
-    """Inertia of a body, its inverse, and what stands in for it, into its row.
+    """Write the inertia of a body, its inverse, and its substitute to its row of the table.
 
-    ``sizes``: what it would be if all that its frames reach were filled; and if it has no size of its own.
+    ``sizes``: inertia if all that its frames reach were filled; and the fallback if it has no size of its own.
     """
     compact, bulky = sizes
     own = J[2, 2]
@@ -136,12 +135,12 @@ def _write_inertia(table: Bodies, b: int, J: np.ndarray, sizes: tuple[Any, Any],
 
 
 def _largest_offsets(s: Structure, flat: np.ndarray) -> np.ndarray:
-    """Of every body the largest component, taken positive, of the ways from its centre of mass to its frames."""
+    """Largest absolute component, for every body, of the vectors from its centre of mass to its frames."""
     out, body = np.zeros(len(s.tables["tree"].parent), flat.dtype), s.tables["frame_body"]
     best = np.argmax(np.abs(real_parts(flat)), axis=1)
     largest = flat[np.arange(len(flat)), best]
     largest = np.where(real_parts(largest) < 0.0, -largest, largest)
     order = np.argsort(real_parts(largest), kind="stable")
     order = order[body[order] >= 0]
-    out[body[order]] = largest[order]  # the last one given is the largest
+    out[body[order]] = largest[order]  # the last assignment, the largest value, remains
     return out

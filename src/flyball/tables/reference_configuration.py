@@ -1,10 +1,9 @@
 """The reference configuration: poses of frames, frames of the tree joints, and coordinates from body poses.
 
-`Refresh` says which rows of the tables are filled again where tables for other parameter values exist already.
-`Poses` finds frames of elements in the reference configuration; `tree_frames` writes the frames of tree joints,
-each with z along its own axis; `positions` and `free_velocities` read the coordinates of the forest from the
-bodies' poses and velocities. Velocities of tree joints need the twist columns, and are in
-``engine/kinematics.py``.
+`Refresh` states which rows of the tables are computed again where tables for other parameter values exist already.
+`Poses` computes frames of elements in the reference configuration; `tree_frames` writes the frames of tree joints, each
+with z along its own axis; `positions` and `free_velocities` compute the coordinates of the forest from the bodies'
+poses and velocities. Velocities of tree joints need the twist columns, and are in ``engine/kinematics.py``.
 """
 
 from __future__ import annotations
@@ -39,18 +38,18 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Refresh:
-    """Rows of elements with other numbers than those in ``base``, or that stand on such an element; else all rows.
+    """Rows to compute again: those of elements with other numbers than in ``base``, or that depend on such an element.
 
-    The others are taken over: they would be the same to the bit.
+    The other rows are copied: they would be the same to the bit. Without ``base`` all rows are computed.
     """
 
     base: Values | None = None
     names: Collection[str] = frozenset()
-    forces_only: bool = False  # whether these are forces and controllers alone
+    forces_only: bool = False  # whether only forces and controllers have other numbers
 
     @classmethod
     def since(cls, base: Values | None, given: ElementNumbers, model: Model) -> Refresh:
-        """What is different from tables of the same structure."""
+        """Differences from existing tables of the same structure."""
         if base is None or base.given.since is not given.since:
             return cls()
         stand_on = model.kept.get("stand on", None, 1, lambda: _dependents(model))
@@ -59,29 +58,29 @@ class Refresh:
         return cls(base, other.union(*(stand_on.get(name, ()) for name in other)), other <= acting)
 
     def table(self, name: str, new: T, dtype: Any) -> T:
-        """A table of `System` to be filled in: with what is known, or the ``new`` one."""
+        """Table of `System` to be filled in: a copy of the existing one, or the ``new`` one."""
         if self.base is None:
             return new
         return map_arrays(lambda _, x: x.astype(dtype), getattr(self.base.system, name))  # type: ignore[no-any-return]
 
     def state(self, name: str, n: int, dtype: Any) -> np.ndarray:
-        """The same of the drawn coordinates, "q", or velocities, "v"."""
+        """Reference coordinates "q" or velocities "v" to be filled in: a copy of the existing ones, or zeros."""
         return np.zeros(n, dtype) if self.base is None else getattr(self.base, name).astype(dtype)
 
     def rows(self, s: Structure, table: str) -> Iterable[int]:
-        """Numbers of the rows of a table ("frames", "terms" or "forces") that are filled in again."""
+        """Numbers of the rows of a table ("frames", "terms" or "forces") that are computed again."""
         if self.base is None:
             return range(len(getattr(s, table)))
         of = s.kept.get("rows of elements", table, 3, lambda: _rows_of_elements(getattr(s, table)))
         return sorted({k for name in self.names for k in of.get(name, ())})
 
     def asks(self, *elements: Any) -> bool:
-        """Whether rows of one of these elements (None: of the world) are filled in again."""
+        """Whether rows of one of these elements (None: of the world) are computed again."""
         return self.base is None or any(e is not None and e.name in self.names for e in elements)
 
 
 def _rows_of_elements(specs: Sequence[Any]) -> Mapping[str, list[int]]:
-    """Element -> the rows that depend on it."""
+    """Map of each element to the rows that depend on it."""
     out: dict[str, list[int]] = {}
     for k, x in enumerate(specs):
         elements = (x,) if isinstance(x, Element) else (x.element, getattr(x, "owner", None))
@@ -91,7 +90,7 @@ def _rows_of_elements(specs: Sequence[Any]) -> Mapping[str, list[int]]:
 
 
 def _dependents(model: Model) -> Mapping[str, set[str]]:
-    """Element -> elements whose drawn frames its numbers move."""
+    """Map of each element to the elements whose frames in the reference configuration depend on its numbers."""
     out: dict[str, set[str]] = {}
     for e in model.elements():
         for name in _supports(model, e):
@@ -100,7 +99,7 @@ def _dependents(model: Model) -> Mapping[str, set[str]]:
 
 
 def _supports(model: Model, e: Any) -> set[str]:
-    """Names of all that an element's frames stand on."""
+    """Names of all elements that an element's frames are defined on."""
     if isinstance(e, Coupling):
         owners = [model.coordinate(text, e)[0] for text in e.coupled()]
         return {owner.name for owner in owners}.union(*(_supports(model, owner) for owner in owners))
@@ -113,7 +112,7 @@ def _supports(model: Model, e: Any) -> set[str]:
 
 
 class Poses:
-    """Where the frames of elements are when the mechanism is drawn."""
+    """Poses of the elements' frames in the reference configuration."""
 
     def __init__(self, s: Structure, given: ElementNumbers) -> None:
         self.s, self.numbers, self.bodies = s, given.of, given.bodies
@@ -139,7 +138,7 @@ class Poses:
         return row[:3], row[3:].reshape(3, 3)
 
     def world(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
-        """Position, rotation and carrier of a frame in the drawn configuration."""
+        """Position, rotation and carrier of a frame in the reference configuration."""
         if f.element is None:
             return np.zeros(3), np.eye(3), GROUND
         key = f.element.name, f.role, f.coordinate
@@ -171,7 +170,7 @@ class Poses:
         return found
 
     def named(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Drawn pose of a body's reference frame or of a named frame."""
+        """Pose of a body's reference frame or of a named frame in the reference configuration."""
         if name in self.bodies:
             return self.bodies[name].p, self.bodies[name].R
         e = self.model[name]
@@ -182,35 +181,35 @@ class Poses:
         )
 
     def separation(self, e: Any) -> float:
-        """Drawn distance from the first of an element's frames to the last, by way of all between."""
+        """Length of the path from the first to the last of an element's frames in the reference configuration."""
         points = [self.world(FrameSpec(0, e, role))[0] for role in e.ends()]
         return sum(np.sqrt(((b - a) ** 2).sum()) for a, b in itertools.pairwise(points))
 
     def apart(self, e: Any) -> float:
-        """The same of an element that has several frames; 0 of others."""
+        """`separation` of an element that has several frames; 0 of others."""
         return self.separation(e) if hasattr(e, "ends") and len(e.ends()) > 1 else 0.0
 
     def ends(self, e: Any) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Drawn frames F and M of a joint."""
+        """Frames F and M of a joint in the reference configuration."""
         F, M = (self.world(FrameSpec(0, e, role))[:2] for role in "FM")
         return F, M
 
     def axis(self, joint: str) -> np.ndarray:
-        """Axis of a joint's angle in the world as drawn."""
+        """Axis of a joint's angle in the world in the reference configuration."""
         e = self.model[joint]
         R = self.ends(e)[0][1]
         turn = e.coordinates["angle"].turn_F if "angle" in e.coordinates else ()
         return (matrix_product(R, np.array(turn)) if len(turn) else R)[:, 2]
 
     def drawn(self, t: TermSpec) -> float:
-        """What a term's formula gives in the drawn configuration."""
+        """Value of a term's formula in the reference configuration."""
         poses = (self.world(self.s.frames[k]) for k in (t.F, t.M))
         F, M = ((tuple(p), tuple(R.ravel()), *((0.0,) * 3,) * 4) for p, R, _ in poses)
         par = (1.0, *t.formula.par[1:6], 0.0, 0.0) if t.formula.of_kind.turns else (*t.formula.par[:6], 0.0, 0.0)
         return t.formula.of_kind.row(par, F, M, self.turned(t.owner), None)[0]
 
     def turned(self, owner: Any) -> float:
-        """Angle of a body or frame in the plane as drawn, whole turns counted; 0 for joints, which begin there."""
+        """Angle of a body or frame in the plane in the reference configuration, with whole turns; 0 for joints."""
         if isinstance(owner, Joint) or not self.model.planar:
             return 0.0
         own = self.numbers[owner.name].angle
@@ -218,14 +217,15 @@ class Poses:
 
 
 IDENTITY = np.eye(3)
-Z_TO_AXIS = {"x": np.roll(IDENTITY, 2, axis=1), "y": np.roll(IDENTITY, 1, axis=1), "z": IDENTITY}  # z goes there
-FLIP = np.diag([1.0, -1.0, -1.0])  # turns an axis round
+# rotations that take z to each axis
+Z_TO_AXIS = {"x": np.roll(IDENTITY, 2, axis=1), "y": np.roll(IDENTITY, 1, axis=1), "z": IDENTITY}
+FLIP = np.diag([1.0, -1.0, -1.0])  # half a turn about x, which reverses z
 
 
 def tree_frames(s: Structure, pose: Poses, numbers: Mapping, table: Bodies, refresh: Refresh) -> None:
-    """Frames of all tree joints into the body table.
+    """Write the frames of all tree joints to the body table.
 
-    A chain leads from F to M; where the body beyond carries F it is gone back, every step about the axis turned round.
+    A chain leads from F to M. Where the body beyond carries F it is traversed backwards, with every axis reversed.
     """
     joints = [t for t in s.tree_joints.values() if refresh.asks(t.joint)]
     if not joints:
@@ -260,7 +260,7 @@ def tree_frames(s: Structure, pose: Poses, numbers: Mapping, table: Bodies, refr
 
 
 def _step_rotation(t: Any, k: int) -> np.ndarray:
-    """Rotation from the frame before a step of a joint to one with z along the step's axis."""
+    """Rotation from the frame before primitive k of a joint to one with z along the primitive's axis."""
     if not t.primitives:
         return IDENTITY
     step = t.primitives[k]
@@ -278,9 +278,9 @@ def _transposed(R: np.ndarray) -> np.ndarray:
 
 
 def _mark_identities(table: Bodies, links: np.ndarray, kinds: np.ndarray) -> None:
-    """Note in the rows of links which of their joints' constant rotations are none: they need not be multiplied.
+    """Mark constant rotations of joints that are the identity: they need not be multiplied.
 
-    One about the axis of a hinge may as well come after the hinge's own, and becomes one with what stands there.
+    A constant rotation about the axis of a hinge commutes with the hinge's own, and is merged with the one behind it.
     """
     T = table.joint_rotation[links].reshape(-1, 3, 3)
     upright = (T[:, 2, 2] == 1.0) & ~(T[:, 2, :2] != 0.0).any(axis=1) & ~(T[:, :2, 2] != 0.0).any(axis=1)
@@ -298,7 +298,7 @@ def _mark_identities(table: Bodies, links: np.ndarray, kinds: np.ndarray) -> Non
 
 
 def _is_constant(R: np.ndarray) -> np.ndarray:
-    """Whether rows are what they are for other values of the parameters too, as far as these numbers carry it."""
+    """Whether rows have the same value for other parameter values too, as far as the number type shows it."""
     if R.dtype == object:
         return np.array([not any(hasattr(x, "called") and not x.known for x in row) for row in R], bool)
     return np.asarray(~R.imag.any(axis=1))
@@ -306,15 +306,13 @@ def _is_constant(R: np.ndarray) -> np.ndarray:
 
 UNIT_AXES = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
 
-MANY_JOINTS = 30  # joints of one coordinate from which on they are read all at once
+MANY_JOINTS = 30  # number of joints of one coordinate from which they are read all at once
 NEXT_AXIS = {"x": "y", "y": "z", "z": "x"}
 
 
 @dataclass(frozen=True)
 class BodyState:
-    """A body as it is: centre of mass, rotation, velocity, angular velocity, all in the world; in the plane its turned
-    angle.
-    """
+    """Body state: centre of mass, rotation, velocity, angular velocity in the world; in the plane also its angle."""
 
     p: np.ndarray
     R: np.ndarray
@@ -333,10 +331,10 @@ def positions(
     hints: Mapping[str, float] | None = None,
     refresh: Refresh = ALL_ROWS,
 ) -> np.ndarray:
-    """Coordinates (nq,) of the forest for bodies that are there; where these do not fit the tree joints, the nearest.
+    """Coordinates (nq,) of the forest for given body states; the nearest ones where these do not fit the tree joints.
 
-    ``hints``: angles of joints, "joint.coordinate", within half a turn; the drawn turns where they are not told.
-    ``refresh``: which are found; the others are those of its tables.
+    ``hints``: angles of joints, "joint.coordinate", within half a turn; by default the turns of the reference
+    configuration. ``refresh``: which are computed; the others are copied from its tables.
     """
     s, tree = x.structure, x.structure.tables["tree"]
     q = refresh.state("q", s.nq, x.system.const.dtype)
@@ -362,7 +360,7 @@ def positions(
 
 
 def free_velocities(x: Values, bodies: Mapping[str, BodyState], refresh: Refresh = ALL_ROWS) -> np.ndarray:
-    """Velocities (nv,) of the bodies that hang on ground by FREE, PLANAR or POINT; zero along all tree joints."""
+    """Velocities (nv,) of the bodies connected to ground by FREE, PLANAR or POINT; zero along all tree joints."""
     s, tree = x.structure, x.structure.tables["tree"]
     v = refresh.state("v", s.nv, x.system.const.dtype)
     hung = {t.child for t in s.tree_joints.values()}
@@ -382,7 +380,7 @@ def free_velocities(x: Values, bodies: Mapping[str, BodyState], refresh: Refresh
 def _read_one_coordinate_joints(
     x: Values, joints: list[TreeJoint], bodies: Mapping[str, BodyState], hints: Mapping[str, Any], q: np.ndarray
 ) -> None:
-    """The same as `_read_joint` for hinges and slides, all at once."""
+    """`_read_joint` for hinges and slides, all at once."""
     if not joints:
         return
     at = x.structure.tables["tree"].q[[t.child for t in joints]]
@@ -413,7 +411,7 @@ def _read_one_coordinate_joints(
 
 
 def _carrying_bodies(x: Values, t: TreeJoint) -> tuple[str, str]:
-    """Bodies that carry frames F and M."""
+    """States of the bodies that carry frames F and M."""
     model = x.structure.model
     return model.carrier(t.joint.body_i, t.joint), model.carrier(t.joint.body_j, t.joint)
 
@@ -421,7 +419,7 @@ def _carrying_bodies(x: Values, t: TreeJoint) -> tuple[str, str]:
 def _read_joint(
     x: Values, t: TreeJoint, bodies: Mapping[str, BodyState], hints: Mapping[str, float], q: np.ndarray
 ) -> None:
-    """Coordinates of one tree joint from the pose of M in F: slides first, then what turns."""
+    """Coordinates of one tree joint from the pose of M in F: slides first, then rotations."""
     first = x.structure.tables["tree"].q
     (pF, RF), (pM, RM) = _joint_frames(x, t, bodies)
     rest = np.array(t.joint.rest or np.eye(3))
@@ -437,7 +435,7 @@ def _read_joint(
         else:
             b = UNIT_AXES[
                 NEXT_AXIS[step.axis]
-            ]  # turned by the angle; a further turn is about an axis that this one has turned
+            ]  # rotated by the angle; a further rotation is about an axis that this one has moved
             crossing = [o for o in t.primitives if o.kind == "R" and o is not step]
             if crossing and crossing[0].axis != step.axis:
                 b = UNIT_AXES[crossing[0].axis]
@@ -449,7 +447,7 @@ def _read_joint(
 
 
 def _joint_frames(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """World poses of a joint's frames F and M on those bodies."""
+    """World poses of a joint's frames F and M for these body states."""
     out = []
     for role, name in zip("FM", _carrying_bodies(x, t), strict=True):
         p, R = x.poses.local(FrameSpec(0, t.joint, role))
@@ -459,7 +457,7 @@ def _joint_frames(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState]) -> l
 
 
 def _rotation_about(a: np.ndarray, angle: float) -> np.ndarray:
-    """Rotation about one of the three axes."""
+    """Rotation about one of the three coordinate axes."""
     K = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
     return np.eye(3) + sin(angle) * K + (1.0 - cos(angle)) * matrix_product(K, K)
 
@@ -467,7 +465,7 @@ def _rotation_about(a: np.ndarray, angle: float) -> np.ndarray:
 def _with_turns(
     x: Values, t: TreeJoint, what: str, angle: Any, bodies: Mapping[str, BodyState], hints: Mapping[str, Any]
 ) -> Any:
-    """The angle with the whole turns that somebody told, or (in the plane) that the bodies' own angles say."""
+    """The angle plus whole turns: those of a hint, or (in the plane) those of the bodies' own angles."""
     name = f"{t.joint.name}.{what}"
     if name in hints:
         near = t.joint.coordinates[what].sign * hints[name]
@@ -486,18 +484,18 @@ def _with_turns(
 
 
 def whole_turns(near: Any, angle: Any) -> Any:
-    """Whole turns [rad] that bring an angle next to another one."""
+    """Whole turns [rad] that bring an angle nearest to another one."""
     return 2.0 * np.pi * rounded((near - angle) / (2.0 * np.pi))
 
 
 def _normal(x: Values, t: TreeJoint) -> float:
-    """Component along the plane's normal of the axis that a joint in the plane turns about."""
+    """Component along the plane's normal of the axis of a joint in the plane."""
     R = x.poses.world(FrameSpec(0, t.joint, "F"))[1]
     return float(matrix_product(R, UNIT_AXES[t.joint.planar_normal])[2].real)
 
 
 def _planar_angle(turn: np.ndarray, t: TreeJoint) -> Any:
-    """Angle of a turn about a planar joint's normal."""
+    """Angle of a rotation about a planar joint's normal."""
     b = UNIT_AXES[NEXT_AXIS[t.joint.planar_normal]]
     c = np.array(cross(UNIT_AXES[t.joint.planar_normal], b))
     turned = matrix_product(turn, b)

@@ -1,8 +1,8 @@
-"""Mechanism -> integers: incidence of bodies and rows, matrix patterns, laws. Numbers come later (`values`).
+"""Structure of a mechanism in integers: incidence of bodies and rows, matrix patterns, laws.
 
-Everything that a change of a parameter leaves alone is decided here, once: bodies in `forest`, rows and
-measured quantities in `constraint_rows`, forces in tables/forces.py, and the sparsity patterns of the Jacobian
-and of the matrix that is factored in this module.
+Everything that does not change with a parameter is decided here, once: bodies in `forest`, rows and measured quantities
+in `constraint_rows`, forces in tables/forces.py, and the sparsity patterns of the Jacobian and of the matrix that is
+factored in this module. `values` computes the numbers.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from .table_definitions import (
 
 
 def set_patterns(s: Structure, solved: bool = True) -> None:
-    """Entries of G, of the matrix that is factored (if something is ``solved``), and who adds to them."""
+    """Set the patterns of G and (if something is ``solved``) of the factored matrix, and which terms add to them."""
     tree = s.tables["tree"]
     parents = tree.parent.tolist()
     ways = [tree_paths(parents, s.frames[t.F].body, s.frames[t.M].body) for t in s.terms]
@@ -78,7 +78,7 @@ def set_patterns(s: Structure, solved: bool = True) -> None:
 
 
 def _load_terms(s: Structure, e: Any) -> list[int]:
-    """Terms whose reactions are a load; -1 for the multiplier of the row that presses two sides together."""
+    """Terms whose reactions make up a load; -1 for the multiplier of a row that presses two sides together."""
     return [term_from_side_M(s, k) for k in s.terms_of.get(e.joint, [])] if hasattr(e, "joint") else [-1]
 
 
@@ -90,7 +90,8 @@ def _row_bodies(s: Structure, paths: list[tuple[list[int], list[int]]]) -> list[
     for k, r in enumerate(s.rows):
         for m in r.sensors:
             touched[k] |= touched[len(s.rows) + m]
-        if not touched[k] and not s.tree_joints:  # where a forest is rigid between two bodies, the row is redundant
+        # a row between two bodies that the forest connects rigidly is redundant
+        if not touched[k] and not s.tree_joints:
             raise ModelError(f"{r.element.title} restrains nothing that can move")
     return touched
 
@@ -98,7 +99,7 @@ def _row_bodies(s: Structure, paths: list[tuple[list[int], list[int]]]) -> list[
 def _jacobian_entries(
     tree: Tree, touched: list[set[int]], rows: int
 ) -> tuple[dict[tuple[int, int], int], list[int], list[int], list[tuple]]:
-    """Where each (row, body) begins in G; first entries of rows; velocities of entries; blocks of the rows."""
+    """First entry in G of each (row, body); first entries of rows; velocities of entries; blocks of the rows."""
     blocks: list[tuple] = []
     row_start, at = [0], {}
     column: list[int] = []
@@ -113,7 +114,7 @@ def _jacobian_entries(
 
 
 def tree_paths(parents: list[int], F: int, M: int) -> tuple[list[int], list[int]]:
-    """Bodies that one of two hangs on and the other does not, themselves included, parents first: of F, of M."""
+    """Bodies on the path from F and from M to their common ancestor (excluded), parents first."""
     on_F: list[int] = []
     on_M: list[int] = []
     while F != M:  # parents have smaller numbers
@@ -127,12 +128,12 @@ def tree_paths(parents: list[int], F: int, M: int) -> tuple[list[int], list[int]
 
 
 def _schur_pattern(s: Structure) -> None:
-    """S = G M^-1 G^T: for each body, every pair of its rows."""
+    """Pattern of S = G M^-1 G^T: for each body, every pair of its rows."""
     order = np.argsort(s.tables["blocks"].body, kind="stable")
     blocks = Blocks(*(x[order] for x in s.tables["blocks"]))
     first, count = np.unique(blocks.body, return_index=True, return_counts=True)[1:]
     one, other = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-    for n in np.unique(count).tolist():  # bodies with as many rows have the same pairs
+    for n in np.unique(count).tolist():  # bodies with equally many rows have the same pairs
         i, j = np.tril_indices(n)
         starts = first[count == n, None]
         one.append((starts + i).ravel())
@@ -147,9 +148,10 @@ def _schur_pattern(s: Structure) -> None:
 
 
 def _coupled_pattern(s: Structure, parents: list[int]) -> None:
-    """[M G^T; G -delta]: entries of M in the order in which ``mass_entries`` makes them, then those of G.
+    """Pattern of [M G^T; G -delta]: entries of M in the order of ``mass_entries``, then those of G.
 
-    What couples a prescribed velocity to others goes to an entry behind the matrix that nobody reads: it is no unknown.
+    Entries that couple a prescribed velocity to others go to a place behind the matrix that is never read: it is no
+    unknown.
     """
     tree = s.tables["tree"]
     own = [range(v0, v0 + n) for v0, n in zip(tree.v.tolist(), tree.nv.tolist(), strict=True)]
@@ -177,32 +179,32 @@ def _coupled_pattern(s: Structure, parents: list[int]) -> None:
 
 
 def _no_matrix(s: Structure) -> None:
-    """No rows on a forest of tree joints: sweeps over articulated bodies need no matrix."""
+    """Empty pattern: a forest of tree joints without rows is solved by articulated bodies and needs no matrix."""
     s.ldl, _ = analyse_ldl(0, np.zeros(0, int), np.zeros(0, int))
     s.tables["pairs"], s.tables["mass_entries"] = integer_table(Pairs, []), integer_table(MassEntries, [])
 
 
-MAX_STRUCTURES = 8  # structures of one mechanism that are kept
+MAX_STRUCTURES = 8  # structures that are cached for each mechanism
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choices:
-    """What tables are wanted of a mechanism.
+    """Options of a mechanism's tables.
 
     Attributes
     ----------
     far : bool
-        Use the rows that lead from a far start (assembly) in place of those of motion.
+        Use the rows that converge from a distant start (assembly) in place of those of motion.
     positions : bool
-        Leave out rows that restrain velocities only, which have no say in assembly.
+        Leave out rows that restrain velocities only, which do not matter in assembly.
     holds : tuple of Initial
         Coordinates to be held at a value, as further rows.
     tree : tuple of str
         Names of joints that become tree joints instead of rows.
     coupled : bool
-        Solve through the coupled matrix also where M is constant and block diagonal: to compare what that costs.
+        Solve through the coupled matrix also where M is constant and block diagonal, to compare the cost.
     solved : bool
-        Whether accelerations are asked for; if not, no matrix is made ready to be factored.
+        Whether accelerations are needed; if not, no matrix pattern is prepared for factorisation.
     switches : bool
         With rows that have modes: those of a motion.
     """
@@ -220,7 +222,7 @@ DEFAULT_CHOICES = Choices()
 
 
 def structure(model: Model, choices: Choices = DEFAULT_CHOICES) -> Structure:
-    """The tables of a mechanism, decided once for each of its snapshots and shared by all who ask: not to be changed.
+    """Structure of a mechanism: computed once for each of its snapshots, cached, not to be changed.
 
     Raises
     ------
@@ -237,7 +239,7 @@ def structure(model: Model, choices: Choices = DEFAULT_CHOICES) -> Structure:
 
 
 def is_outdated(s: Structure) -> bool:
-    """Whether a Python function that it was made of is no longer what it was: a law, or a formula of a user's class."""
+    """Whether a Python function in it (a law, or a formula of a user-defined class) has changed since."""
     return any(f.native.stale for f in s.functions) or any(x.stale for x in s.code_tables)
 
 

@@ -1,4 +1,4 @@
-"""`Structure`: all that no parameter can change, with its frames, terms and rows; names of the velocities."""
+"""`Structure`: everything that no parameter can change, with its frames, terms and rows; names of the velocities."""
 
 from __future__ import annotations
 
@@ -28,35 +28,35 @@ T = TypeVar("T", bound=tuple)
 
 @dataclass(frozen=True)
 class FrameSpec:
-    """A frame that some element needs: on which body (-1 ground), whose, and which of its frames."""
+    """A frame of an element: on which body (-1 ground), of which element, and in which role."""
 
     body: int
     element: Any
     role: str  # "F", "M", "P0"; "world" for ground itself
-    coordinate: str = ""  # turned for that coordinate of a joint
+    coordinate: str = ""  # rotated for that coordinate of a joint
 
 
 @dataclass
 class TermSpec:
     """One term of a constraint row or of a measured quantity."""
 
-    row: int  # measured quantities are counted from the number of rows, once that is known
+    row: int  # measured quantities are counted after all rows, once their number is known
     F: int
     M: int
     formula: Row
     sign: float
-    element: Element  # whose row it is
-    owner: Any = None  # whose coordinate it is, and which; a joint's own rows have none
+    element: Element  # element that the row belongs to
+    owner: Any = None  # element whose coordinate it is, and which; None for a joint's own rows
     what: str = ""
     measured: bool = False
-    hint: int = -1  # state that it leans on
-    index: int = 0  # which of the row's coordinates
+    hint: int = -1  # state that it uses for whole turns or a place on a curve
+    index: int = 0  # index among the row's coordinates
     switch: str | None = None  # label of the switch whose quantity it is part of, with a weight
 
 
 @dataclass
 class RowSpec:
-    """One constraint row: whose it is, and the law it follows."""
+    """One constraint row: its element, and the law it follows."""
 
     element: Element
     label: str
@@ -69,7 +69,7 @@ class RowSpec:
 
 @dataclass
 class Structure:
-    """All that is decided about a mechanism before its numbers are known."""
+    """Structure of a mechanism: everything that is decided before its numbers are known."""
 
     model: Model
     far: bool
@@ -90,31 +90,32 @@ class Structure:
     slots: dict[str, int] = field(default_factory=dict)  # sensor -> slot that laws read (rates come after all values)
     angles: list[tuple[int, int, int]] = field(default_factory=list)  # frame F, frame M, state
     forces: list[Force] = field(default_factory=list)
-    force_code: list[CodeTable | None] = field(default_factory=list)  # formulas of each force of a user's own
-    term_code: list[CodeTable | None] = field(default_factory=list)  # of each term
+    force_code: list[CodeTable | None] = field(default_factory=list)  # code table of each user-defined force
+    term_code: list[CodeTable | None] = field(default_factory=list)  # code table of each user-defined term
     switches: list[Any] = field(default_factory=list)  # rows with modes (`constraint_rows.SwitchSpec`)
     branches: Any = (
-        None  # what finds the sides of laws' corners (`law_inputs.NonsmoothPoints`); None: laws decide themselves
+        None  # finds the sides of nonsmooth points (`law_inputs.NonsmoothPoints`); None: laws decide themselves
     )
-    guards: list[tuple[int, int, int]] = field(default_factory=list)  # what is watched: kind, of what, which way
+    guards: list[tuple[int, int, int]] = field(default_factory=list)  # (kind, switch or law, direction of the crossing)
     events: dict[int, Any] = field(default_factory=dict)  # guard -> event of the model
     controls: list[ConnectedState] = field(default_factory=list)  # states of controllers, the first of all states
     ordered: list[tuple[Controller, tuple[str, str], list[int]]] = field(default_factory=list)
-    sampled: list[tuple[str, int, int, bool]] = field(default_factory=list)  # controller, state, law, whether last
-    loads: list[Force] = field(default_factory=list)  # those that need to know what their joint carries
-    reads: dict[str, int] = field(default_factory=dict)  # element whose force events name -> its column (`reads`)
+    # controller, state, law, whether it comes last
+    sampled: list[tuple[str, int, int, bool]] = field(default_factory=list)
+    loads: list[Force] = field(default_factory=list)  # forces that depend on the load of their joint
+    reads: dict[str, int] = field(default_factory=dict)  # element whose force events name -> its first column, from 0
     state_at: dict[str, int] = field(default_factory=dict)  # name -> work, turn or place state
     tables: dict[str, Any] = field(default_factory=dict)  # integers of `System`, by its fields
     code: list[int] = field(default_factory=list)
     const: list[float] = field(default_factory=list)
     table_at: dict[str, int] = field(default_factory=dict)  # table or joint's curve -> its place in const
-    laws: dict[int, str] = field(default_factory=dict)  # start of each law in the code -> what it is the law of
+    laws: dict[int, str] = field(default_factory=dict)  # start of each law in the code -> description of the law
     functions: list[Any] = field(default_factory=list)  # Python functions that laws call
     depth: int = 1
     ldl: LDLPattern = None  # type: ignore[assignment]
     kept: ResultCache = field(
         default_factory=ResultCache, init=False
-    )  # values of it, what they cost; a changed copy has its own
+    )  # cached values of it, and their cost; a changed copy has its own
 
     @cached_property
     def nq(self) -> int:
@@ -128,7 +129,7 @@ class Structure:
 
     @cached_property
     def code_tables(self) -> set[CodeTable]:
-        """Code tables of all classes of a user's own in it."""
+        """Code tables of all user-defined classes in it."""
         return {x for x in (*self.force_code, *self.term_code) if x is not None}
 
     @property
@@ -137,7 +138,7 @@ class Structure:
         return list(self.state_at)
 
     def state(self, name: str) -> int:
-        """Index of a state of that name, made when first asked for."""
+        """Index of a state of that name, created when first needed."""
         return self.state_at.setdefault(name, len(self.state_at))
 
     def law(self, law: Expression, inputs: tuple[str, ...], owner: Any = None, derivatives: bool = False) -> int:
@@ -159,12 +160,12 @@ class Structure:
         return at
 
     def missed(self, stack: np.ndarray) -> TableFault | None:
-        """The last law that a table left without a value, if one is on record in the laws' scratch."""
+        """Last law without a value due to a table, if one is recorded in the laws' scratch."""
         return table_fault(stack, self.laws, {self.table_at[x.name]: x for x in self.model.tables})
 
 
 def frame_index(s: Structure, e: Any, role: str, coordinate: str = "") -> int:
-    """Index of a frame of an element, made when first asked for."""
+    """Index of a frame of an element, created when first needed."""
     key = (e.name, role, coordinate)
     if key not in s.frame_at:
         s.frame_at[key] = len(s.frames)
@@ -173,7 +174,7 @@ def frame_index(s: Structure, e: Any, role: str, coordinate: str = "") -> int:
 
 
 def integer_table(of: type[T], rows: Any) -> T:
-    """A table of integers, one array for each of its fields, from its rows; there may be none."""
+    """Table of integers from its rows, one array for each field; there may be no rows."""
     width = len(of._fields)  # type: ignore[attr-defined]
     return of(*np.ascontiguousarray(np.array(rows, np.int64).reshape(-1, width).T))
 
@@ -182,18 +183,18 @@ AXES = ("x", "y", "z")
 
 
 class VelocityName(NamedTuple):
-    """A velocity by the name of what it is the rate of."""
+    """Name of a velocity: the coordinate whose rate it is."""
 
     name: str
-    unit: str  # of that: "m" or "rad"
+    unit: str  # of the coordinate: "m" or "rad"
 
 
 def velocity_names(s: Structure) -> list[VelocityName]:
-    """What each velocity is the rate of, (nv,).
+    """Names of the velocities, (nv,): the coordinates whose rates they are.
 
-    Bodies that hang on ground freely: ``x``, ``y``, ``z`` of the centre of mass along the world's axes; ``angle`` in
-    the plane, in space ``turn x``, ``turn y``, ``turn z`` about the body's own axes, which point masses do not
-    have. Tree joints: the joint's coordinates; what has no name of its own is a ``turn`` or ``shift`` along an axis.
+    Bodies connected to ground freely: ``x``, ``y``, ``z`` of the centre of mass along the world's axes; ``angle`` in
+    the plane; in space ``turn x``, ``turn y``, ``turn z`` about the body's own axes, which point masses do not have.
+    Tree joints: the joint's coordinates; a coordinate without a name is a ``turn`` or ``shift`` along an axis.
     """
     return s.kept.get("names of velocities", None, 1, lambda: _velocity_names(s))
 
@@ -206,7 +207,7 @@ def _velocity_names(s: Structure) -> list[VelocityName]:
         hung.add(row)
         v0, n = int(tree.v[row]), int(tree.nv[row])
         for k in range(n):
-            told = step.coordinate if n == 1 else ""  # what turns about a point has three velocities
+            told = step.coordinate if n == 1 else ""  # a spherical primitive has three velocities
             what = told or f"{'shift' if step.kind == 'P' else 'turn'} {AXES[k] if n > 1 else step.axis}"
             unit = "m" if step.kind == "P" else "rad"
             out[v0 + k] = VelocityName(f"{t.joint.name}.{what}", unit)

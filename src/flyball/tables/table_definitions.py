@@ -1,8 +1,8 @@
 """Table definitions: the mechanism (`System`), its workspace (`Work`), contact properties (`Surfaces`).
 
-Uniform tables, one row an element, sorted by kind; every loop of the engine runs over these. Integers hold
-structure (incidence, places of matrix entries), floats hold values: changing a parameter changes floats only.
-Constants number kinds, modes and columns.
+Uniform tables, one row for each element, sorted by kind; every loop of the engine runs over these. Integers hold
+structure (incidence, places of matrix entries), floats hold values: changing a parameter changes floats only. Constants
+number kinds, modes and columns.
 """
 
 from __future__ import annotations
@@ -21,28 +21,29 @@ T = TypeVar("T", bound=tuple)
 FREE, PLANAR, POINT, REVOLUTE, PRISMATIC, SPHERICAL, WELD = range(7)
 TREE_NQ, TREE_NV = (7, 3, 3, 1, 1, 4, 0), (6, 3, 3, 1, 1, 3, 0)
 BETWEEN, ALONG, SLIDING = range(3)  # families of forces: `Forces.family`
-FORCE_BY_ADDRESS = 1000  # the kind of forces that have a code table: no built-in element's number
-# modes of switches: the row counts for nothing, holds its quantity where it is, or at rest
+FORCE_BY_ADDRESS = 1000  # kind of forces with a code table: not the number of a built-in element
+# modes of switches: the row is inactive, holds its quantity where it is, or keeps it at rest
 OFF, HELD, STEADY = 0.0, 1.0, 2.0
-# kinds of guards; what a guard's zero is watched for
+# kinds of guards; directions of zero crossings
 G_LAW, G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CORNER, G_PRESS_LOWER, G_PRESS_UPPER = range(10)
 G_CONE, G_TURNS, G_EDGE, G_SHARED = range(10, 14)
 FALLING, EITHER, RISING = -1, 0, 1
-# rows of Work.sensed: of each measured quantity; then, columns of their own, of its rate as a value
+# rows of Work.sensed: of each measured quantity; then, in separate columns, of its rate as a value
 VALUE, RATE, BIAS = range(3)
 # in the columns after those, of each load of a joint: the load now, the one returned; load and gap of the pass before;
-# scratch; and the inverse Jacobian of the gaps. Then forces that events name (`readings`). Then value, rate and its
-# rate of each controller's state (`rows.controller_column`). Then, in row VALUE, the way of each switch (`rows.direction_column`)
+# scratch; and the inverse Jacobian of the gaps. Then forces that events name (`loads.update_readings`). Then value,
+# rate and its rate of each controller's state (`rows.controller_column`). Then, in row VALUE, the direction of each
+# switch (`rows.direction_column`)
 LOAD, RETURNED, LOAD_BEFORE, GAP_BEFORE, BROYDEN_PRODUCT, BROYDEN_ROW, INVERSE_JACOBIAN = range(7)
-# entries of System.flat: the length of Work.flat, then addresses; what each does is said in `engine/calls.py`
+# entries of System.flat: the length of Work.flat, then addresses; `engine/calls.py` describes each
 SCRATCH, PREPARE, PLACE, MOVE, LOADS, FACTOR, REUSE, STEP, STEP_UNLOADED, REFINE, FINISH, DRIFT, SHOW, SAMPLED, FLAT = (
     range(15)
 )
-# entries of Work.flat with a meaning of their own: size of the terms that `DRIFT` has met; whether the solve that goes
-# on is loaded; inputs of a law; what `REFINE` leaves of the rows, and what this has beyond rounding
+# reserved entries of Work.flat: size of the terms in `DRIFT`; whether the current solve is loaded; inputs of a law;
+# residual of the rows after `REFINE`, and its part beyond rounding
 TERMS, LOADED, LAW_INPUT, LAW_INPUT_RATE, ROW_RESIDUAL, BEYOND_ROUNDING, FIRST_FREE = range(7)
 
-# how the equations are solved: `System.solver`
+# how the equations are solved: `Sizes.solver`
 SCHUR, COUPLED, ARTICULATED = range(3)
 
 TERM_KINDS = BY_ADDRESS + 1
@@ -50,11 +51,11 @@ FIELD_WIDTHS = {
     "inertia": 9, "inverse_inertia": 9, "excess_inertia": 9, "joint_position": 3, "joint_rotation": 9,
     "body_position": 3, "body_rotation": 9, "position": 3, "rotation": 9,
 }  # fmt: skip
-"""Columns of the fields of tables of numbers that have several."""
+"""Widths of the fields with several columns."""
 
 
 class Tree(NamedTuple):
-    """How bodies hang on one another: a row (nb,) for each body, or each step of a tree joint, parents first."""
+    """Forest of bodies: a row (nb,) for each body, or each primitive of a tree joint, parents first."""
 
     parent: Int1  # the row that carries it; -1: ground
     joint: Int1  # kind of the tree joint to its parent
@@ -66,11 +67,11 @@ class Tree(NamedTuple):
     work: Int1  # state of that driver's work; -1: none
 
     def coordinates(self, b: int) -> slice:
-        """Where the coordinates of a row are."""
+        """Slice of the coordinates of a row."""
         return slice(int(self.q[b]), int(self.q[b] + self.nq[b]))
 
     def velocities(self, b: int) -> slice:
-        """Where its velocities are."""
+        """Slice of the velocities of a row."""
         return slice(int(self.v[b]), int(self.v[b] + self.nv[b]))
 
 
@@ -80,18 +81,18 @@ class Bodies(NamedTuple):
     mass: Number1
     inertia: Number2  # (nb, 9): about the centre of mass, in body axes
     inverse_inertia: Number2  # (nb, 9): with `excess_inertia`
-    excess_inertia: Number2  # (nb, 9): added where a principal inertia is none, and taken out again by the solve
+    excess_inertia: Number2  # (nb, 9): added where a principal inertia is zero, and removed again by the solve
     joint_position: Number2  # (nb, 3): of the tree joint's frame on the parent, from the parent's centre of mass
     joint_rotation: Number2  # (nb, 9)
     body_position: Number2  # (nb, 3): of the centre of mass in the frame beyond the tree joint
     body_rotation: Number2  # (nb, 9)
     inverse_mass: Number1  # with `excess_mass`
-    inverse_reference_inertia: Number1  # of a body of that mass as large as what its frames reach
-    offset: Number1  # value of the tree joint's coordinate as drawn
+    inverse_reference_inertia: Number1  # of a body of that mass as large as the reach of its frames
+    offset: Number1  # value of the tree joint's coordinate in the reference configuration
     joint_turned: Number1  # 0 where `joint_rotation` is the identity: no need to multiply
     body_turned: Number1  # 0 where `body_rotation` is
-    excess_mass: Number1  # added to a mass that is none, and taken out again by the solve
-    inverse_reference_mass: Number1  # of the mass that the body would have if it were like the others
+    excess_mass: Number1  # added to a zero mass, and removed again by the solve
+    inverse_reference_mass: Number1  # of the typical mass
 
 
 class Frames(NamedTuple):
@@ -109,7 +110,7 @@ class Terms(NamedTuple):
     M: Int1  # frame
     segment: Int1  # first of its `Segments`
     segment_end: Int1
-    hint: Int1  # state that it leans on: turns of an angle, place on a curve; -1: none
+    hint: Int1  # state used for turns of an angle or a place on a curve; -1: none
 
 
 class Segments(NamedTuple):
@@ -123,7 +124,7 @@ class Segments(NamedTuple):
 class Rows(NamedTuple):
     """Constraint rows [(nr,)]."""
 
-    law: Int1  # that its quantity follows; -1: 0
+    law: Int1  # law that its quantity follows; -1: 0
     wrapped: Int1  # whether it is an angle, compared up to whole turns
     work: Int1  # state of its work; -1: none
 
@@ -141,7 +142,7 @@ class SensorDrivers(NamedTuple):
 class Forces(NamedTuple):
     """Forces, sorted by kind [(nk, ...)]."""
 
-    F: Int1  # frame; of a force along a measured quantity that quantity, of a sliding contact its slips
+    F: Int1  # frame; of a force along a measured quantity the quantity, of contact friction its slips
     M: Int1  # frame
     laws: Int2  # (nk, 3)
     work: Int1  # state of its work; -1: none
@@ -160,7 +161,7 @@ class Angles(NamedTuple):
 
 
 class LoadTerms(NamedTuple):
-    """Which terms make up the reaction behind a load; see `reads` too [(nj,)]."""
+    """Terms that make up the reaction behind a load or a force that events name [(nj,)]."""
 
     load: Int1  # column in `Work.sensed`
     term: Int1
@@ -172,28 +173,28 @@ class Switches(NamedTuple):
     row: Int1  # -1: none
     measured: Int1  # quantity
     kind: Int1
-    force: Int1  # that acts while it slides; -1: none
-    law: Int1  # corner of a law; -1: none
-    partner: Int1  # of a slip that along the other tangent; -1: none
-    other: Int1  # of a slip the gap; -1: none
+    force: Int1  # force that acts while it slides; -1: none
+    law: Int1  # nonsmooth point of a law; -1: none
+    partner: Int1  # of a slip, the slip along the other tangent; -1: none
+    other: Int1  # of a slip, its gap; -1: none
 
 
 class SwitchNumbers(NamedTuple):
-    """Numbers of `Switches`; what a kind has not is 0, bounds -inf and inf [(nw,)]."""
+    """Numbers of `Switches`; 0 where a kind does not have them, bounds -inf and inf [(nw,)]."""
 
     lower: Number1
     upper: Number1
     restitution: Number1
     stiffness: Number1
     damping: Number1
-    tooth: Number1  # of a ratchet: where a tooth is
+    tooth: Number1  # of a ratchet: position of a tooth
     pitch: Number1
     static_friction: Number1  # of a slip: coefficient at rest
     kinetic_friction: Number1
 
 
 class Guards(NamedTuple):
-    """What is watched for zeros [(ng,)]."""
+    """Guards: functions whose zeros are events [(ng,)]."""
 
     kind: Int1
     of: Int1  # switch or law
@@ -226,33 +227,33 @@ class Blocks(NamedTuple):
 
 
 class Sizes(Record, kind="Int"):
-    """How the equations are solved, and how many there are of what."""
+    """Solver and numbers of rows."""
 
     solver: int  # SCHUR, COUPLED or ARTICULATED
     coordinates: int
-    moving_frames: int  # frames that are kept up to date
-    ground_frames: int  # those of them that are on ground
+    moving_frames: int  # frames that are updated at every state
+    ground_frames: int  # number of those on ground
 
 
 class Scales(Record, kind="Number"):
-    """What things are compared with."""
+    """Scales for comparisons."""
 
     regularization: float  # of the solve, relative
-    semidefinite: float  # 1 if some mass or inertia is none, else 0
+    semidefinite: float  # 1 if some mass or inertia is zero, else 0
     length: float  # a typical length [m]
-    rate: float  # a typical rate [1/s] (`tempo`)
+    rate: float  # characteristic rate [1/s]
 
 
 class System(NamedTuple):
-    """A mechanism in arrays. Nothing in it changes during an analysis."""
+    """A mechanism in arrays. Constant during an analysis."""
 
     tree: Tree
     bodies: Bodies
     frame_body: Int1  # (nf,): body of each frame, -1: ground
     frames: Frames
     terms: Terms
-    term_parameters: Number2  # (nt, 8): of its formula, the last one its factor in the row
-    term_code: CodeTables1  # (nt,): code table of a row of a user's own (`ConstraintRow`); 0 of others
+    term_parameters: Number2  # (nt, 8): parameters of its formula, the last one its factor in the row
+    term_code: CodeTables1  # (nt,): code table of a user-defined row (`ConstraintRow`); 0 of others
     segments: Segments
     rows: Rows
     row_start: Int1  # (nr + nm + 1,): first entry of each row, then of each measured quantity, in Work.G
@@ -260,7 +261,7 @@ class System(NamedTuple):
     sensor_drivers: SensorDrivers
     forces: Forces
     force_parameters: Number2  # (nk, 16)
-    force_code: CodeTables1  # (nk,): code table of a force of a user's own; 0 of others
+    force_code: CodeTables1  # (nk,): code table of a user-defined force; 0 of others
     angles: Angles
     load_terms: LoadTerms
     switches: Switches
@@ -273,22 +274,22 @@ class System(NamedTuple):
     const: Number1  # parameters, literals of the laws, splines
     gravity: Number1  # (3,) [m/s^2]
     scales: Scales
-    units: Number1  # (nm,): what each measured quantity is compared with: that length, or a radian
+    units: Number1  # (nm,): unit of each measured quantity: the mechanism's length, or a radian
     mass_entries: MassEntries
     pairs: Pairs
     blocks: Blocks
     ldl: LDLPattern  # the sparse factor
-    flat: Int1  # (15,): code made for this mechanism: length of its scratch, addresses; all 0: there is none
+    flat: Int1  # (15,): code generated for this mechanism: length of its scratch, addresses; all 0: there is none
 
 
 NUMBERS = (
     "bodies", "frames", "term_parameters", "force_parameters", "switch_numbers", "const", "gravity", "scales", "units",
 )  # fmt: skip
-"""The fields of `System` that hold numbers: they change with parameters, and may be complex, or expressions."""
+"""Fields of `System` that hold floats: they change with parameters, and may be complex, or expressions."""
 
 
 def zero_table(of: type[T], n: int, dtype: Any) -> T:
-    """A table of n rows of zeros."""
+    """Table of n rows of zeros."""
     return of(*(np.zeros((n, FIELD_WIDTHS[name]) if name in FIELD_WIDTHS else n, dtype) for name in of._fields))  # type: ignore[attr-defined]
 
 
@@ -302,7 +303,7 @@ def named_arrays(table: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]
 
 
 def map_arrays(function: Callable[[str, np.ndarray], Any], table: Any, name: str = "") -> Any:
-    """The table of what a function makes of each array in it, and of its name."""
+    """Table with ``function(array, name)`` in place of each array."""
     if not isinstance(table, tuple):
         made = function(name, table)
         return made.view(type(table)) if isinstance(table, Record) else made
@@ -311,23 +312,23 @@ def map_arrays(function: Callable[[str, np.ndarray], Any], table: Any, name: str
 
 
 def assign(to: Any, table: Any) -> None:
-    """Write all arrays of a table into those of another."""
+    """Copy all arrays of a table into those of another."""
     for (_, x), (_, y) in zip(named_arrays(to), named_arrays(table), strict=True):
         x[...] = y
 
 
 def with_numbers(S: System, function: Callable[[str, np.ndarray], Any], names: Sequence[str] = NUMBERS) -> System:
-    """The same with what a function makes of every array of numbers, and of its name."""
+    """Table with ``function(array, name)`` in place of each array of floats."""
     return S._replace(**{name: map_arrays(function, getattr(S, name), name) for name in names})
 
 
 class RowScratch(NamedTuple):
-    """Of the constraint rows [(nr,)]."""
+    """Workspace of the constraint rows [(nr,)]."""
 
     value: Number1  # g
     nu: Number1  # right-hand side of G v = nu
     gamma: Number1  # right-hand side of G vdot = gamma
-    diagonal: Number1  # of the matrix that is factored, before regularization
+    diagonal: Number1  # diagonal of the factored matrix, before regularisation
     multiplier: Number1
     scratch_1: Number1
     scratch_2: Number1
@@ -336,28 +337,28 @@ class RowScratch(NamedTuple):
 
 
 class VelocityScratch(NamedTuple):
-    """Of the velocities [(nv,)]."""
+    """Workspace of the velocities [(nv,)]."""
 
-    applied: Number1  # forces along them
-    solved: Number1  # accelerations, or what else was solved for
+    applied: Number1  # generalised forces
+    solved: Number1  # accelerations, or another solution
     scratch_1: Number1
     scratch_2: Number1
     scratch_3: Number1
     prescribed: Number1  # accelerations that drivers prescribe
     effort: Number1  # of these drivers
-    partition: Number1  # size of the coordinate: > 0 if it depends on others, < 0 if not, 0 if it is prescribed
+    partition: Number1  # size of the coordinate: > 0 if it is dependent, < 0 if independent, 0 if it is prescribed
 
 
 class Modes(NamedTuple):
-    """Of the switches [(nw, ...)]."""
+    """Modes of the switches [(nw, ...)]."""
 
     mode: Number1  # OFF, HELD, STEADY
-    hold: Number1  # where the quantity is held
-    lower: Number1  # how far it may go
+    hold: Number1  # value at which the quantity is held
+    lower: Number1  # lower bound
     upper: Number1
     released: Number1  # whether an event has released the element
     shared: Number1  # weight of a row of a group with indeterminate forces, 0 of others (`engine/guards.py`)
-    drift: Number1  # of corners of laws that hold the motion: du/dt
+    drift: Number1  # of nonsmooth points that hold the motion: du/dt
     previous_side: Number1  # side and du/dt of the pass before
     previous_drift: Number1
     moved_side: Number1  # scratch
@@ -366,60 +367,62 @@ class Modes(NamedTuple):
 
 
 class Options(Record, kind="Float"):
-    """Choices of the analysis, and what it reports."""
+    """Options of the analysis, and its diagnostics."""
 
     stabilization: float
     position_tolerance: float
     velocity_tolerance: float
     alpha: float  # of Baumgarte's stabilization
     beta: float
-    position_violation: float  # largest met
+    position_violation: float  # largest violation so far
     velocity_violation: float
-    solve_tolerance: float  # relative residual of a solve that passes
-    partitioned: float  # whether solves are for the dependent coordinates alone
-    deferred: float  # whether accelerations at output times are found when they are asked for
-    placed: float  # whether only positions and velocities are wanted
+    solve_tolerance: float  # relative residual at which a solve is accepted
+    partitioned: float  # whether solves are for the dependent coordinates only
+    deferred: float  # whether accelerations at output times are computed only when needed
+    placed: float  # whether only positions and velocities are needed
 
 
 class Counts(Record, kind="Int"):
     """Counters of a run."""
 
     status: int
-    guilty_row: int  # the row that a failure is due to
+    guilty_row: int  # the row that caused a failure
     evaluations: int
     factorisations: int
     solves: int
     projections: int
-    load_updates: int  # how many loads' slopes are known
-    exchanges: int  # of dependent coordinates
+    load_updates: int  # number of loads whose slopes are known
+    exchanges: int  # exchanges of dependent coordinates
 
 
 class Work(NamedTuple):
-    """Scratch of one run on one thread: nothing is allocated inside the loops."""
+    """Workspace of one run on one thread: nothing is allocated inside the loops."""
 
     BK: Number2  # (nb, 24): kinematics of the bodies
     FK: Number2  # (nf, 24): kinematics of the frames
     X: Number2  # (nv, 14): world twist column of each velocity, at its body's reference point; then its factor
     O: Number2  # (nb, 3): that reference point
     FB: Number2  # (nb, 6): force on each body, torque about its centre of mass
-    IC: Number2  # (nb, 30): composite inertias; articulated inertias, and what solves with them pass on
+    IC: Number2  # (nb, 30): composite inertias; articulated inertias, and the pending values of solves with them
     M: Number1  # (nM,): mass matrix entries
     G: Number1  # (nG,): constraint Jacobian, then gradients of the measured quantities
     H: Number1  # (nG,): M^-1 G^T
-    T: Number2  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
+    T: Number2  # (nt, 6): wrench of each term on M, where loads are needed; else (0, 6)
     rows: RowScratch
     velocities: VelocityScratch
-    sensed: Number2  # (6 + nl, 2 nm + nl + ne + nc + nw): value, rate, bias measured; loads; forces; controls; ways
+    # (6 + nl, 2 nm + nl + ne + nc + nw): value, rate, bias of measured quantities; loads; forces; controllers;
+    # directions
+    sensed: Number2
     modes: Modes
     A: Number1  # matrix to be factored
     L: Number1  # its factor
     D: Number2  # (3, n): inverse diagonal, scratch, right-hand side
     stack: Number2  # law evaluation
-    y: Number2  # (3, ny): states in the making
+    y: Number2  # (3, ny): trial states
     options: Options
     counts: Counts
-    made: Int1  # (15,): while code made for the mechanism is in use, its addresses as in `System.flat`; else 0
-    flat: Number1  # scratch of code made for the mechanism
+    made: Int1  # (15,): while generated code is in use, its addresses as in `System.flat`; else 0
+    flat: Number1  # scratch of the generated code
 
 
 ComplexSystem = Annotated[System, COMPLEX]
@@ -433,15 +436,15 @@ SURFACE_COLUMNS = 12
 
 
 class Surfaces(NamedTuple):
-    """Numbers of every pair of surfaces; which surface a shape has is its MATERIAL in the geometry.
+    """Properties of every pair of surfaces; the surface of a shape is its MATERIAL in the geometry.
 
-    Friction with a grain is that along it. Where the grain stands square on the surface, that across it holds all
-    around.
+    With a grain, friction is the value along it. Where the grain is perpendicular to the surface, the value across it
+    applies in all directions.
     """
 
-    pair: Float3  # (k, k, 12): static and kinetic friction, restitution, rolling and spinning friction [m], how
-    # many times as great both frictions are across the grain of one of the two (1: there is none); of the normal force
-    # where it gives way (0 where it is hard): stiffness, or 4/3 E* [Pa] from which it follows, exponent of the overlap,
-    # dissipation [s/m], damping [N s/m]; nan: they do not touch
+    # (k, k, 12): static and kinetic friction, restitution, rolling and spinning friction [m], ratio of both frictions
+    # across to along the grain of one of the two (1: no grain); of the compliant normal force (0 if rigid): stiffness,
+    # or 4/3 E* [Pa] from which it follows, exponent of the overlap, dissipation [s/m], damping [N s/m]; nan: no contact
+    pair: Float3
     belt: Float2  # (ns, 3): velocity [m/s] of a shape's surface relative to its mover, in the mover's axes
     grain: Float2  # (ns, 3): direction (a unit vector, or 0) of its grain, in the mover's axes

@@ -1,11 +1,11 @@
-"""Structure and parameter values -> floats: the tables of `System`, and the reference state.
+"""Values of a mechanism in floats: the tables of `System`, and the reference state.
 
-Runs again for every change of a parameter; nothing is compiled and no description is validated here. Parameters
-may be complex: all tables are then complex, and for a small imaginary part of one parameter their imaginary
-parts are its multiple by the exact derivatives (complex step). Decisions use real parts.
+This runs again for every change of a parameter; nothing is compiled and no description is validated here. Parameters
+may be complex. All tables are then complex: for a small imaginary part of one parameter, their imaginary parts are that
+part times the exact derivatives (complex step). Decisions use real parts.
 
-Typical length and rate of the mechanism are computed here too: what lengths and rates are compared with. They
-do not depend on the duration of a simulation.
+Typical length and characteristic rate of the mechanism, the scales of lengths and rates, are computed here too. They do
+not depend on the duration of a simulation.
 """
 
 from __future__ import annotations
@@ -34,13 +34,14 @@ from .reference_configuration import BodyState, Poses, Refresh, free_velocities,
 from .structure_definition import Structure, TermSpec
 from .table_definitions import FLAT, Frames, Scales, SwitchNumbers, System, zero_table
 
-DEFAULT_RATE = 1.0  # [1/s]: where neither gravity nor any speed tells
+DEFAULT_RATE = 1.0  # [1/s]: where there is neither gravity nor any speed
 
 
 def characteristic_rate(given: ElementNumbers, model: Model, gravity: np.ndarray, length: Any) -> Any:
-    """A rate of the mechanism's own [1/s]: of half swings of a pendulum as long as it, sqrt(g / length) / pi.
+    """Characteristic rate [1/s]: half swings of a pendulum of the typical length, sqrt(g / length) / pi.
 
-    Without gravity: of the fastest body or coordinate at the start, per length, or turning; a second, where all rests.
+    Without gravity: the fastest body or coordinate at the start, speed per length or angular speed; 1/s if all are at
+    rest.
     """
     if (g := _norm(gravity)).real > 0.0:
         return np.sqrt(g / length) / np.pi
@@ -56,18 +57,18 @@ def characteristic_rate(given: ElementNumbers, model: Model, gravity: np.ndarray
 
 
 def _norm(x: np.ndarray) -> Any:
-    """Length of a vector (3,); zero of what is zero, where a root has no derivative."""
+    """Length of a vector (3,); 0 for a zero vector, where the square root has no derivative."""
     return np.sqrt(inner_product(x, x)) if real_parts(x).any() else 0.0
 
 
-NO_LENGTH = 1e-13  # of coordinates: a distance that is their rounding
-MAX_VALUES = 4  # sets of values of one structure that are kept
+NO_LENGTH = 1e-13  # relative to the coordinates: a distance that is only rounding
+MAX_VALUES = 4  # sets of values of one structure that are cached
 REGULARISATION = 1e-9
 
 
 @dataclass
 class Values:
-    """A compiled mechanism: the System, the drawn state, and the numbers of every element."""
+    """A compiled mechanism: the System, the reference state, and the numbers of every element."""
 
     structure: Structure
     system: System
@@ -75,10 +76,10 @@ class Values:
     v: np.ndarray
     given: ElementNumbers
     length: float  # a typical length of the mechanism [m]
-    poses: Poses  # where frames are when it is drawn
+    poses: Poses  # frames in the reference configuration
     kept: ResultCache = field(
         default_factory=ResultCache, init=False
-    )  # where motions of it start; a changed copy has its own
+    )  # initial states of motions; a changed copy has its own
     alike: Values | None = field(default=None, init=False, repr=False)  # see `unforced`
 
     @property
@@ -88,7 +89,7 @@ class Values:
 
     @property
     def bodies(self) -> Mapping[str, SimpleNamespace]:
-        """Body -> p, R, com: drawn reference frame, centre of mass in it; c: where that is drawn."""
+        """Body -> p, R, com: reference frame in the reference configuration, centre of mass in it; c: its position."""
         return self.given.bodies
 
     @property
@@ -98,15 +99,15 @@ class Values:
 
     @property
     def unforced(self) -> Values:
-        """Values from which these differ in numbers of forces and controllers alone; themselves, if none are known.
+        """Values that differ from these in numbers of forces and controllers only; these themselves if there are none.
 
-        What depends on bodies, joints and the drawn state is worked out once for both.
+        Results that depend on bodies, joints and the reference state only are computed once for both.
         """
         return self if self.alike is None else self.alike
 
     @property
     def told(self) -> dict[str, float]:
-        """Values of the parameters that it was made with."""
+        """Values of the parameters used."""
         names = list(self.structure.model.parameters)
         return dict(zip(names, self.system.const[: len(names)].real.tolist(), strict=True))
 
@@ -114,7 +115,7 @@ class Values:
         return vars(self) | {"alike": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """In another process code has other addresses."""
+        """Restore in another process, where code has other addresses."""
         vars(self).update(state)
         self.system = self.system._replace(
             force_code=table_addresses(self.structure.force_code), term_code=table_addresses(self.structure.term_code)
@@ -124,7 +125,7 @@ class Values:
 def values(
     s: Structure, parameters: Mapping[str, complex] | None = None, holds: Mapping[str, complex] | None = None
 ) -> Values:
-    """Numbers of a mechanism: filled in once for each set of values, shared by all who ask, not to be changed.
+    """Numbers of a mechanism, computed once for each set of values; cached, not to be changed.
 
     Parameters
     ----------
@@ -138,14 +139,14 @@ def values(
 
 
 def values_of(s: Structure, n: ElementNumbers, holds: Mapping[str, complex] | None = None) -> Values:
-    """The same from the numbers of its elements."""
+    """Numbers of a mechanism from the numbers of its elements."""
     if n.dtype is not float or (holds and number_type(holds.values()) is not float):
         return _fill(s, n, holds or {})
     return s.kept.get("values", (n.key, exact_key(holds or {})), MAX_VALUES, lambda: _fill(s, n, holds or {}))
 
 
 def _fill(s: Structure, given: ElementNumbers, holds: Mapping[str, Any]) -> Values:
-    """All tables; where some were filled in before, only the rows that depend on what is different now."""
+    """Compute all tables; where some exist already, only the rows that differ."""
     if holds:
         return _fill_all(s, given, holds, Refresh())
     first = s.kept.known("filled first")
@@ -158,7 +159,7 @@ def _fill(s: Structure, given: ElementNumbers, holds: Mapping[str, Any]) -> Valu
 
 
 def _fill_forces(s: Structure, given: ElementNumbers, refresh: Refresh) -> Values | None:
-    """The values where forces and controllers alone have other numbers; None if bodies or frames are moved by these."""
+    """Values where only forces and controllers have other numbers; None if these move bodies or frames."""
     base, pose = refresh.base, Poses(s, given)
     assert base is not None
     S, dtype = base.system, base.system.const.dtype
@@ -231,9 +232,10 @@ def _check_points(s: Structure, places: np.ndarray, length: Any, refresh: Refres
 
 
 def _length(s: Structure, places: np.ndarray, bodies: Mapping[str, SimpleNamespace]) -> Any:
-    """A typical length: the largest way from a centre of mass to a frame, or from one body to the mean of all.
+    """Typical length: the largest distance from a centre of mass to a frame, or from one body to the mean of all.
 
-    Where there is none: of bodies and places on the ground about their mean, or what bodies' inertia is the square of.
+    Where that is zero: the extent of bodies and points on the ground about their mean, or the largest radius of
+    gyration; else 1 m.
     """
     moving = [b for k, b in bodies.items() if k != GROUND]
     if not moving:
@@ -247,7 +249,7 @@ def _length(s: Structure, places: np.ndarray, bodies: Mapping[str, SimpleNamespa
 
 
 def _extent(on_bodies: np.ndarray, on_ground: np.ndarray, centres: np.ndarray) -> Any:
-    """The same by places alone, (..., k, 3) each; 0 where they are all one."""
+    """Typical length from places alone, (..., k, 3) each; 0 where they coincide."""
     places = np.concatenate([on_ground, centres], axis=-2)
     nothing = NO_LENGTH * np.abs(real_parts(places)).max(axis=(-2, -1), initial=0.0)[..., None]
     first = _longest_vector(np.concatenate([on_bodies, centres - centres.mean(axis=-2, keepdims=True)], axis=-2))
@@ -259,20 +261,20 @@ def _extent(on_bodies: np.ndarray, on_ground: np.ndarray, centres: np.ndarray) -
 
 
 def _units(s: Structure, length: Any) -> list[Any]:
-    """Of every measured quantity what it is compared with: the mechanism's length, or a radian."""
+    """Unit of every measured quantity: the mechanism's length, or a radian."""
     metric = {t.row - len(s.rows) for t in s.terms if t.measured and t.formula.measure == "m"}
     return [length if m in metric else 1.0 for m in range(len(s.measured))]
 
 
 def _longest_vector(vectors: np.ndarray) -> np.ndarray:
-    """Length (..., 1) of the longest of some ways (..., k, 3)."""
+    """Length (..., 1) of the longest of some vectors (..., k, 3)."""
     at = np.argmax((real_parts(vectors) ** 2).sum(axis=-1), axis=-1)
     longest = np.take_along_axis(vectors, at[..., None, None], axis=-2)[..., 0, :]
     return sqrt((longest**2).sum(axis=-1, keepdims=True))
 
 
 def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:
-    """Parameters, literals and tables of the laws, splines of joints; where those of each joint begin."""
+    """Parameters, literals and tables of the laws, splines of joints; and where those of each joint begin."""
     const: list[Any] = list(s.const or [0.0])
     const[: len(s.model.parameters)] = [env[k] for k in s.model.parameters]
     curve_at = {}
@@ -323,7 +325,7 @@ def _term_parameters(
 
 
 def _offset(t: TermSpec, numbers: Mapping) -> float:
-    """Value of a term's coordinate as drawn."""
+    """Offset of a term's coordinate in the reference configuration."""
     return t.owner.offset(numbers[t.owner.name], t.what) if isinstance(t.owner, Joint) else 0.0
 
 

@@ -1,8 +1,7 @@
-"""The contract that an element has to fulfil so that every analysis can use it, checked on an instance.
+"""The contract that an element must satisfy so that every analysis can use it, checked on an instance.
 
-Besides its formulas (`formula_checks`) an element is checked in a sample mechanism that is simulated for a
-moment, in general motion with bodies of about 1 kg and 1 m; a convex shape by its support function, its mass
-properties and its file.
+Besides its formulas (`formula_checks`) an element is tested in a sample mechanism that is simulated briefly, in general
+motion with bodies of about 1 kg and 1 m; a convex shape by its support function, its mass properties and its file.
 """
 
 from __future__ import annotations
@@ -55,7 +54,8 @@ def sample_mechanism(
     Q: np.ndarray | None = None,
     d: np.ndarray | None = None,
 ) -> Mechanism:
-    """The element, and the bodies, frames and joints that it names: bodies of about 1 kg and 1 m, in gravity.
+    """Return a mechanism with the element and the bodies, frames and joints that it names: bodies of about 1 kg and 1
+    m, in gravity.
 
     Each body is joined to an arm that is hinged on ground, so that joint coordinates differ from absolute ones.
 
@@ -89,8 +89,8 @@ def sample_mechanism(
 
 
 def _needed_bodies(e: Force | Joint) -> list[tuple[str, str, str]]:
-    """Bodies that have to be there, the joint of each, and what it must have: a coordinate, or a frame on the body."""
-    if isinstance(e, Joint) and e.at is None:  # it names frames
+    """Return the required bodies, the joint of each, and what it must have: a coordinate, or a frame on the body."""
+    if isinstance(e, Joint) and e.at is None:  # the element names frames
         return [(CARRIER + x, f"joint of {x}", FRAME) for x in e.ends().values() if x != GROUND]
     found: dict[str, tuple[str, str]] = {x: (f"joint of {x}", "") for x in e.ends().values() if x != GROUND}
     for text in e.along() if isinstance(e, CoordinateForce) else ():
@@ -103,7 +103,7 @@ def _needed_bodies(e: Force | Joint) -> list[tuple[str, str, str]]:
 
 
 def _turned_element(e: Any, Q: np.ndarray, d: np.ndarray) -> Force | Joint:
-    """The element with its points and directions rotated and its points shifted."""
+    """Return the element with its points and directions rotated and its points shifted."""
     units, new = fields_with(type(e), Unit), dict[str, Any]()
     points = {name for name, unit in units.items() if unit.dimension == "m" and isinstance(getattr(e, name), tuple)}
     for name in points.union(fields_with(type(e), Vector)):
@@ -113,7 +113,7 @@ def _turned_element(e: Any, Q: np.ndarray, d: np.ndarray) -> Force | Joint:
             x = np.array(value, float)
             new[name] = tuple(_float_tuple(Q @ v + shift) for v in x) if x.ndim > 1 else _float_tuple(Q @ x + shift)
     fields = type(e).__dataclass_fields__
-    if (np.eye(3) != Q).any() and "orientation" in fields:  # of its axes as drawn; the world's if not given
+    if (np.eye(3) != Q).any() and "orientation" in fields:  # in its reference axes; the world's if not given
         given = e.orientation
         R = np.eye(3) if given is None else orientation_matrix(given, f"orientation of {e.title}")
         new["orientation"] = _quaternion_of(Q @ R)
@@ -132,9 +132,9 @@ def _float_tuple(x: np.ndarray) -> tuple[float, ...]:
 
 SPAN, OUTPUTS = 0.3, 301  # [s]: part of a period of the sample mechanism
 TOLERANCES = {"rtol": 1e-10, "atol": 1e-12}
-ENERGY_TOLERANCE = 1e-7  # of the energies that change: a thousand times what the tolerance leaves
-WORK_TOLERANCE = 1e-3  # of the largest work: power is summed over outputs by trapezoids
-POSITION_TOLERANCE = 1e-7  # of a metre: two ways of computing one motion at that tolerance
+ENERGY_TOLERANCE = 1e-7  # relative to the energies that change: a thousand times the integration error
+WORK_TOLERANCE = 1e-3  # relative to the largest work: power is summed over outputs by the trapezoidal rule
+POSITION_TOLERANCE = 1e-7  # [m]: two ways of computing one motion at that tolerance
 SHIFT = np.array([5.0, -2.0, 3.0])
 
 
@@ -147,13 +147,13 @@ def _positions(r: Result) -> np.ndarray:
 
 
 def _difference(a: np.ndarray, b: np.ndarray) -> str:
-    """How far two motions differ; "" if no more than rounding and tolerance explain."""
+    """Return how two motions differ; "" if rounding and tolerance explain it."""
     apart, size = np.abs(a - b).max(), max(1.0, np.abs(a).max())
     return "" if apart <= POSITION_TOLERANCE * size else f"positions of bodies differ by {apart:.3g} m after {SPAN} s"
 
 
 def file_round_trip(s: Subject) -> str:
-    """Saved and loaded again it is the same."""
+    """Saved and loaded again, the element is unchanged."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "saved.toml"
         s.mechanism.save(path)
@@ -185,7 +185,7 @@ def coordinate_choices(s: Subject) -> str:
 
 
 def generated_code(s: Subject) -> str:
-    """Code made for this mechanism gives the same motion; there is none where constraints open and close."""
+    """Generated code gives the same motion; there is none for constraints that open and close."""
     if isinstance(s.element, Force) and s.element.switches():
         return ""
     other = s.mechanism.simulate(SPAN, outputs=OUTPUTS, specialize=True, **TOLERANCES)  # type: ignore[arg-type]
@@ -211,10 +211,10 @@ def linearization(s: Subject) -> str:
     return "linearize(frozen=True) gives eigenvalues that are not finite: the formula has no derivatives"
 
 
-SUPPORT_TOLERANCE = 1e-11  # of the size of the shape
-DIRECTION_LENGTHS = (1e-6, 3.0, 1e6)  # of directions
+SUPPORT_TOLERANCE = 1e-11  # relative to the size of the shape
+DIRECTION_LENGTHS = (1e-6, 3.0, 1e6)  # number of directions
 SURFACE_CORNERS = 96  # corners of a circle on the surface whose inside is integrated
-SURFACE_TOLERANCE = 1e-2  # of volume, inertia and size: what such a surface is off by, and more
+SURFACE_TOLERANCE = 1e-2  # volume, inertia and size: discretisation error of such a surface, with margin
 
 
 class ShapeSubject(NamedTuple):
@@ -225,7 +225,7 @@ class ShapeSubject(NamedTuple):
     par: tuple[float, ...]
 
     def point(self, d: Any) -> np.ndarray:
-        """The farthest point along a direction."""
+        """Return the farthest point along a direction."""
         return np.array(type(self.element).support(self.par, tuple(float(x) for x in d)), float)
 
 
@@ -256,7 +256,7 @@ def support_farthest(s: ShapeSubject) -> str:
     directions = _test_directions()
     points = np.array([s.point(d) for d in directions])
     size = np.abs(points).max()
-    reached = directions @ points.T  # of each direction, how far along it all points are
+    reached = directions @ points.T  # for each direction, the extent of all points along it
     k, other = np.unravel_index(int(np.argmax(reached - np.diag(reached)[:, None])), reached.shape)
     if reached[k, other] - reached[k, k] > SUPPORT_TOLERANCE * size:
         return (
@@ -289,7 +289,7 @@ def shape_mass(s: ShapeSubject) -> str:
 
 
 def shape_file(s: ShapeSubject) -> str:
-    """Saved and loaded again it is the same."""
+    """Saved and loaded again, the shape is unchanged."""
     m = Mechanism("sample")
     m.add(Body("body", mass=1, inertia=(1, 1, 1), shape=s.element))
     with tempfile.TemporaryDirectory() as folder:
@@ -309,7 +309,7 @@ SHAPE_CHECKS: dict[str, Callable[[ShapeSubject], str]] = {
 
 
 class ContractError(AssertionError):
-    """An element does not keep the contract: the message names the part of it, and what was found."""
+    """An element violates the contract: the message names the part of it and the values found."""
 
 
 @dataclass(frozen=True)
@@ -395,24 +395,25 @@ def check_element(
 ) -> list[str]:
     """Check a force or a joint, of flyball or of a user's own, or a convex shape, in every way that analyses use it.
 
-    Its formulas are evaluated at random states. A force or a joint acts in a mechanism that is simulated for a moment.
+    Its formulas are evaluated at random states. A force or a joint is simulated briefly in a mechanism.
 
     Parameters
     ----------
     element : Force, Joint or ConvexSolid
-        An instance with ordinary numbers. Of a joint the formulas of its `ConstraintRow` are checked.
+        An instance with ordinary numbers. For a joint the formulas of its `ConstraintRow` are checked.
     mechanism : Mechanism, optional
         A mechanism in which the element can be added, if it needs more than the bodies and joints that it names: for
         instance sensors that its laws depend on. Not given: these bodies, about 1 kg and 1 m, tumbling.
     parameters : mapping, optional
         Parameters that the element names, where no mechanism is given.
     skip : collection of str
-        Parts of the contract that do not hold for good reasons:
+        Parts of the contract that do not apply:
 
         - ``"axes"`` and ``"turned"``: for an element given in the world's axes, such as a wind from the north;
         - ``"units"``: if its formula holds a constant that has a unit, such as the density of air;
         - ``"file"``: if it has Python functions as laws;
-        - ``"symbols"`` and ``"made"``: if its formula branches on what moves; symbolic equations are not for it then;
+        - ``"symbols"`` and ``"made"``: if its formula branches on the motion; symbolic equations do not support it
+          then;
         - ``"complex"``, ``"derivatives"`` and ``"linear"``: the same for linearisation, sensitivities and implicit
           methods.
 
@@ -426,7 +427,7 @@ def check_element(
     ContractError
         Naming the part that fails, with the numbers found.
     ModelError
-        If the element cannot be described, or a name in ``skip`` is no part of the contract.
+        If the element is invalid, or a name in ``skip`` is not a part of the contract.
     """
     if not isinstance(element, Force | Joint | ConvexSolid):
         raise ModelError(f"{type(element).__name__} is no force, joint or ConvexSolid; check_element is for these")
@@ -435,7 +436,7 @@ def check_element(
         raise ModelError(f"{sorted(unknown)} is no part of the contract; its parts are {', '.join(checks)}")
     _refuse_incomplete(element)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", StartWarning)  # a joint may change where its bodies are, and how they move
+        warnings.simplefilter("ignore", StartWarning)  # the joint may change positions and velocities of its bodies
         subject = _subject(element, mechanism, parameters)
         for name, check in checks.items():
             if name not in skip:
@@ -449,7 +450,7 @@ def check_element(
 
 
 def _refuse_incomplete(e: Force | Joint | ConvexSolid) -> None:
-    """Refuse classes whose formulas are missing or are no static methods."""
+    """Refuse classes whose formulas are missing or are not static methods."""
     owners: list[tuple[type, Any, Any]] = [(type(r), ROWS, ROWS) for r in _constraint_rows(e)]
     if isinstance(e, ConvexSolid):
         owners = [(type(e), SUPPORT, SUPPORT)]

@@ -1,4 +1,4 @@
-"""Checks of an element's formulas: on every kind of number, their derivatives, and what they must not depend on.
+"""Checks of an element's formulas: with every kind of number, their derivatives, and their invariances.
 
 Formulas are evaluated at random states of frames in arbitrary motion, as functions of one array of numbers.
 """
@@ -47,7 +47,7 @@ def random_rotation(seed: int) -> np.ndarray:
 
 
 def frame_record(m: Frame, dtype: Any = float) -> tuple[tuple[Any, ...], ...]:
-    """The kinematic record of a frame."""
+    """Return the kinematic record of a frame."""
     return tuple(tuple(np.asarray(m[k], dtype).ravel().tolist()) for k in ("p", "R", "w", "v", "alpha", "a"))
 
 
@@ -82,7 +82,7 @@ def turned_frame(m: Frame, Q: np.ndarray, d: np.ndarray) -> Frame:
 
 
 def wrench_power(wrench: Any, F: Frame, M: Frame) -> Any:
-    """Power of a force and a torque on M, and of the reverse on F's body at the same point."""
+    """Return the power of a force and a torque on M, and of the reverse on F's body at the same point."""
     f, t = (np.array(x) for x in wrench)
     d = M["p"] - F["p"]
     return f @ (M["v"] - F["v"] - np.cross(F["w"], d)) + t @ (M["w"] - F["w"])
@@ -116,16 +116,16 @@ class FormulaState:
     row: ConstraintRow | None = None
 
     def at(self, x: Sequence[Any]) -> np.ndarray:
-        """All numbers of the result, with other numbers in the arguments."""
+        """Return all numbers of the result, for other numbers in the arguments."""
         return np.array(list(flat_numbers(self.function(*nest_numbers(self.signature.lengths, iter(x))))))
 
     @property
     def numbers(self) -> np.ndarray:
-        """All numbers in the arguments."""
+        """Return all numbers in the arguments."""
         return np.array(list(flat_numbers(self.arguments)), float)
 
     def compiled(self, x: np.ndarray, first_order: bool) -> np.ndarray:
-        """The same as `at`, computed by the machine code that kernels call."""
+        """Return the same as `at`, computed by the machine code that kernels call."""
         code = FormulaCode(self.function, first_order, self.signature)
         dtype = complex if first_order else float
         given, out = (
@@ -137,7 +137,7 @@ class FormulaState:
 
 
 def flat_numbers(x: Any) -> Iterator[Any]:
-    """The numbers in nested tuples."""
+    """Return the numbers in nested tuples as a flat sequence."""
     if isinstance(x, tuple):
         for part in x:
             yield from flat_numbers(part)
@@ -184,18 +184,18 @@ def row_states(row: ConstraintRow, par: Sequence[float]) -> list[FormulaState]:
     ]
 
 
-ROUNDING = 1e-11  # of the largest result: the same operations, by other functions of the C library at most
-STEP = 1e-30  # imaginary: its square is nothing beside 1
-STEPS = (1e-3, 1e-4, 1e-5, 1e-6)  # of differences; one of them must do
+ROUNDING = 1e-11  # relative to the largest result: the same operations, with at most other functions of the C library
+STEP = 1e-30  # imaginary step: its square is negligible beside 1
+STEPS = (1e-3, 1e-4, 1e-5, 1e-6)  # steps of differences; one of them must suffice
 SLOPE = 1e-6  # relative error of differences of fourth order with the best step
-WORLD = 1e-9  # relative: what is left of a shift by SHIFT, which takes three digits
+WORLD = 1e-9  # relative: error left by a shift of SHIFT, which costs three digits
 SHIFT = np.array([1e3, -2e2, 5e2])
 SCALES = {"meter": 3.0, "kilogram": 0.7, "second": 1.7}
 """Other units of length, mass and time, in those of the SI."""
 
 
 def _differ(a: Any, b: Any, tolerance: float, size: float = 0.0) -> bool:
-    """Whether numbers differ by more than a part of the largest; nan equals nan."""
+    """Return whether numbers differ by more than a part of the largest; nan equals nan."""
     a, b = np.asarray(a), np.asarray(b)
     if a.shape != b.shape or (np.isnan(a) != np.isnan(b)).any():
         return True
@@ -241,7 +241,7 @@ def compiled(s: Subject) -> str:
 
 
 def complex_numbers(s: Subject) -> str:
-    """Complex numbers change nothing, in Python and compiled; the imaginary parts of both are the same."""
+    """Complex numbers give the same results, in Python and compiled; the imaginary parts of both agree."""
     for state in s.states:
         x = state.numbers
         for way in (np.zeros(len(x)), _random_direction(x)):
@@ -256,12 +256,12 @@ def complex_numbers(s: Subject) -> str:
 
 
 def _random_direction(x: np.ndarray) -> np.ndarray:
-    """A direction in which all arguments change by a part of their size; those that are zero, such as no laws, stay."""
+    """Return a direction that changes all arguments by a part of their size; zeros stay zero."""
     return np.random.default_rng(1).normal(size=len(x)) * np.abs(x)
 
 
 def derivatives(s: Subject) -> str:
-    """A complex step gives the derivatives that differences give."""
+    """A complex step gives the same derivatives as finite differences."""
     for state in s.states:
         x = state.numbers
         for seed in range(3):
@@ -316,7 +316,7 @@ def rates(s: Subject) -> str:
 
 
 def energy(s: Subject) -> str:
-    """What a conservative element gives it loses of its energy."""
+    """The power of a conservative element is minus the rate of its energy."""
     e: Any = s.element
     if not e.conservative():
         return ""
@@ -342,7 +342,7 @@ def energy(s: Subject) -> str:
 
 
 def gradient(s: Subject) -> str:
-    """The rate of a row's value is what its force and torques give with the velocities of the frames."""
+    """The rate of a row's value is the power of its force and torques with the velocities of the frames."""
     for state in s.states:
         if state.frames is None or state.row is None or not state.row.holonomic:
             continue
@@ -358,7 +358,7 @@ def gradient(s: Subject) -> str:
 
 
 def bias(s: Subject) -> str:
-    """The bias of a row is the rate of that, with the accelerations of the frames."""
+    """The bias of a row is the rate of its velocity, with the accelerations of the frames."""
     for state in s.states:
         if state.frames is None or state.row is None:
             continue
@@ -374,7 +374,7 @@ def bias(s: Subject) -> str:
 
 
 def _rate(row: Any, F: Any, M: Any) -> Any:
-    """What the force and the torques of a row give with the velocities of its frames."""
+    """Return the power of a row's force and torques with the velocities of its frames."""
     _, force, torque_M, torque_F, _ = (np.array(x) for x in row)
     return force @ (np.array(M[3]) - F[3]) + torque_M @ np.array(M[2]) + torque_F @ np.array(F[2])
 
@@ -385,7 +385,7 @@ def _size(state: FormulaState) -> float:
 
 
 def axes(s: Subject) -> str:
-    """Frames turned and shifted in the world: what is measured stays, the wrench turns with them."""
+    """Frames rotated and shifted in the world: measured values stay, the wrench rotates with them."""
     Q = random_rotation(3)
     for state in s.states:
         if state.frames is None:
@@ -404,7 +404,7 @@ def axes(s: Subject) -> str:
 
 
 def units(s: Subject) -> str:
-    """In other units of length, mass and time the same: no constant of the formula has a unit."""
+    """In other units of length, mass and time the result is the same: the formula contains no constant with a unit."""
     if (new := _rescaled(s)) is None:
         return ""
     for state, given, wanted in (
@@ -420,7 +420,7 @@ def units(s: Subject) -> str:
 
 
 def _rescaled(s: Subject) -> SimpleNamespace | None:
-    """The numbers of the element in other units; None if the unit of one is not known."""
+    """Return the element's numbers in other units; None if a unit is unknown."""
     e = s.element
     along = _is_angular(e) if isinstance(e, CoordinateForce) else 0
     new = SimpleNamespace(**vars(s.numbers))
@@ -436,11 +436,11 @@ def _rescaled(s: Subject) -> SimpleNamespace | None:
 
 
 Rescaled = Iterator[tuple[FormulaState, tuple[Any, ...], np.ndarray]]
-"""States, their arguments in other units, and what their formulas must give in these."""
+"""States, their arguments in other units, and the results expected in these."""
 
 
 def _rescaled_rows(s: Subject, new: SimpleNamespace) -> Rescaled:
-    """The same of the rows of a joint."""
+    """Rescale the rows of a joint."""
     e: Any = s.element
     m = _unit_factor("m")
     ends = [(p * m, R) for p, R in s.ends]
@@ -454,7 +454,7 @@ def _rescaled_rows(s: Subject, new: SimpleNamespace) -> Rescaled:
 
 
 def _rescaled_force(s: Subject, e: Any, new: SimpleNamespace) -> Rescaled:
-    """The same of a force."""
+    """Rescale a force."""
     along = _is_angular(e) if isinstance(e, CoordinateForce) else 0
     laws = [of.dimension for of in fields_with(type(e), LawOf).values()]
     length, force = (1.0 if along else _unit_factor("m")), (_unit_factor("N*m") if along else _unit_factor("N"))
@@ -479,12 +479,12 @@ def _rescaled_force(s: Subject, e: Any, new: SimpleNamespace) -> Rescaled:
 
 
 def _is_angular(e: CoordinateForce) -> int:
-    """1 if it acts about an angle, 0 along a length."""
+    """Return 1 for an angle, 0 for a length."""
     return int(any(text.partition(".")[2].startswith("angle") for text in e.along()))
 
 
 def _unit_factor(unit: str) -> float:
-    """How many of the unit in which numbers are given are one of the same made of `SCALES`."""
+    """Return the factor from the given unit to the same unit made of `SCALES`."""
     out = 1.0
     for base, exponent in powers_in_si(unit).items() if unit not in ("", "1") else ():
         out *= SCALES.get(base, 1.0) ** -exponent

@@ -34,7 +34,7 @@ class Capsule(Cylinder):
         return (ConvexPart("CAPSULE", (n.radius, n.length / 2), n.radius + n.length / 2),)
 
     def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
-        """A segment and all within the radius of it."""
+        """Return a segment thickened by the radius."""
         p, R = self.pose(n)
         return (polygon_outline(np.array([p - R[:, 2] * n.length / 2, p + R[:, 2] * n.length / 2]), n.radius),)
 

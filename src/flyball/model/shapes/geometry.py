@@ -13,34 +13,34 @@ LENGTH_PARAMETERS = {
     "HULL": (0,),
     "FIELD": (2, 3),
     "SOLID": (7,),
-}  # parameters that grow with the shape; of other kinds all do
+}  # parameters that scale with the shape; of other kinds all do
 
 
 @dataclass(frozen=True, eq=False)
 class ConvexPart:
-    """A convex part of a shape, of a kind that contact knows by name (`collision/shape_kinds.py`).
+    """A convex part of a shape, of a kind defined (`collision/shape_kinds.py`).
 
     Attributes
     ----------
     kind : str
-        ``"SPHERE"``, ``"BOX"``, ...; ``"MESH"`` is a closed surface, whose triangles stand in ``face``, and ``"HULL"``
-        with one parameter the hull of ``vertex``: `tables/contact_tables.py` makes finished hulls of these.
+        ``"SPHERE"``, ``"BOX"``, ...; ``"MESH"`` is a closed surface, with triangles in ``face``, and ``"HULL"`` with
+        one parameter the hull of ``vertex``: `tables/contact_tables.py` computes the hulls of these.
     par : tuple of float
         Parameters of its kind.
     reach : float
-        Radius [m] of a sphere about its origin that holds it; inf for what is unbounded.
+        Radius [m] of an enclosing sphere about its origin; inf if unbounded.
     place : (3,)
         Its origin [m] in the shape's own frame.
     axes : (3, 3)
         Its axes (columns) in the shape's own.
     vertex : (k, 3)
-        Corners [m] in its own axes, of what has them, and whatever else its kind keeps there.
+        Corners [m] in its own axes, if any, and other data of its kind.
     face : (l,)
-        Faces of what has them: count of corners, then the corners counter-clockwise seen from outside, and so on.
+        Faces, if any: count of corners, then the corners counter-clockwise seen from outside, and so on.
     corners : int
-        How many of the rows of ``vertex`` are corners; all if not given. The others do not grow with the shape.
+        Number of rows of ``vertex`` that are corners; all if not given. The others do not scale with the shape.
     sides : int
-        How many faces there are.
+        Number of faces.
     owner : type
         The class of a ``"SOLID"``, which has its support function.
     """
@@ -57,11 +57,11 @@ class ConvexPart:
     owner: type | None = None
 
     def carried(self, p: np.ndarray, R: np.ndarray) -> ConvexPart:
-        """The same, in a frame in which the shape's own lies at p with the axes R."""
+        """Return the part in a frame in which the shape's own frame is at p with the axes R."""
         return replace(self, place=p + R @ self.place, axes=R @ self.axes)
 
     def grown(self, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Parameters (n, k) and, one below the other, ``vertex`` of the same in n sizes."""
+        """Return parameters (n, k) and concatenated ``vertex`` of the part in n sizes."""
         par = np.tile(np.real(np.array(self.par, complex)), (len(sizes), 1))
         lengths = list(LENGTH_PARAMETERS.get(self.kind, range(len(self.par))))
         par[:, lengths] *= sizes[:, None]
@@ -71,21 +71,23 @@ class ConvexPart:
 
 
 def surface_part(surface: tuple[np.ndarray, np.ndarray]) -> ConvexPart:
-    """What a closed surface, vertices (k, 3) and triangles (m, 3), is a description of; not yet in convex parts."""
+    """Return the part of a closed surface, vertices (k, 3) and triangles (m, 3), before decomposition into convex
+    parts.
+    """
     v, f = np.real(surface[0]), np.asarray(surface[1], np.int64)
     return ConvexPart("MESH", (), np.sqrt((v**2).sum(axis=1)).max(), vertex=v, face=f.ravel())
 
 
 def lathe(profile: np.ndarray, fine: int, ring: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Turn a profile about z.
+    """Rotate a profile about z.
 
     Parameters
     ----------
     profile : (k, 2)
-        Points (r, z), the solid to the left of the way along them. It begins and ends on the axis (r = 0), or it is
-        a ring: a closed way that stays off the axis.
+        Points (r, z), with the solid to the left of their direction. It begins and ends on the axis (r = 0), or it is a
+        ring: a closed curve off the axis.
     fine : int
-        Corners of a circle.
+        Number of corners of a circle.
     ring : bool
 
     Returns
@@ -121,18 +123,18 @@ def arc(centre: tuple[float, float], radius: float, start: float, end: float, st
 
 
 def snapped_to_axis(profile: np.ndarray) -> np.ndarray:
-    """The profile with its ends put exactly on the axis of rotation."""
+    """Return the profile with its ends exactly on the axis of rotation."""
     profile[[0, -1], 0] = 0.0
     return profile
 
 
 def triangulated(p: np.ndarray) -> np.ndarray:
-    """Triangles (k - 2, 3) of a simple polygon (k, 2), counter-clockwise, by cutting off ears (Meisters 1975)."""
+    """Triangulate a simple polygon (k, 2), counter-clockwise, by ear clipping (Meisters 1975): triangles (k - 2, 3)."""
     left = list(range(len(p)))
     out = []
     while len(left) > 3:
         k = next((k for k in range(len(left)) if _is_ear(p, left, k)), None)
-        if k is None:  # no ear but for rounding: cut where the turn is sharpest
+        if k is None:  # no ear because of rounding: cut at the sharpest corner
             k = int(np.argmax([_turn(p, left, k) for k in range(len(left))]))
         out.append((left[k - 1], left[k], left[(k + 1) % len(left)]))
         left.pop(k)
@@ -161,13 +163,13 @@ def _is_ear(p: np.ndarray, remaining: list[int], k: int) -> bool:
 
 
 def _used(v: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Without triangles that have no area by their indices, and without vertices that none uses."""
+    """Remove triangles with repeated indices, and unused vertices."""
     f = f[(f[:, 0] != f[:, 1]) & (f[:, 1] != f[:, 2]) & (f[:, 2] != f[:, 0])]
     used, at = np.unique(f, return_inverse=True)
     return v[used], at.reshape(f.shape)
 
 
-ALIGNMENT_TOLERANCE = 1e-9  # sine of the angle between directions that count as the same
+ALIGNMENT_TOLERANCE = 1e-9  # sine of the angle between directions that count as equal
 OBLIQUE_REMEDY = (
     "it stands oblique to the plane of the mechanism, so it has no outline that contact knows; turn it, or give it "
     "contact=False"
@@ -175,7 +177,7 @@ OBLIQUE_REMEDY = (
 
 
 def polygon_outline(points: np.ndarray, rounding: Any = 0.0) -> ConvexPart:
-    """The convex polygon around points (k, 2 or 3), seen along z, and all within ``rounding`` of it; in their axes."""
+    """Return the convex polygon around points (k, 2 or 3), seen along z, enlarged by ``rounding``; in their axes."""
     corners = convex_hull(np.asarray(points, float)[:, :2])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     at = np.hstack([corners - middle, np.zeros((len(corners), 1))])
@@ -184,19 +186,20 @@ def polygon_outline(points: np.ndarray, rounding: Any = 0.0) -> ConvexPart:
 
 
 def circle_outline(radius: Any, p: np.ndarray) -> ConvexPart:
-    """A circle about p, seen along z."""
+    """Return a circle about p, seen along z."""
     return ConvexPart("SPHERE", (radius,), radius, np.array([p[0], p[1], 0.0]))
 
 
 def revolved_outline(
     what: Any, p: np.ndarray, R: np.ndarray, radius: Any, profile: list[tuple[Any, Any]]
 ) -> ConvexPart:
-    """What is round about its own z axis: a circle seen along it, seen from the side the points (r, z) and (-r, z).
+    """Return the outline of a solid of revolution: a circle along its axis, the points (r, z) and (-r, z) from the
+    side.
 
     Raises
     ------
     ModelError
-        If it stands oblique to the plane of the mechanism.
+        If its axis is oblique to the plane of the mechanism.
     """
     if np.hypot(*R[:2, 2]) < ALIGNMENT_TOLERANCE:
         return circle_outline(radius, p)
@@ -222,7 +225,7 @@ def convex_hull(p: np.ndarray) -> np.ndarray:
     return np.array([*chains[0], *chains[1]]) if len(p) > 1 else p
 
 
-ZERO_TOLERANCE = 1e-12  # a volume smaller than this part of the bounding box's is none
+ZERO_TOLERANCE = 1e-12  # a volume smaller than this part of the bounding box's counts as zero
 
 
 @dataclass(frozen=True)
@@ -235,11 +238,10 @@ class Integrals:
 
 
 def polyhedron_integrals(v: np.ndarray, f: np.ndarray) -> Integrals:
-    """Integrals over the inside of a closed surface, exact but for rounding.
+    """Return the integrals over the inside of a closed surface, exact up to rounding.
 
-    The sum over the tetrahedra that the triangles make with one point, each with its sign: with corners 0, a, b, c and
-    s = a + b + c its volume is V = a . (b x c) / 6, its first moment V s / 4, its second moment
-    V (a a + b b + c c + s s) / 20.
+    They are signed sums over the tetrahedra formed by the triangles and one point: with corners 0, a, b, c and s = a +
+    b + c its volume is V = a . (b x c) / 6, its first moment V s / 4, its second moment V (a a + b b + c c + s s) / 20.
 
     Parameters
     ----------
@@ -248,7 +250,7 @@ def polyhedron_integrals(v: np.ndarray, f: np.ndarray) -> Integrals:
     f : (m, 3)
         Triangles, counter-clockwise seen from outside.
     """
-    middle = v.mean(axis=0)  # near the inside, so that little cancels
+    middle = v.mean(axis=0)  # close to the solid, to reduce cancellation
     corners = (v - middle)[f]
     a, b, c = corners.transpose(1, 0, 2)
     V = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
@@ -260,8 +262,8 @@ def polyhedron_integrals(v: np.ndarray, f: np.ndarray) -> Integrals:
 
 
 def weld_vertices(v: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices at the same place made one, and triangles without an area by their indices left out."""
-    order = np.lexsort(v.T)  # np.unique by rows does the same ten times as slowly
+    """Merge vertices at the same place, and remove triangles with repeated indices."""
+    order = np.lexsort(v.T)  # np.unique by rows takes ten times as long
     new = np.ones(len(v), bool)
     new[1:] = (np.diff(v[order], axis=0) != 0.0).any(axis=1)
     at = np.empty(len(v), int)
@@ -271,7 +273,7 @@ def weld_vertices(v: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def surface_defects(v: np.ndarray, f: np.ndarray) -> str:
-    """What keeps a (welded) surface from having an inside, as a sentence with numbers; empty if nothing does."""
+    """Return why a (welded) surface does not enclose a volume, as a sentence with numbers; empty if it does."""
     if not len(f):
         return "it has no triangles"
     open_edges, twisted = _edges(f)
@@ -289,7 +291,7 @@ def surface_defects(v: np.ndarray, f: np.ndarray) -> str:
 
 
 def _edges(f: np.ndarray) -> tuple[int, int]:
-    """Edges with an odd number of triangles, and edges that are not gone along as often one way as the other."""
+    """Return edges with an odd number of triangles, and edges not traversed equally often in both directions."""
     ways = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
     up = np.where(ways[:, 0] < ways[:, 1], 1, -1)
     edge = ways.min(axis=1) * (f.max() + 1) + ways.max(axis=1)
@@ -300,7 +302,7 @@ def _edges(f: np.ndarray) -> tuple[int, int]:
 
 
 def _inside_out(v: np.ndarray, f: np.ndarray) -> str:
-    """Parts that face inwards without lying in another part, as cavities do; a volume of nothing."""
+    """Return parts that face inwards without being cavities of another part; or a zero volume."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

@@ -1,4 +1,4 @@
-"""A landscape: heights over a grid."""
+"""A landscape: heights on a grid."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from .solid import RESOLUTION, Surface
 
 @element
 class HeightField(Surface):
-    """A landscape: heights over a grid in its x-y plane, solid below, with nothing beyond its edges.
+    """A landscape: heights on a grid in its x-y plane, solid below, empty beyond its edges.
 
     Each cell is two triangles that share the diagonal from its corner at least x and y.
 
     Parameters
     ----------
     heights : (nx, ny) numbers [m]
-        Height (i, j) stands over (i dx, j dy), counted from its origin.
+        Height (i, j) is at (i dx, j dy) from its origin.
     dx, dy : number [m]
         Width of a cell along x and y; ``dy`` equals ``dx`` if not given.
     """
@@ -59,7 +59,7 @@ class HeightField(Surface):
         return tuple(np.ptp(self.surface(n)[0], axis=0).tolist())
 
     def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
-        """Two triangles a cell; it is open."""
+        """Return two triangles per cell; the surface is open."""
         z = np.array(self.heights)
         i, j = np.indices(z.shape)
         v = np.stack([i * n.dx, j * (n.dx if n.dy is None else n.dy), z], axis=-1).reshape(-1, 3)

@@ -38,7 +38,7 @@ class Hemisphere(Sphere):
         return (ConvexPart("HEMISPHERE", (n.radius,), n.radius),)
 
     def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
-        """Seen along its axis a circle; else a polygon about half a circle, or about what is between."""
+        """Return a circle if seen along its axis; else a circumscribed polygon."""
         p, R = self.pose(n)
         if np.hypot(*R[:2, 2]) < ALIGNMENT_TOLERANCE:
             return (circle_outline(n.radius, p),)

@@ -19,12 +19,12 @@ from .solid import RESOLUTION, Solid
 
 @element
 class Hull(Solid):
-    """The smallest convex solid that holds the given points.
+    """The smallest convex solid that contains the given points.
 
     Parameters
     ----------
     vertices : (k, 3) numbers
-        Four or more that do not lie in one plane; those inside count for nothing. In units of ``scale``.
+        Four or more that do not lie in one plane; interior points have no effect. In units of ``scale``.
     scale : number [m]
         Length of one unit of the vertices: ``"1 mm"``.
     """
@@ -46,7 +46,7 @@ class Hull(Solid):
 
     @cached_property
     def _triangles(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners of the hull and triangles that face outwards, in units of its own."""
+        """Return the corners of the hull and triangles that face outwards, in its own units."""
         from scipy.spatial import ConvexHull, QhullError
 
         p = np.array(self.vertices, float)

@@ -19,7 +19,7 @@ from .solid import RESOLUTION, Solid
 
 @element
 class Link(Solid):
-    """A flat bar from ``start`` to ``end`` with round ends about these points, where a link has its pins.
+    """A flat bar from ``start`` to ``end`` with round ends about these points, the pins of a link.
 
     Its own frame has its origin in the middle, x along the bar and z along its thickness.
 
@@ -31,8 +31,8 @@ class Link(Solid):
         Across the bar; the ends are half circles of this diameter.
     thickness : number [m]
     normal : direction
-        Of the thickness, in the body's reference frame; only its part at right angles to the bar counts. If not
-        given: z, or x for a bar along z.
+        Direction of the thickness, in the body's reference frame; only its component perpendicular to the bar is used.
+        If not given: z, or x for a bar along z.
     """
 
     start: Point
@@ -88,7 +88,7 @@ class Link(Solid):
         )
 
     def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
-        """A segment with round ends; what there is to see from the side."""
+        """Return a segment with round ends, or a rectangle if seen from the side."""
         p, R = self.pose(n)
         flat = np.hypot(*R[:2, 2]) < ALIGNMENT_TOLERANCE
         if not flat and np.sort(np.abs(R[2]))[1] < ALIGNMENT_TOLERANCE:  # from the side

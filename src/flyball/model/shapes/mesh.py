@@ -30,7 +30,7 @@ _FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
 
 @contextmanager
 def paths_from(folder: str | os.PathLike | None) -> Iterator[None]:
-    """Relative paths of meshes made in here are counted from this folder, not from the current one."""
+    """Context manager: relative paths of meshes created inside are relative to this folder, not to the current one."""
     token = _FOLDER.set(None if folder is None else Path(folder).absolute())
     try:
         yield
@@ -39,20 +39,20 @@ def paths_from(folder: str | os.PathLike | None) -> Iterator[None]:
 
 
 def current_folder() -> Path:
-    """The folder that relative paths are counted from."""
+    """Return the folder to which relative paths refer."""
     return _FOLDER.get() or Path.cwd()
 
 
 @dataclass(frozen=True, eq=False)
 class Triangulation:
-    """Vertices (k, 3) and triangles (m, 3) with what follows from them, in units of their own."""
+    """Vertices (k, 3) and triangles (m, 3) with derived quantities, in their own units."""
 
     v: np.ndarray
     f: np.ndarray
 
     @cached_property
     def flaws(self) -> str:
-        """Why it has no inside, or nothing."""
+        """Return why the surface does not enclose a volume; empty if it does."""
         return surface_defects(self.v, self.f)
 
     @cached_property
@@ -62,7 +62,7 @@ class Triangulation:
 
 
 def number_rows(kind: type) -> Any:
-    """Rows of plain numbers become tuples, quickly; what is none is left as it is, to be refused with all the rest."""
+    """Convert rows of plain numbers to tuples quickly; leave anything else unchanged, for pydantic to refuse."""
 
     def convert(value: Any) -> Any:
         try:
@@ -86,21 +86,21 @@ class Mesh(Solid):
 
     The surface must be closed and its triangles counter-clockwise seen from outside; then its volume, centre of mass
     and inertia are exact for the polyhedron. It may have several parts and, with triangles that face into them,
-    cavities; parts that overlap count twice. Where it is for looks only (``looks=True``, or the body's mass and
-    inertia are given) any surface will do.
+    cavities; parts that overlap count twice. For display only (``looks=True``, or the body's mass and inertia are
+    given) any surface is accepted.
 
     Parameters
     ----------
     path : str
-        An STL, OBJ, PLY or OFF file. A relative path is counted from the folder of the model file; of a mechanism
-        described in Python, from the current folder. Reading it takes the package trimesh.
+        An STL, OBJ, PLY or OFF file. A relative path refers to the folder of the model file, or to the current folder
+        for a mechanism described in Python. Reading requires the package trimesh.
     vertices : (k, 3) numbers
         In place of a path; in units of ``scale``.
     faces : (m, 3) whole numbers
         With ``vertices``: three indices of vertices, from 0, for each triangle.
     scale : number [m]
-        Length of one unit of the file or of the vertices: ``"1 mm"`` for a drawing in millimetres. A file does not
-        say it; 1 m if not given.
+        Length of one unit of the file or of the vertices: ``"1 mm"`` for a drawing in millimetres. Files do not state
+        it; 1 m if not given.
     """
 
     path: Annotated[str | None, BeforeValidator(_text)] = None
@@ -109,14 +109,14 @@ class Mesh(Solid):
     scale: Length = 1.0
 
     def __post_init__(self) -> None:
-        """Remember the folder that a relative path is counted from."""
+        """Store the folder to which a relative path refers."""
         object.__setattr__(self, "_folder", current_folder())
 
     def _key(self) -> tuple:
         return tuple(self.file if f.name == "path" else getattr(self, f.name) for f in fields(self))
 
     def __eq__(self, other: object) -> bool:
-        """Equal if everything is; of paths, the files that they lead to."""
+        """Return whether all fields are equal; paths are equal if they lead to the same file."""
         return self._key() == other._key() if isinstance(other, Mesh) else NotImplemented
 
     def __hash__(self) -> int:
@@ -124,17 +124,17 @@ class Mesh(Solid):
 
     @property
     def title(self) -> str:
-        """Kind, and name or path if it has one, for messages."""
+        """Return kind, and name or path if it has one, for messages."""
         name = self.name or self.path
         return f"Mesh {name!r}" if name else "Mesh"
 
     @property
     def file(self) -> str | None:
-        """Where the file is."""
+        """Return the absolute path of the file."""
         return self.path and os.path.normpath(os.path.join(self._folder, self.path))  # type: ignore[attr-defined]
 
     def path_from(self, folder: str | os.PathLike) -> str | None:
-        """The path as a model file in that folder has to say it."""
+        """Return the path as a model file in that folder must contain it."""
         if self.path is None or os.path.isabs(self.path) or os.path.normpath(Path(folder, self.path)) == self.file:
             return self.path
         try:
@@ -143,7 +143,7 @@ class Mesh(Solid):
             return self.file
 
     def check(self, n: SimpleNamespace) -> None:
-        """A surface that can be had, and a scale greater than zero."""
+        """Require a valid surface, and a scale greater than zero."""
         positive(self, n, "scale")
         if (self.path is None) == (self.vertices is None):
             both = "both a path and vertices" if self.path is not None else "neither a path nor vertices"
@@ -179,7 +179,7 @@ class Mesh(Solid):
 
     @property
     def triangulation(self) -> Triangulation:
-        """Its triangles, in its own units; a file is read again if it has changed.
+        """Return its triangles, in its own units; a file is read again if it has changed.
 
         Raises
         ------
@@ -224,7 +224,7 @@ class Mesh(Solid):
         return self._integrals().gyration * n.scale**2
 
     def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
-        """Its surface, from which convex parts are made.
+        """Return its surface, which is decomposed into convex parts later.
 
         Raises
         ------
@@ -256,7 +256,7 @@ class Mesh(Solid):
 
 @lru_cache(maxsize=256)
 def read_mesh(file: str, *stamp: int) -> Triangulation:
-    """The triangles of a file; ``stamp`` says which state of it, so that one that has changed is read again.
+    """Return the triangles of a file; ``stamp`` identifies its state, so that a changed file is read again.
 
     Raises
     ------
@@ -275,7 +275,7 @@ def read_mesh(file: str, *stamp: int) -> Triangulation:
     try:
         loaded: Any = trimesh.load(file, force="mesh", process=False)
         v, f = np.array(loaded.vertices, float), np.array(loaded.faces, int)
-    except Exception as error:  # trimesh fails with many kinds of error on files that are none
+    except Exception as error:  # trimesh raises many kinds of errors for invalid files
         raise ModelError(f"{file!r} cannot be read as {kind[1:].upper()}: {error}") from None
     if v.ndim != 2 or not np.isfinite(v).all():
         raise ModelError(f"{file!r} has vertices that are no points")

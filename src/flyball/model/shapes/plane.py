@@ -15,14 +15,14 @@ from .solid import RESOLUTION, Surface, spatial_point
 
 @element
 class Plane(Surface):
-    """A plane without end through ``position``; all behind it, against its ``normal``, is solid.
+    """An infinite plane through ``position``; the half-space behind it, opposite to its ``normal``, is solid.
 
     Parameters
     ----------
     normal : direction
-        Out of the solid, in the body's reference frame; z if not given. In a planar mechanism it must be given.
+        Outward normal, in the body's reference frame; z if not given. In a planar mechanism it must be given.
     extent : number [m]
-        Edge of the patch that pictures show of it; if not given, as the rest of the scene asks.
+        Edge length of the displayed patch; if not given, it follows from the size of the scene.
     """
 
     normal: Direction | None = None
@@ -64,7 +64,7 @@ class Plane(Surface):
         return (ConvexPart("PLANE", (), np.inf, np.array([p[0], p[1], 0.0]), axes),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
-        """Edge of the patch that is shown; 1 m where nothing says it."""
+        """Return the edge length of the displayed patch; 1 m if not given."""
         return (1.0 if n.extent is None else n.extent,)
 
     def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:

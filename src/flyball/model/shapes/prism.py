@@ -1,4 +1,4 @@
-"""A plate of any outline."""
+"""A plate with a polygonal outline."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Outline = Annotated[tuple[Numbers, ...], Unit("m")]
 
 @element
 class Prism(Solid):
-    """A polygon in its x-y plane, extruded along z: a plate of any outline. The middle of its thickness is at z = 0.
+    """A polygon in its x-y plane, extruded along z: a plate with its middle plane at z = 0.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _moments(p: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray]:
 
 
 def _crossing(p: np.ndarray) -> tuple[int, int] | None:
-    """Two sides (numbered by their first corner, from 1) that meet other than at a common corner."""
+    """Return two sides (numbered by their first corner, from 1) that intersect other than at a common corner."""
     k = len(p)
     q = np.roll(p, -1, axis=0)
     for i in range(k - 1):
@@ -117,7 +117,7 @@ def _crossing(p: np.ndarray) -> tuple[int, int] | None:
         one, two = planar_cross(b - a, c - a), planar_cross(b - a, d - a)
         three, four = planar_cross(d - c, a - c), planar_cross(d - c, b - c)
         hit = (one * two <= 0) & (three * four <= 0) & _overlap(a, b, c, d)
-        hit[0] = _turns_back(a, b, d[0])  # the next side begins where this one ends
+        hit[0] = _turns_back(a, b, d[0])  # consecutive sides share this corner
         if i == 0:
             hit[-1] = _turns_back(c[-1], a, b)
         if hit.any():
@@ -126,11 +126,11 @@ def _crossing(p: np.ndarray) -> tuple[int, int] | None:
 
 
 def _overlap(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Whether the rectangles around the sides overlap: decides where the sides lie on one line."""
+    """Return whether the rectangles around the sides overlap: decides for sides that lie on one line."""
     low, high = np.minimum(a, b), np.maximum(a, b)
     return ((np.minimum(c, d) <= high) & (np.maximum(c, d) >= low)).all(axis=1)
 
 
 def _turns_back(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
-    """Whether the way a, b, c goes back on itself at b, or does not leave it."""
+    """Return whether the path a, b, c reverses at b, or does not leave it."""
     return bool(planar_cross(b - a, c - b) == 0.0 and (b - a) @ (c - b) <= 0.0)

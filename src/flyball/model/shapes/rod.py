@@ -14,7 +14,7 @@ from ..geometry import triad
 from .cylinder import Cylinder
 from .solid import RESOLUTION, Solid, spatial_point
 
-ROUND = Cylinder(radius=1.0, length=1.0)  # for its formulas, which take the numbers from elsewhere
+ROUND = Cylinder(radius=1.0, length=1.0)  # a dummy instance for its formulas; the numbers are passed separately
 
 
 def ends(solid: Any, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray, Any]:
@@ -51,7 +51,7 @@ class Rod(Solid):
         super().check(n)
 
     def pose(self, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
-        """The middle, and axes with z along the bar; ``position`` and ``orientation`` move all of it."""
+        """Return the middle, and axes with z along the bar; ``position`` and ``orientation`` move the whole rod."""
         p, R = super().pose(n)
         middle, axis, _ = ends(self, n)
         return p + matrix_product(R, middle), matrix_product(R, triad(axis))

@@ -1,4 +1,4 @@
-"""What every shape declares: pose, volume, centre of mass, inertia, collision geometry, surface to draw."""
+"""Base classes of shapes: pose, volume, centre of mass, inertia, collision geometry, surface for display."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def smaller(solid: Solid, field: str, value: Any, other: str, limit: Any) -> Non
         raise ModelError(f"{solid.title}: {field} is {value:g} m; it must be smaller than its {other}, {limit:g} m")
 
 
-RESOLUTION = 32  # corners of a circle in a picture
-MAX_PARAMETERS = 7  # parameters of a convex solid
+RESOLUTION = 32  # corners of a circle for display
+MAX_PARAMETERS = 7  # largest number of parameters of a convex solid
 DIRECTIONS = tuple(d for d in itertools.product((-1.0, 0.0, 0.6, 1.0), repeat=3) if any(d))
-"""Directions in which a support function is tried: along axes, in their planes, and others."""
+"""Directions in which a support function is tested: along axes, in their planes, and others."""
 CONTACT_REMEDY = (
     "give it contact=False, and the body shapes that can stand for it, such as Cylinder(..., looks=True, contact=True)"
 )
@@ -40,32 +40,32 @@ CONTACT_REMEDY = (
 
 @dataclass(frozen=True)
 class Solid(Element):
-    """A homogeneous solid on a body: its own frame lies at ``position``, turned by ``orientation``.
+    """A homogeneous solid on a body: its own frame is at ``position``, rotated by ``orientation``.
 
-    What it adds to the body's mass is its own ``mass``, or its volume times its own ``density``, or its volume times
-    the body's density. A body whose ``mass`` is given shares it out among its shapes by volume or, where all of them
-    have a density of their own, by volume times density.
+    It contributes to the body's mass its own ``mass``, or its volume times its own ``density``, or its volume times the
+    body's density. A given ``mass`` of the body is distributed over its shapes by volume, or by volume times density if
+    all of them have a density of their own.
 
     Parameters
     ----------
     name : str
         Optional.
     position : point [m]
-        Origin of its own frame, in the body's reference frame. In a planar mechanism two components will do.
+        Origin of its own frame, in the body's reference frame. In a planar mechanism two components suffice.
     orientation : quaternion (scalar first), Bryant angles (x-y-z) [rad], rotation object or 3x3 matrix
         Of its own frame, relative to the body's reference frame.
     density : number [kg/m^3]
     mass : number [kg]
     looks : bool
-        It is only seen: it has no mass.
+        For display only, without mass.
     hole : bool
-        It is missing from the others: its mass is taken away, and it is not drawn. It must lie inside them, which is
-        not checked beyond what comes out: a positive mass and a possible inertia.
+        A cut-out of the other shapes: its mass is subtracted, and it is not drawn. It must lie inside them; only the
+        resulting mass and inertia are checked.
     material : str
-        Name of the `Material` that it touches others with; that of its body if not given.
+        Name of its `Material` in contact; that of its body if not given.
     contact : bool
-        Whether it touches others, where a `Contact` lets its body. If not given: unless it is for looks only. A hole
-        is not cut out of what touches.
+        Whether it takes part in contact, if a `Contact` applies to its body. If not given: yes, unless it is for
+        display only. Holes are not cut out of the contact geometry.
     """
 
     name: str = ""
@@ -88,12 +88,12 @@ class Solid(Element):
         return f"{type(self).__name__} {self.name!r}" if self.name else type(self).__name__
 
     def check(self, n: SimpleNamespace) -> None:
-        """Refuse numbers that make no sense.
+        """Refuse invalid numbers.
 
         Raises
         ------
         ModelError
-            If a mass or density is not greater than zero, both are given, or it is said to be massless as well.
+            If a mass or density is not greater than zero, both are given, or it is for display only.
         """
         if n.density == 0.0 or n.mass == 0.0:
             zero = "density" if n.density == 0.0 else "mass"
@@ -113,28 +113,28 @@ class Solid(Element):
 
     @property
     def touches(self) -> bool:
-        """Whether it may touch others."""
+        """Return whether it takes part in contact."""
         return not (self.hole or self.looks) if self.contact is None else self.contact
 
     def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
-        """What it is where it touches others in space: convex parts, in its own frame.
+        """Return its spatial contact geometry: convex parts, in its own frame.
 
         Raises
         ------
         ModelError
-            If there is nothing like that.
+            If it has none.
         """
         raise ModelError(f"{self.title}: {type(self).__name__} has no form that contact knows; {CONTACT_REMEDY}")
 
     def outlines(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
-        """What it is where it touches others in a planar mechanism: convex parts of its outline, seen along z.
+        """Return its planar contact geometry: convex parts of its outline, seen along z.
 
         They are in the body's reference frame, at z = 0.
 
         Raises
         ------
         ModelError
-            If there is nothing like that.
+            If it has none.
         """
         raise ModelError(f"{self.title}: {type(self).__name__} has no outline that contact knows; {CONTACT_REMEDY}")
 
@@ -147,20 +147,20 @@ class Solid(Element):
         return 0.0, 0.0, 0.0
 
     def gyration(self, n: SimpleNamespace) -> Any:
-        """Inertia per unit mass [m^2] about the centre of mass, in its own axes.
+        """Return the inertia per unit mass [m^2] about the centre of mass, in its own axes.
 
         Three moments, or a 3x3 matrix where its own axes are not principal.
         """
         raise NotImplementedError
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
-        """Numbers for drawing it [m]."""
+        """Return the dimensions for drawing it [m]."""
         raise NotImplementedError
 
     def surface(self, n: SimpleNamespace, fine: int = RESOLUTION) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices (k, 3) [m] in its own frame and triangles (m, 3), counter-clockwise seen from outside.
+        """Return vertices (k, 3) [m] in its own frame and triangles (m, 3), counter-clockwise seen from outside.
 
-        ``fine`` is the number of corners of a circle; the surface is closed whatever it is.
+        ``fine`` is the number of corners of a circle; the surface is closed for any value.
         """
         raise NotImplementedError
 
@@ -186,22 +186,22 @@ class Solid(Element):
 
 @dataclass(frozen=True)
 class ConvexSolid(Solid):
-    """A convex shape of a user's own, described by its support function.
+    """A user-defined convex shape, described by its support function.
 
     A subclass defines `parameters` and the static method ``support(par, d)``: the point of the solid (x, y, z), in its
-    own frame, that is farthest along the direction d, which has any length but zero. It touches every other shape in
-    space, at one point: for a solid with flat sides use a hull. A body with this shape needs ``mass`` and ``inertia``,
+    own frame, that is farthest along the direction d, of any length but zero. In spatial contact it touches other
+    shapes at one point: for a solid with flat sides use a hull. A body with this shape needs ``mass`` and ``inertia``,
     unless the class also defines ``volume`` and ``gyration`` (and ``centre``).
     """
 
     support: ClassVar[Callable[..., Any]]
 
     def parameters(self, n: SimpleNamespace) -> tuple[Any, ...]:
-        """Up to seven numbers for the support function; ``n`` has the fields in SI units."""
+        """Return up to seven numbers for the support function; ``n`` has the fields in SI units."""
         return ()
 
     def forms(self, n: SimpleNamespace) -> tuple[ConvexPart, ...]:
-        """Itself, within a sphere about its bounding box.
+        """Return the solid itself, with a sphere about its bounding box.
 
         Raises
         ------
@@ -215,7 +215,7 @@ class ConvexSolid(Solid):
         return (ConvexPart("SOLID", (*par, 1.0), np.linalg.norm(np.abs(box).max(axis=1)), owner=type(self)),)
 
     def volume(self, n: SimpleNamespace) -> Any:
-        """Not known.
+        """Raise an error: the volume is unknown.
 
         Raises
         ------
@@ -234,7 +234,7 @@ class ConvexSolid(Solid):
         return np.array([self._point(par, tuple(d)) for d in v.tolist()]), f
 
     def par(self, n: SimpleNamespace) -> tuple[float, ...]:
-        """The parameters as the support function gets them: seven real numbers.
+        """Return the parameters of the support function: seven real numbers.
 
         Raises
         ------
@@ -263,10 +263,10 @@ class ConvexSolid(Solid):
 
 @dataclass(frozen=True)
 class Surface(Solid):
-    """A shape without an inside, for what cannot move or has its mass and inertia given."""
+    """A shape that does not enclose a volume, for ground or for bodies with given mass and inertia."""
 
     def volume(self, n: SimpleNamespace) -> Any:
-        """There is none.
+        """Raise an error: there is no volume.
 
         Raises
         ------
@@ -277,5 +277,5 @@ class Surface(Solid):
 
 
 def spatial_point(values: Any, what: str) -> np.ndarray:
-    """Three components of a point that is given by three, or by two in the plane z = 0."""
+    """Return three components of a point given by three, or by two in the plane z = 0."""
     return vector((*values, 0.0) if len(values) == 2 else values, False, what)

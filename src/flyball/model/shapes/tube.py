@@ -18,7 +18,7 @@ from .solid import RESOLUTION, smaller
 class Tube(Cylinder):
     """A hollow cylinder along z, its middle at its origin: outer ``radius``, ``inner_radius`` and ``length`` [m].
 
-    It touches others as a cylinder does: nothing gets into its bore.
+    In contact it is a solid cylinder: nothing can enter its bore.
     """
 
     inner_radius: Length

@@ -11,4 +11,9 @@ The small dense problem (`dense_problem`, `dense_solver`) decides which rows hol
 `interior_point` and `douglas_rachford` find indeterminate forces within their cones.
 
 Imports: NumPy, `compiler/`, `math/`, `numerics/graphs`.
+
+Coulomb's law is not the convex problem. Gauss-Seidel solves it directly; Newton alternates convex problems with De
+Saxce's terms and Newton steps on the law; ADMM renews these terms. Newton keeps impulses (method of multipliers), so
+that its compliance leaves the answer. The dense problem is scaled to a unit diagonal and softened by 1e-9, on which
+states are decided; then the softening is refined away.
 """

@@ -3,8 +3,8 @@
 min 1/2 |e|^2 + g(z) over z = u0 + G e, with multipliers p (the impulses) and penalties 1 / R (`proximal_rows`):
 e from (1 + sum G' R^-1 G) e = sum G' (p + (z - u0) / R), p from the nearest admissible impulse to p - u / R, z
 from the rest (Boyd et al. 2011; for contact Tasora, Mangoni, Benatti and Garziera 2021). The penalty follows
-the two residuals, and only then the matrix is factored anew. With Coulomb's law De Saxce's additions are
-renewed where the convex problem that they make is nearly solved.
+the two residuals, and the matrix is factored again only when it changes. With Coulomb's law De Saxce's terms are
+updated when the current convex problem is nearly solved.
 """
 
 from __future__ import annotations
@@ -51,11 +51,13 @@ from .proximal_rows import (
     write_back_rows,
 )
 
-FIRST_RHO, MIN_RHO, MAX_RHO = 0.1, 1e-6, 1e3  # R in parts of the mobility
-# iterations to the first look at the penalty, and how much longer it is to the next, so that it settles; ratio of
-# residuals that is too much; change of R
+FIRST_RHO, MIN_RHO, MAX_RHO = 0.1, 1e-6, 1e3  # R relative to the mobility
+# iterations before the first check of the penalty, growth of the interval to the next, so that it settles; ratio of
+# residuals that changes R; factor of R
 FIRST_CHECK, CHECK_GROWTH, RESIDUAL_RATIO, RHO_CHANGE = 10, 1.2, 5.0, 5.0
-CONVEX_TOLERANCE = 0.2  # of the residual is left of the convex problem: on to the next one
+CONVEX_TOLERANCE = (
+    0.2  # accuracy of the convex problem, relative to the residual, at which De Saxce's terms are updated
+)
 SPLIT_VELOCITY = TARGET_CHANGE  # column of z
 
 
@@ -74,7 +76,7 @@ def factor_for_rho(R, rho):
 
 @formula
 def solve_velocities(R):
-    """e of the iteration."""
+    """Compute e of the iteration."""
     x, n = R.row, R.size[BLOCKS]
     for k in range(6 * n):
         R.blocks[k] = 0.0
@@ -91,7 +93,7 @@ def solve_velocities(R):
 
 @formula
 def update_impulses(R):
-    """Impulses and z of the iteration. Returns the largest u - z and the largest change of z [m/s]."""
+    """Update impulses and z. Returns the largest u - z and the largest change of z [m/s]."""
     x, apart, moved = R.row, 0.0, 0.0
     for row in range(R.size[ROWS]):
         o = ROW_NUMBERS * row
@@ -116,7 +118,7 @@ def update_impulses(R):
 
 @formula
 def iterate_admm(R, O, coulomb):
-    """Iterations until the residual is small enough. Returns how it ended, and the residual."""
+    """Iterate until the residual is small enough. Returns the outcome and the residual."""
     rho, worst, wait, look = FIRST_RHO, 0.0, 1.0 * FIRST_CHECK, FIRST_CHECK
     for row in range(R.size[ROWS]):
         for s in range(3):
@@ -182,5 +184,5 @@ def admm_solve(P, X, O, F):
 def admm(
     P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
-    """Alternating directions; returns iterations. For what stands in `Choices.count[ENDED]` see `newton.newton`."""
+    """Alternating directions; returns iterations. For the outcomes in O.count.ended see `newton.newton`."""
     return admm_solve(P, X, O, F)

@@ -2,9 +2,8 @@
 
 Nesterov 1983; Mazhar, Heyn, Negrut and Tasora 2015, algorithm 1: theta' = (-theta^2 + theta sqrt(theta^2 + 4))
 / 2, beta = theta (1 - theta) / (theta^2 + theta'); back-tracking while the quadratic bound at y fails; restart
-where the gradient, with its constant term, points along the last change. N y is put together from products
-already made, so an iteration takes one product. The iterate whose step was the smallest, as a velocity, is the
-answer.
+if the gradient, with its constant term, points along the last change. N y is combined from earlier products,
+so an iteration takes one product. The result is the iterate with the smallest step, measured as a velocity.
 """
 
 from __future__ import annotations
@@ -23,12 +22,12 @@ from .contact_problem import (
 )
 from .gradient_steps import apply_operator, apply_vector, begin_iterations, gradient_step, report_iterate, unused_index
 
-MAX_LIPSCHITZ = 1e30  # of L: beyond it nothing is to be gained by smaller steps
+MAX_LIPSCHITZ = 1e30  # largest L; beyond it smaller steps gain nothing
 
 
 @formula
 def accelerated_gradient(P, X, W, O, first, way):
-    """Iterate; way: whether the metric is 1, by what L grows and shrinks, how far the bound may be missed."""
+    """Iterate; way: whether the metric is 1, factors by which L grows and shrinks, tolerance factor of the bound."""
     plain, grow, shrink, missed = way
     many = begin_iterations(P, X, W, O, plain)
     L = first if first > 0.0 else initial_lipschitz(P, X, W, O, many)
@@ -65,7 +64,7 @@ def accelerated_gradient(P, X, W, O, first, way):
 
 @formula
 def initial_lipschitz(P, X, W, O, many):
-    """L0 = |N (p - 1)| / |p - 1|, as published; of contacts."""
+    """L0 = |N (p - 1)| / |p - 1|, as published; over the contacts."""
     n, up, down = many[0] + many[1] + many[2] + many[3] + many[4], 0.0, 0.0
     for s in range(n):
         for k in range(3):
@@ -82,7 +81,7 @@ def initial_lipschitz(P, X, W, O, many):
 def apgd(
     P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
-    """Iterations until a step would change velocities by less than `ENOUGH`, at most `MOST`; how many there were."""
+    """Iterate until a step changes velocities by less than O.real.enough, or O.count.most times. Returns iterations."""
     return accelerated_gradient(P, X, W, O, -1.0, (True, 2.0, 0.9, 1.0 + 1e-9))
 
 
@@ -90,9 +89,9 @@ def apgd(
 def scaled_apgd(
     P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
-    """Iterations until a step would change velocities by less than `ENOUGH`, at most `MOST`; how many there were.
+    """Iterate in the metric of the diagonal blocks; arguments and result as `apgd`.
 
-    L starts at 1, since the metric is that of the blocks; the bound may be missed by a fiftieth, which near the
-    solution is rounding.
+    L starts at 1, since the metric is that of the blocks. The bound may be violated by a fiftieth, which is rounding
+    near the solution.
     """
     return accelerated_gradient(P, X, W, O, 1.0, (False, 1.3, 0.998, 1.02))

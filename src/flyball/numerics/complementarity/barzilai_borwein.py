@@ -1,9 +1,9 @@
 """Spectral projected gradient: steps of Barzilai and Borwein 1988 in the metric of diagonal blocks.
 
-The line search asks for less than the largest of the last five objectives, not for descent in every iteration
+The line search requires a value below the largest of the last five objectives, not descent in every iteration
 (Grippo, Lampariello and Lucidi 1986; Birgin, Martinez and Raydan 2000); for contacts: Heyn, Anitescu, Tasora
-and Negrut 2013. The two step lengths are taken in turn. The iterate whose step was the smallest, as a velocity,
-is the answer.
+and Negrut 2013. The two step lengths alternate. The result is the iterate with the smallest step, measured as a
+velocity.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from .contact_problem import (
 )
 from .gradient_steps import TORQUE_OFFSET, apply_operator, begin_iterations, gradient_step, report_iterate, unused_index
 
-SUFFICIENT_DECREASE = 1e-4  # of what the slope promises
-MIN_STEP, MAX_STEP = 1e-3, 1e3  # of the steps, where 1 is that of Gauss-Seidel
+SUFFICIENT_DECREASE = 1e-4  # part of the decrease predicted by the slope
+MIN_STEP, MAX_STEP = 1e-3, 1e3  # bounds of the step; 1 is that of Gauss-Seidel
 
 
 @formula
 def shorten_step(P, W, O, many, cur, new, part):
-    """Only a part of the way from cur to new, and of their N p."""
+    """Shorten the step from cur to new, and the change of N p, to a part."""
     for s in range(many[0] + many[1] + many[2] + many[3] + many[4]):
         for k in range(3):
             W.rows[new, s, k] = W.rows[cur, s, k] + part * (W.rows[new, s, k] - W.rows[cur, s, k])
@@ -49,7 +49,7 @@ def shorten_step(P, W, O, many, cur, new, part):
 
 @formula
 def line_search(f, slope, curved, highest):
-    """The longest of 1, 1/2, 1/4 ... at which f + t slope + t^2 curved / 2 is low enough."""
+    """Longest of 1, 1/2, 1/4 ... at which f + t slope + t^2 curved / 2 is low enough."""
     t = 1.0
     while f + t * slope + 0.5 * t * t * curved > highest + SUFFICIENT_DECREASE * t * slope and t > 1e-10:
         t *= 0.5
@@ -58,7 +58,7 @@ def line_search(f, slope, curved, highest):
 
 @formula
 def spectral_step(dd, curved, square, odd):
-    """One of the two lengths: d' M d / d' N d or d' N d / |N d|^2."""
+    """One of the two step lengths: d' M d / d' N d or d' N d / |N d|^2."""
     up, down = (dd, curved) if odd else (curved, square)
     return min(max(up / down, MIN_STEP), MAX_STEP) if down > 0.0 and up > 0.0 else 1.0
 
@@ -67,10 +67,10 @@ def spectral_step(dd, curved, square, odd):
 def barzilai_borwein(
     P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
-    """Iterations until a step would change velocities by less than `ENOUGH`, at most `MOST`; how many there were.
+    """Iterate until a step changes velocities by less than O.real.enough, or O.count.most times. Returns iterations.
 
-    Of the convex form: the line search needs an objective, and Coulomb's law has none. Asked for it, it ends `SOLVE_FAILED`
-    with everything as it was.
+    Only for the convex form: the line search needs an objective, and Coulomb's law has none. With Coulomb's law it ends
+    with `SOLVE_FAILED` and changes nothing.
     """
     if O.count.coulomb:
         O.count.ended, O.count.used = SOLVE_FAILED, 0
@@ -84,7 +84,7 @@ def barzilai_borwein(
         ids = cur, cur, 4 + cur, 4 + cur, new
         dd, slope, worst = gradient_step(P, X, W, O, many, ids, (0.0, size, 0))
         curved, square = apply_operator(P, X, W, O, many, ids, 4 + new, 0.0)
-        rate = sqrt(worst) / min(size, 1.0)  # not less than that of a step of 1
+        rate = sqrt(worst) / min(size, 1.0)  # at least that of a step of 1
         t = line_search(f, slope, curved, max(max(f, a0), max(max(a1, a2), a3)))
         if t < 1.0:
             shorten_step(P, W, O, many, cur, new, t)

@@ -8,7 +8,7 @@ from ...math.scalar import sqrt
 
 @formula
 def project_on_cone(mu, n, s, t):
-    """The point of |(s, t)| <= mu n nearest to (n, s, t)."""
+    """Project (n, s, t) on the cone |(s, t)| <= mu n."""
     r = sqrt(s * s + t * t)
     if r <= mu * n:
         return n, s, t
@@ -21,16 +21,16 @@ def project_on_cone(mu, n, s, t):
 
 @formula
 def fraction_within(n, bound, r):
-    """What of a length r is left within bound n."""
+    """Factor that reduces a length r to at most bound * n."""
     return 1.0 if r <= bound * n else bound * n / r
 
 
 @formula
 def rolling_cone_normal(mu, rho, sigma, n, r, q, w):
-    """Normal component of the point of r' <= mu n', q' <= rho n', w' <= sigma n' nearest to (n, r, q, w), r, q, w >= 0.
+    """Normal component of the projection on r' <= mu n', q' <= rho n', w' <= sigma n'; r, q, w >= 0.
 
-    The root of n' - n - sum m max(0, x - m n') over the three: concave and rising, so Newton's method from the left
-    ends at it after at most one step for each corner.
+    It is the root of n' - n - sum m max(0, x - m n') over the three, a concave increasing function, so Newton's method
+    from the left ends at it after at most one step per corner.
     """
     if n + mu * r + rho * q + sigma * w <= 0.0:
         return 0.0
@@ -49,16 +49,16 @@ def rolling_cone_normal(mu, rho, sigma, n, r, q, w):
 
 @formula
 def project_on_rolling_cone(mu, rho, sigma, least, p, q):
-    """The nearest point with rolling and spinning friction.
+    """Project on the cone with rolling and spinning friction.
 
     Parameters
     ----------
     mu, rho, sigma : float
         Friction, rolling and spinning: |p_t| <= mu p_n, |q_t| <= rho p_n, |q_n| <= sigma p_n.
     least : float
-        p_n is not below it.
+        Lower bound of p_n.
     p, q : tuple
-        Impulse and torque, in one unit: normal, two tangential.
+        Impulse and torque, in the same unit: normal, two tangential.
     """
     r, a, w = sqrt(p[1] * p[1] + p[2] * p[2]), sqrt(q[1] * q[1] + q[2] * q[2]), abs(q[0])
     n = max(rolling_cone_normal(mu, rho, sigma, p[0], r, a, w), least)
@@ -68,13 +68,13 @@ def project_on_rolling_cone(mu, rho, sigma, least, p, q):
 
 @formula
 def least_normal_impulse(P, c):
-    """The least normal impulse of contact c."""
+    """Lower bound of the normal impulse of contact c."""
     return P.least[c] if P.least.shape[0] > 0 else 0.0
 
 
 @formula
 def project_on_cone_above(mu, least, n, s, t):
-    """The point of the cone with a normal component of at least ``least`` nearest to (n, s, t)."""
+    """Project (n, s, t) on the part of the cone with a normal component of at least ``least``."""
     near, a, b = project_on_cone(mu, n, s, t)
     if not near < least:  # nan stays nan
         return near, a, b

@@ -4,12 +4,12 @@ Velocities and impulses of a contact are tuples along its frame: normal, two tan
 the normal, about the two tangential axes. ``v`` (nn, 6 or more) and ``wide`` are any velocities of nodes and of
 groups. A symmetric diagonal block is six numbers: nn, ns, nt, ss, st, tt.
 
-The residual is that of the natural map: a solution is a fixed point of p -> P(p - s u), with P the nearest
-point of the cone. The difference from it, over s, is a velocity [m/s]; over the largest impulse of all it is a
-number, the force residual. s is a contact's own: three over the trace of its diagonal block (for torques
-likewise, counted in lengths so that both blocks have the same size), so that light and heavy contacts count
-alike. The velocity residual is the largest of all contacts and lines; on stacks of large mass ratios a harmless
-one may hide impulses that are wrong, hence the force residual.
+The residual is that of the natural map: a solution is a fixed point of p -> P(p - s u), with P the projection on the
+cone. The deviation from it, divided by s, is a velocity [m/s]; divided by the largest impulse of all contacts it is
+the dimensionless force residual. Each contact has its own s: three over the trace of its diagonal block (for torques
+likewise, in length units that make both blocks equally large), so that light and heavy contacts count equally. The
+velocity residual is the largest of all contacts and lines. In stacks with large mass ratios a small velocity residual
+may hide wrong impulses, hence the force residual.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from .contact_problem import (
 
 @formula
 def point_velocity(v, i, P, c, side):
-    """Velocity of a node at the contact."""
+    """Velocity at the contact of the point fixed to a node."""
     return add(load3(v, i, 0), cross(load3(v, i, 3), load3(P.arm, c, 3 * side)))
 
 
 @formula
 def contact_velocity(P, v, wide, c):
-    """D v of contact c [m/s], without bias: velocity of side 2 less that of side 1."""
+    """D v of contact c [m/s], without bias: velocity of side 2 minus that of side 1."""
     i, j = P.at[c, 0], P.at[c, 1]
     u = (0.0, 0.0, 0.0)
     if j >= 0:
@@ -55,19 +55,19 @@ def contact_velocity(P, v, wide, c):
 
 @formula
 def to_contact_frame(P, c, x):
-    """Components along the contact's frame of a vector in the world."""
+    """Components of a world vector along the contact's frame."""
     return mv(load9(P.frame, c, 0), x)
 
 
 @formula
 def to_world_frame(P, c, n, s, t):
-    """The vector in the world with these components along the contact's frame."""
+    """World vector with these components along the contact's frame."""
     return mtv(load9(P.frame, c, 0), (n, s, t))
 
 
 @formula
 def group_velocity(P, wide, c, first):
-    """What the groups' velocities add to three velocities of a contact: rows ``first`` and on of J."""
+    """Contribution of the groups to three velocities of a contact: rows ``first`` and following of J."""
     x, y, z = 0.0, 0.0, 0.0
     for side in range(2):
         e = P.block[c, side]
@@ -101,19 +101,19 @@ def apply_to_groups(P, wide, c, first, p):
 
 @formula
 def symmetric_block(A, i, o):
-    """A symmetric matrix that stands as xx yy zz xy xz yz in row i of a table, from column o, for ``vec.symmetric``."""
+    """Read a symmetric matrix stored as xx yy zz xy xz yz in row i from column o, for `math.vec.symmetric`."""
     return (A[i, o], A[i, o + 3], A[i, o + 4], A[i, o + 1], A[i, o + 5], A[i, o + 2])
 
 
 @formula
 def set_symmetric_block(A, i, o, a):
-    """Write a symmetric matrix, as ``vec.symmetric`` takes it, where `symmetric_block` reads it."""
+    """Write a symmetric matrix in the form of `math.vec.symmetric` where `symmetric_block` reads it."""
     A[i, o], A[i, o + 3], A[i, o + 4], A[i, o + 1], A[i, o + 5], A[i, o + 2] = a
 
 
 @formula
 def angular_response(P, i, t):
-    """What an angular impulse changes the angular velocity of node i by."""
+    """Change of the angular velocity of node i by an angular impulse."""
     return symmetric(symmetric_block(P.node, i, INVERSE_INERTIA), t)
 
 
@@ -206,7 +206,7 @@ def frame_axis(P, c, k):
 
 @formula
 def node_block(P, i, m, e, r):
-    """The block of m e . e + r . B r for three axes e and three torques r."""
+    """Block with entries m e . e + r . B r for three axes e and three torques r."""
     x, y, z = angular_response(P, i, r[0]), angular_response(P, i, r[1]), angular_response(P, i, r[2])
     return (
         m * dot(e[0], e[0]) + dot(r[0], x),
@@ -226,7 +226,7 @@ def add_blocks(a, b):
 
 @formula
 def group_block(P, c, side, first):
-    """The block of three rows of J and Y."""
+    """Diagonal block of three rows of J and Y."""
     g, e = -2 - P.at[c, side], P.block[c, side]
     n = P.group[g + 1] - P.group[g]
     e += first * n
@@ -244,7 +244,7 @@ def group_block(P, c, side, first):
 
 @formula
 def diagonal_block(P, c):
-    """The block of contact c, without compliance."""
+    """Diagonal block of contact c, without compliance."""
     D = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     e = frame_axis(P, c, 0), frame_axis(P, c, 1), frame_axis(P, c, 2)
     for side in range(2):
@@ -259,7 +259,7 @@ def diagonal_block(P, c):
 
 @formula
 def rolling_diagonal_block(P, c):
-    """The block of the torques of contact c."""
+    """Diagonal block of the torques of contact c."""
     D = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     e = frame_axis(P, c, 0), frame_axis(P, c, 1), frame_axis(P, c, 2)
     for side in range(2):
@@ -271,12 +271,12 @@ def rolling_diagonal_block(P, c):
     return D
 
 
-ZERO_RESIDUAL = (0.0, 0.0, 0.0, 0.0, 0.0)  # residual, impulse lacking, square of the largest impulse, b' p, p' N p
+ZERO_RESIDUAL = (0.0, 0.0, 0.0, 0.0, 0.0)  # residual, missing impulse, square of the largest impulse, b' p, p' N p
 
 
 @formula
 def island_range(begin, whole, O):
-    """First of what is meant and the one after its last, where islands begin at ``begin``."""
+    """First and end index in the selected island, or in all; islands begin at the entries of ``begin``."""
     k = O.count.island
     if k < 0:
         return 0, whole
@@ -285,31 +285,31 @@ def island_range(begin, whole, O):
 
 @formula
 def contact_range(P, O):
-    """First contact of what is meant, and the one after its last."""
+    """First and end index of the selected contacts."""
     return island_range(P.island, P.size[0], O)
 
 
 @formula
 def node_range(P, O):
-    """First node of what is meant and the one after its last, in ``member``."""
+    """First and end index of the selected nodes, in ``member``."""
     return island_range(P.member_p, P.size[1], O)
 
 
 @formula
 def line_range(P, O):
-    """First line of what is meant, and the one after its last."""
+    """First and end index of the selected lines."""
     return island_range(P.line_p, P.size[3], O)
 
 
 @formula
 def larger_or_nan(a, b):
-    """The larger of two; nan if one is, so that none is lost."""
+    """Larger of two numbers; nan if either is nan."""
     return a if a >= b or a != a else b
 
 
 @formula
 def contact_residual(P, X, c, u, coulomb):
-    """Squares of the impulse that contact c lacks and of its step, and of the impulse, without turning."""
+    """Square of the missing impulse of contact c, its step s, square of the impulse; without rolling friction."""
     D = diagonal_block(P, c)
     s = D[0] + D[3] + D[5]
     s = 3.0 / (s + P.soft[c]) if s > 0.0 else 0.0
@@ -324,10 +324,10 @@ def contact_residual(P, X, c, u, coulomb):
 
 @formula
 def rolling_residual(P, X, c, u, w, coulomb):
-    """As `contact_residual` for a contact with rolling and spinning friction."""
+    """As `contact_residual`, for a contact with rolling and spinning friction."""
     D, E = diagonal_block(P, c), rolling_diagonal_block(P, c)
     whole = D[0] + D[3] + D[5] + P.soft[c]
-    s, size = 3.0 / whole, sqrt(whole / (E[0] + E[3] + E[5]))  # torques are counted as size * force
+    s, size = 3.0 / whole, sqrt(whole / (E[0] + E[3] + E[5]))  # torques count as size * force
     n, a, b = X.p[c, 0], X.p[c, 1], X.p[c, 2]
     k, l, m = X.torque[c, 0] / size, X.torque[c, 1] / size, X.torque[c, 2] / size
     mu, rho, sigma = P.mu[c], P.turn[c, 0] / size, P.turn[c, 1] / size
@@ -343,15 +343,15 @@ def rolling_residual(P, X, c, u, w, coulomb):
 
 @formula
 def biased_velocity(P, X, c, u):
-    """Velocity of contact c with bias and compliance."""
+    """Velocity of contact c including bias and compliance."""
     return u[0] + P.bias[c, 0] + P.soft[c] * X.p[c, 0], u[1] + P.bias[c, 1], u[2] + P.bias[c, 2]
 
 
 @formula
 def accumulate_residual(sofar, more):
-    """Worst residual, impulse lacking and square of the largest impulse; sums of b' p and p' N p.
+    """Accumulate largest residual, missing impulse and square of the impulse; sums of b' p and p' N p.
 
-    more: squares of the impulse that is lacking, step, square of the impulse, b' p, p' N p of one contact or line.
+    more: square of the missing impulse, step, square of the impulse, b' p, p' N p of one contact or line.
     """
     lack = sqrt(more[0])
     rate = lack / more[1] if more[1] > 0.0 else lack
@@ -361,14 +361,14 @@ def accumulate_residual(sofar, more):
 
 @formula
 def residual_summary(sofar):
-    """Residual [m/s], force residual [1], b . p and p' N p."""
+    """Residual [m/s], force residual [1], b . p and p' N p from accumulated values."""
     worst, lacking, largest, linear, square = sofar
     return worst, lacking / sqrt(largest) if largest > 0.0 else lacking, linear, square
 
 
 @formula
 def contact_terms(P, X, O, velocities, c):
-    """What `accumulate_residual` wants to know of contact c."""
+    """Terms of contact c for `accumulate_residual`."""
     v, wide, free, free_wide = velocities
     n, a, b, coulomb = X.p[c, 0], X.p[c, 1], X.p[c, 2], 1.0 * O.count.coulomb
     d, e = contact_velocity(P, v, wide, c), contact_velocity(P, free, free_wide, c)
@@ -393,7 +393,7 @@ def residuals(P, X, O, velocities):
     Parameters
     ----------
     velocities : tuple
-        With the impulses: of nodes and of groups; without them: of nodes and of groups.
+        Of nodes and groups with the impulses, then of nodes and groups without them.
     """
     sofar = ZERO_RESIDUAL
     first, last = contact_range(P, O)
@@ -404,7 +404,7 @@ def residuals(P, X, O, velocities):
 
 @formula
 def accumulate_line_residuals(P, X, O, wide, free_wide, sofar):
-    """What is so far, and of the lines."""
+    """Add the lines to accumulated residuals."""
     first, last = line_range(P, O)
     for k in range(first, last):
         p, d, e = X.line[k], line_velocity(P, wide, k), line_velocity(P, free_wide, k)
@@ -419,10 +419,10 @@ def accumulate_line_residuals(P, X, O, wide, free_wide, sofar):
 
 @formula
 def finish_solve(P, X, W, O, residual, used, last):
-    """Write down how far impulses are from a solution; if it is the last time, make them safe and hand back.
+    """Store the residuals of the impulses; after the last iteration, limit the impulses and write the solution.
 
-    Impulses are those in X, velocities with them in W.own and X.wide, those without in X.v and W.free_wide; ``residual`` is
-    what `residuals` says.
+    The impulses are in X, the velocities with them in W.own and X.wide, those without in X.v and W.free_wide;
+    ``residual`` is the result of `residuals`.
     """
     velocity, force, linear, square = residual
     row = O.count.written
@@ -437,13 +437,13 @@ def finish_solve(P, X, W, O, residual, used, last):
     if not (velocity == velocity and square == square):
         part, O.count.ended = 0.0, SOLVE_FAILED
     elif 0.5 * square + linear > 0.0 and O.count.ended == LIMIT_REACHED and P.least.shape[0] == 0:
-        part = 0.0 if linear >= 0.0 else -linear / square  # the best there is along these impulses
+        part = 0.0 if linear >= 0.0 else -linear / square  # scaling with the smallest objective
     write_back(P, X, W, O, part)
 
 
 @formula
 def blend(part, a, b):
-    """A if the part is 0, b if it is 1, whatever the other is."""
+    """Interpolate from a (part 0) to b (part 1); exact at the ends even if the other is nan."""
     if part == 1.0:
         return b
     return a + part * (b - a) if part > 0.0 else a
@@ -451,7 +451,7 @@ def blend(part, a, b):
 
 @formula
 def write_back(P, X, W, O, part):
-    """Velocities with a part of the impulses."""
+    """Write velocities, and impulses scaled by ``part``, to X."""
     begin, end = node_range(P, O)
     for e in range(begin, end):
         i = P.member[e]

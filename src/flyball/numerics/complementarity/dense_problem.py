@@ -1,23 +1,23 @@
 """The small dense complementarity problem of a few rows, and its active-set method.
 
-u = A x + b, and each row has a rule that its impulse x and its velocity u fulfil together. The same stands for
-accelerations and forces. Rules:
+u = A x + b, and each row has a rule that relates its impulse x and its velocity u. The same applies to forces and
+accelerations. Rules:
 
     INACTIVE           x = 0
     BILATERAL          u = 0
     UNILATERAL         x >= 0, u >= 0, x u = 0
-    FRICTION_LINE      |x| <= reach; u = 0 within, u against x at the bound
+    FRICTION_LINE      |x| <= reach; u = 0 within, u opposite to x at the bound
     SLIDING            x = -lean reach: slides in a known direction
     FRICTION_DISC      with the row behind it (FRICTION_DISC_2): the same of |(x1, x2)| <= reach
 
-reach = const + gain x, of friction never less than zero: what a row can hold may depend on what others carry,
-and where that is a load linearised elsewhere, the line passes below zero. Rows are of any units; A's diagonal
-says what is large. Where A is singular, impulses of rows that hold are those of the least sum of A_ii x_i^2.
+reach = const + gain x is the bound of friction, never less than zero. The bound of a row may depend on the impulses of
+others; if these are loads linearised elsewhere, the linear function can become negative. Rows have any units; A's
+diagonal gives the scale. Where A is singular, impulses of rows at rest are those with minimum sum of A_ii x_i^2.
 
-The active-set method: the linear equations of one set of states, the rows that violate their rules, exchanges
-of states. A's diagonal is scaled to ones and softened by a little, which makes impulses unique where A is
-singular. States are decided on the softened problem, where the decision has one answer; values are refined
-until the softening is removed (the proximal point method, Rockafellar 1976).
+The active-set method solves the linear equations of one set of states, finds the rows that violate their rules, and
+exchanges states. A's diagonal is scaled to ones and increased by a small softening, which makes impulses unique where
+A is singular. States are decided on the softened problem, which has one solution; the values are refined
+until the effect of the softening is removed (the proximal point method, Rockafellar 1976).
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from ...compiler.struct_layout import Float1, Float2, Float3, Int1
 from ...math.scalar import sqrt
 
 INACTIVE, BILATERAL, UNILATERAL, FRICTION_LINE, SLIDING, FRICTION_DISC, FRICTION_DISC_2 = range(7)
-# states that are found: no impulse; at rest; at one end or the other of what it holds; as DRIVEN says;
+# states of rows: no impulse; at rest; at the lower or upper bound; sliding as given by `lean`;
 # a pair that slips
 NO_IMPULSE, AT_REST, AT_LOW, AT_HIGH, SLIDES_AS_GIVEN, DISC_SLIPS = range(6)
-# entries of Dense.info; how it ended
+# entries of DenseProblem.info; outcomes
 OUTCOME, PASS_COUNT, PIVOT_COUNT = range(3)
-SOLUTION_FOUND, NO_SOLUTION, HOLD_IMPOSSIBLE = range(3)  # NOT_HELD: rows that must hold cannot
-# rows of Dense.row
+SOLUTION_FOUND, NO_SOLUTION, HOLD_IMPOSSIBLE = range(3)  # HOLD_IMPOSSIBLE: rows that must rest cannot
+# rows of DenseProblem.row
 (
     ROW_SCALE,
     SCALED_BIAS,
@@ -53,33 +53,33 @@ SOLUTION_FOUND, NO_SOLUTION, HOLD_IMPOSSIBLE = range(3)  # NOT_HELD: rows that m
 
 
 class DenseProblem(NamedTuple):
-    """What is asked, what is found, and scratch."""
+    """Data, results and scratch of a dense problem."""
 
     A: Float2  # (n, n)
     b: Float1  # (n,)
-    grain: Float1  # (n,): rounding of b
+    grain: Float1  # (n,): rounding error of b
     rule: Int1  # (n,)
     const: Float1  # (n,)
     gain: Float2  # (n, n)
     lean: Float1  # (n,)
-    state: Int1  # (n,): what is tried first, and what is found
+    state: Int1  # (n,): initial guess, and result
     x: Float1  # (n,)
     u: Float1  # (n,)
     reach: Float1  # (n,)
     info: Int1  # (3,)
     N: Float2  # (n, n): A, scaled
-    scaled_gain: Float2  # (n, n): the same of the gain
+    scaled_gain: Float2  # (n, n): gain, scaled
     K: Float2  # (n, n): equations of a set of states; its factor
-    swap: Int1  # (n,): order of its pivots
+    swap: Int1  # (n,): row exchanges of its pivoting
     row: Float2  # (10, n)
-    T: Float2  # (m, 2 m + 2): pivoting
+    T: Float2  # (m, 2 m + 2): tableau of pivoting
     basis: Int1  # (m,)
-    at: Int1  # (n + 1,): first unknown of each row in it
-    Q: Float3  # (2, n, n + 1): x and reach by what pivoting looks for
+    at: Int1  # (n + 1,): first unknown of each row in the tableau
+    Q: Float3  # (2, n, n + 1): x and reach as linear functions of the unknowns of pivoting
 
 
 def allocate_dense(n: int) -> DenseProblem:
-    """Room for n rows, all OUT."""
+    """Allocate a problem of n inactive rows."""
     m = 4 * n
     z, i = np.zeros, np.int64
     return DenseProblem(
@@ -88,16 +88,16 @@ def allocate_dense(n: int) -> DenseProblem:
     )  # fmt: skip
 
 
-SOFTENING = 1e-9  # of the scaled diagonal
-TERM_ROUNDING = 1e-12  # of the terms of a sum: its rounding
+SOFTENING = 1e-9  # added to the scaled diagonal
+TERM_ROUNDING = 1e-12  # rounding of a sum, relative to its terms
 MAX_REFINEMENTS = 50
-SOLVED_TOLERANCE = 1e-15  # of the terms of a row: solved
-SINGULAR_PIVOT = 1e-15  # of the largest entry of its column: no pivot
+SOLVED_TOLERANCE = 1e-15  # residual of a solved row, relative to its terms
+SINGULAR_PIVOT = 1e-15  # relative to the largest entry of its column; smaller pivots count as zero
 
 
 @formula
 def scale_problem(P):
-    """The problem with ones on the diagonal, into N, gained and rows of P."""
+    """Scale the problem to ones on the diagonal; writes N, scaled_gain and rows of P.row."""
     n = P.b.shape[0]
     for i in range(n):
         d = P.A[i, i]
@@ -118,7 +118,7 @@ def scale_problem(P):
 
 @formula
 def assemble_equations(P):
-    """The matrix K of the states, and its factor by rows. Returns whether it has one."""
+    """Assemble the matrix K of the states and factor it. Returns whether that is possible."""
     n = P.b.shape[0]
     for i in range(n):
         of_reach, state = 0.0, P.state[i]
@@ -139,9 +139,9 @@ def assemble_equations(P):
 
 @formula
 def assemble_slip_equation(P, i):
-    """The equation of a row of a pair that slips: x + d reach + k (u - d d.u) = 0, k = reach / |u| (Newton's method).
+    """Assemble the equation of a row of a slipping pair: x + d reach + k (u - d d.u) = 0, k = reach / |u|.
 
-    d is the way in which it slips.
+    d is the slip direction. The equation is linearised at the current velocities (Newton's method).
     """
     first = i if P.rule[i] == FRICTION_DISC else i - 1
     d, k = P.row[SLIP_DIRECTION, i], P.row[SLIP_RATIO, first]
@@ -155,7 +155,7 @@ def assemble_slip_equation(P, i):
 
 @formula
 def factor_equations(P):
-    """LU with partial pivoting, in place."""
+    """Factor K by LU with partial pivoting, in place."""
     n = P.b.shape[0]
     for k in range(n):
         best, size = k, 0.0
@@ -196,7 +196,7 @@ def substitute(P, r):
 
 @formula
 def solve_states(P):
-    """Impulses of the states: of the softened problem into row FIRST, of the problem itself into row REST."""
+    """Solve for the impulses of the states: with softening (SOFTENED_IMPULSE) and refined (REFINED_IMPULSE)."""
     n = P.b.shape[0]
     if not assemble_equations(P):
         return False
@@ -208,7 +208,7 @@ def solve_states(P):
         for i in range(n):
             r[i] = equation_residual(P, x, i)
             done = done and abs(r[i]) <= SOLVED_TOLERANCE * term_size(P, x, i)
-        if done:  # more would only add up rounding where A is singular
+        if done:  # further refinement would only accumulate rounding where A is singular
             break
         substitute(P, r)
         for i in range(n):
@@ -220,7 +220,7 @@ def solve_states(P):
 
 @formula
 def equation_residual(P, x, i):
-    """What the equation of row i lacks."""
+    """Residual of the equation of row i."""
     state = P.state[i]
     if state == NO_IMPULSE:
         return -x[i]
@@ -241,7 +241,7 @@ def equation_residual(P, x, i):
 
 @formula
 def scaled_velocity(P, x, i):
-    """U of row i, scaled."""
+    """Scaled velocity u of row i."""
     u = P.row[SCALED_BIAS, i]
     for j in range(x.shape[0]):
         u += P.N[i, j] * x[j]
@@ -250,7 +250,7 @@ def scaled_velocity(P, x, i):
 
 @formula
 def scaled_reach(P, x, i):
-    """What row i can hold, scaled."""
+    """Scaled friction bound of row i."""
     c = P.row[SCALED_CONST, i]
     for j in range(x.shape[0]):
         c += P.scaled_gain[i, j] * x[j]
@@ -259,7 +259,7 @@ def scaled_reach(P, x, i):
 
 @formula
 def term_size(P, x, i):
-    """How large the terms of row i are, together."""
+    """Sum of the absolute terms of row i."""
     size = abs(P.row[SCALED_BIAS, i]) + abs(x[i])
     for j in range(x.shape[0]):
         size += abs(P.N[i, j] * x[j])
@@ -268,13 +268,13 @@ def term_size(P, x, i):
 
 @formula
 def row_rounding(P, x, i):
-    """What is nothing beside the terms of row i."""
+    """Rounding error of row i."""
     return TERM_ROUNDING * term_size(P, x, i) + P.grain[i] / P.row[ROW_SCALE, i]
 
 
 @formula
 def required_state(P, x, i):
-    """The state of row i that its rule asks for, where its own breaks it; else its own."""
+    """State of row i that its rule requires; unchanged if the rule is fulfilled."""
     state, rule = P.state[i], P.rule[i]
     if rule == UNILATERAL:
         if state == AT_REST:
@@ -304,7 +304,7 @@ def required_state(P, x, i):
 
 @formula
 def required_disc_state(P, x, i):
-    """The same of the pair i, i + 1."""
+    """As `required_state`, for the pair i, i + 1."""
     if P.state[i] == AT_REST:
         size = sqrt(x[i] * x[i] + x[i + 1] * x[i + 1])
         least = row_rounding(P, x, i) + row_rounding(P, x, i + 1) + TERM_ROUNDING * size
@@ -317,7 +317,7 @@ def required_disc_state(P, x, i):
 
 @formula
 def start_slip(P, x, i):
-    """The way in which a pair slips that cannot hold: against what it would have to carry."""
+    """Initialise the slip direction of a pair: opposite to the impulse that would keep it at rest."""
     size = sqrt(x[i] * x[i] + x[i + 1] * x[i + 1])
     reach = min(max(scaled_reach(P, x, i), 0.0), size)
     P.row[SLIP_DIRECTION, i], P.row[SLIP_DIRECTION, i + 1] = -x[i] / size, -x[i + 1] / size
@@ -326,10 +326,10 @@ def start_slip(P, x, i):
 
 @formula
 def exchange_states(P, which, most):
-    """Other states for the rows that break their rules, again and again. Returns whether none is left.
+    """Exchange states of rows that violate their rules until none is left. Returns whether that succeeded.
 
-    All at once while that makes them fewer, else the last one alone, which cannot run in circles where A is positive
-    definite and reaches are given (Judice and Pires 1994).
+    All at once while their number decreases, else only the last one, which cannot cycle if A is positive definite and
+    friction bounds are constant (Judice and Pires 1994).
     """
     n = P.b.shape[0]
     fewest, patience = n + 1, 3
@@ -353,7 +353,7 @@ def exchange_states(P, which, most):
 
 @formula
 def change_states(P, x, only):
-    """Better states for all rows, or for one."""
+    """Set the required states of all rows, or of one."""
     for i in range(P.b.shape[0]):
         alone = (
             i == only

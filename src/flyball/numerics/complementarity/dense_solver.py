@@ -1,14 +1,14 @@
-"""The small dense complementarity problem solved: exchange of states, then Lemke's pivoting.
+"""Solver of the small dense complementarity problem: exchange of states, then Lemke's pivoting.
 
-Pivoting is used where exchanging states does not end. Rows that hold and those that slide in a known direction
-are eliminated first. A unilateral row is one unknown, friction is four: its impulse up and down, how fast it
-slides (Stewart and Trinkle 1996), and by how much the line of its reach is below zero. Ties are broken
-lexicographically (Cottle, Pang and Stone 1992, section 4.9), so that constants within rounding have to be set
-to zero: along a chain of bodies constants fall by many powers of ten, and their rounding would decide which is
-the least.
+Pivoting is used if the exchange of states does not end. Bilateral rows and those that slide in a known direction
+are eliminated first. A unilateral row is one unknown, friction is four: its impulse in both directions, its sliding
+velocity (Stewart and Trinkle 1996), and the amount by which the linear friction bound is negative. Ties are broken
+lexicographically (Cottle, Pang and Stone 1992, section 4.9), so constants within rounding must be set to zero. Along
+a chain of bodies constants decrease by many powers of ten, and their rounding would decide which is the
+smallest.
 
-The law of friction discs that slip is not linear: it is linearised at the present velocities, and all is solved
-again (Newton's method where everything else has its own rules: Josephy 1979).
+The law of slipping friction discs is nonlinear. It is linearised at the current velocities, and the whole problem is
+solved again (Newton's method with the other rows' rules retained: Josephy 1979).
 """
 
 from __future__ import annotations
@@ -56,13 +56,13 @@ from .dense_problem import (
 
 PIVOT_TOLERANCE = 1e-11
 TIE_TOLERANCE = 1e-13
-CONSTANT_ROUNDING = 1e-14  # of the largest constant at the start: what is left of a constant is none
-MAX_PIVOTS = 50  # pivots for each unknown
+CONSTANT_ROUNDING = 1e-14  # relative to the largest constant at the start; smaller constants count as zero
+MAX_PIVOTS = 50  # maximum pivots per unknown
 
 
 @formula
 def solve_by_pivoting(P):
-    """States by pivoting. Returns whether there are any."""
+    """Find the states by pivoting. Returns whether that succeeded."""
     m = number_unknowns(P)
     if not reduce_problem(P):
         return False
@@ -75,7 +75,7 @@ def solve_by_pivoting(P):
 
 @formula
 def number_unknowns(P):
-    """How many there are; the first of each row into ``at``; ``at[n]`` is the first slip."""
+    """Number the unknowns, the first of each row in ``at``; returns their count."""
     n, m = P.b.shape[0], 0
     for i in range(n):
         P.at[i] = m
@@ -88,7 +88,7 @@ def number_unknowns(P):
 
 @formula
 def reduce_problem(P):
-    """x and reach of every row by the impulses of those that are sought, into Q: columns of these, and a constant."""
+    """Express x and reach of every row by the impulses of unknown rows, in Q: their coefficients, and a constant."""
     n = P.b.shape[0]
     for i in range(n):
         for j in range(n + 1):
@@ -120,22 +120,22 @@ def reduce_problem(P):
 
 @formula
 def is_eliminated(rule):
-    """Whether rows of this rule have equations alone."""
+    """Whether rows of this rule are equations only."""
     return rule == BILATERAL or rule == SLIDING
 
 
 @formula
 def is_friction(rule):
-    """Whether rows of this rule are friction; a pair is taken for two, a square for its circle, to begin with."""
+    """Whether rows of this rule are friction; at first a pair counts as two rows, a square in place of its disc."""
     return rule == FRICTION_LINE or rule == FRICTION_DISC or rule == FRICTION_DISC_2
 
 
 @formula
 def eliminate_rows(P):
-    """Rows of Q[0] with equations become x = (coefficients of the others, constant); Gauss and Jordan."""
+    """Solve rows of Q[0] with equations for x = (coefficients of the others, constant), by Gauss-Jordan elimination."""
     n = P.b.shape[0]
     for i in range(n):
-        P.swap[i] = -1  # the unknown that the equation of row i was solved for
+        P.swap[i] = -1  # unknown for which the equation of row i was solved
     for k in range(n):
         if not is_eliminated(P.rule[k]):
             continue
@@ -154,7 +154,7 @@ def eliminate_rows(P):
             if i != best and is_eliminated(P.rule[i]) and f != 0.0:
                 for j in range(n + 1):
                     P.Q[0, i, j] -= f * P.Q[0, best, j]
-    for i in range(n):  # rows in the order of their unknowns, moved to the other side; Q[1] is scratch here
+    for i in range(n):  # rows sorted by their unknowns, with the sign changed; Q[1] is scratch here
         if P.swap[i] >= 0:
             k = P.swap[i]
             for j in range(n + 1):
@@ -169,7 +169,7 @@ def eliminate_rows(P):
 
 @formula
 def fill_tableau(P, m):
-    """Columns: w, z, z0, q; of w = M z + z0 + q."""
+    """Fill the tableau of w = M z + z0 + q, with columns w, z, z0, q."""
     n = P.b.shape[0]
     T = P.T
     for a in range(m):
@@ -190,7 +190,7 @@ def fill_tableau(P, m):
             T[a + 2, m + a] += 1.0  # reach - up - down
             T[a + 2, m + a + 1] += 1.0
             add_impulse_terms(P, m, a + 3, i, (0.0, 1.0))
-            T[a + 2, m + a + 3] -= 1.0  # + what it lacks, in reach and in what is not negative of it
+            T[a + 2, m + a + 3] -= 1.0  # + the missing amount, in reach and in its nonnegative part
             T[a + 3, m + a + 3] -= 1.0
 
 
@@ -217,7 +217,7 @@ def add_impulse_terms(P, m, a, i, what):
 
 @formula
 def pivot_to_solution(P, m):
-    """Pivot until z0 is out. Returns whether it came to that."""
+    """Pivot until z0 leaves the basis. Returns whether it does."""
     T = P.T
     least, most = 0.0, 0.0
     for a in range(m):
@@ -247,7 +247,7 @@ def pivot_to_solution(P, m):
 
 @formula
 def leaving_row(P, m, enter, start):
-    """The row of the lexicographically least (q, inverse of the basis) over the column that enters; -1: a ray."""
+    """Row with the lexicographically smallest (q, inverse of the basis) over the entering column; -1: a ray."""
     T = P.T
     largest = 1.0
     for a in range(m):
@@ -258,7 +258,7 @@ def leaving_row(P, m, enter, start):
             continue
         if best < 0 or stands_before(P, m, (a, best), enter, start):
             best = a
-    if best >= 0 and not start:  # z0 leaves where it may
+    if best >= 0 and not start:  # z0 leaves if possible
         for a in range(m):
             if P.basis[a] == 2 * m and T[a, enter] > PIVOT_TOLERANCE * largest:
                 q, p = T[a, 2 * m + 1] / T[a, enter], T[best, 2 * m + 1] / T[best, enter]
@@ -269,7 +269,7 @@ def leaving_row(P, m, enter, start):
 
 @formula
 def stands_before(P, m, two, enter, start):
-    """Whether the first of two rows stands before the second."""
+    """Whether the first of two rows is lexicographically smaller."""
     T = P.T
     a, b = two
     da = 1.0 if start else T[a, enter]
@@ -284,7 +284,7 @@ def stands_before(P, m, two, enter, start):
 
 @formula
 def pivot_on(P, m, row, enter):
-    """Make the column of what enters a unit vector."""
+    """Make the entering column a unit vector."""
     T = P.T
     d = T[row, enter]
     for c in range(2 * m + 2):
@@ -298,7 +298,7 @@ def pivot_on(P, m, row, enter):
 
 @formula
 def clear_rounding(P, m, nothing):
-    """Constants that are rounding become zero."""
+    """Set constants within rounding to zero."""
     for a in range(m):
         if abs(P.T[a, 2 * m + 1]) <= nothing:
             P.T[a, 2 * m + 1] = 0.0
@@ -315,7 +315,7 @@ def unknown_value(P, m, z):
 
 @formula
 def read_states(P, m):
-    """States from the unknowns."""
+    """Read the states from the unknowns."""
     for i in range(P.b.shape[0]):
         rule, a = P.rule[i], P.at[i]
         if rule == UNILATERAL:
@@ -346,20 +346,20 @@ def read_states(P, m):
             P.row[SLIP_RATIO, i] = size / slip if slip > 0.0 else 1.0
 
 
-MAX_REST_VELOCITY = 1e-6  # of the largest velocity that there would be: what holds and is left with more cannot hold
+MAX_REST_VELOCITY = 1e-6  # relative to the largest velocity; a row with a larger one cannot rest
 DIRECTION_TOLERANCE = 1e-13
-MAX_DIRECTION_PASSES = 60  # of the ways of pairs
-MAX_SLOW_SLIP_PASSES = 200  # the same by the other way
-REACH_TOLERANCE = 1e-12  # of what a pair can hold: found
-MAX_MISS = 1e-6  # of what a pair can hold, or of its way: missed; redundancy leaves rounding of 1e-7
-MIN_LOG_SLOPE = 1e-6  # least slope of the logarithm of what it carries over that of k
-MAX_LOG_STEP = 3.0  # longest step of the logarithm of k
-REST_RATIO = 1e8  # as large a k, of a mass of one, as is at rest
+MAX_DIRECTION_PASSES = 60  # iterations of slip directions
+MAX_SLOW_SLIP_PASSES = 200  # iterations of `solve_slow_slip`
+REACH_TOLERANCE = 1e-12  # relative to the friction bound of a pair: converged
+MAX_MISS = 1e-6  # relative to the bound, or for its direction: failed; redundancy leaves rounding of 1e-7
+MIN_LOG_SLOPE = 1e-6  # smallest slope of the logarithm of the impulse over that of k
+MAX_LOG_STEP = 3.0  # largest step of the logarithm of k
+REST_RATIO = 1e8  # a pair with a larger k, at unit mass, is at rest
 
 
 @formula
 def admit_states(P):
-    """States that go with the rules."""
+    """Make the states admissible for the rules."""
     for i in range(P.b.shape[0]):
         rule, state = P.rule[i], P.state[i]
         if rule == BILATERAL or rule == FRICTION_DISC or rule == FRICTION_DISC_2:
@@ -376,12 +376,12 @@ def admit_states(P):
 
 @formula
 def solve_scaled(P):
-    """States and impulses of the problem as it is scaled and turned. Returns how it ended."""
+    """Solve for states and impulses with the current scaling and slip directions. Returns the outcome."""
     n = P.b.shape[0]
     if not exchange_states(P, SOFTENED_IMPULSE, 10 + 3 * n):
         if not solve_by_pivoting(P):
             return NO_SOLUTION
-        exchange_states(P, SOFTENED_IMPULSE, 10 + n)  # pivots are as good as rounding lets them be
+        exchange_states(P, SOFTENED_IMPULSE, 10 + n)  # removes rounding errors of pivoting
     for i in range(n):
         P.at[i] = P.state[i]
     if not exchange_states(P, REFINED_IMPULSE, 10 + n):
@@ -390,7 +390,7 @@ def solve_scaled(P):
         if not solve_states(P):
             return NO_SOLUTION
     idle = 0
-    for i in range(n):  # what carries nothing and need not, does not hold
+    for i in range(n):  # a row without impulse that needs none does not rest
         if (
             P.rule[i] == UNILATERAL
             and P.state[i] == AT_REST
@@ -398,11 +398,9 @@ def solve_scaled(P):
         ):
             P.state[i] = NO_IMPULSE
             idle += 1
-    if idle > 0 and not solve_states(
-        P
-    ):  # the others by themselves: where all is rounding its share is not less than theirs
+    if idle > 0 and not solve_states(P):  # solve the others alone: if all is rounding, its share is as large as theirs
         return NO_SOLUTION
-    for i in range(n):  # friction that can hold nothing: as it slides
+    for i in range(n):  # friction with zero bound: slides
         if P.rule[i] == FRICTION_LINE and P.state[i] == NO_IMPULSE:
             P.state[i] = AT_LOW if scaled_velocity(P, P.row[REFINED_IMPULSE], i) > 0.0 else AT_HIGH
         elif P.rule[i] == SLIDING:
@@ -419,7 +417,7 @@ def solve_scaled(P):
 
 @formula
 def driving_size(P, x, i):
-    """How large the terms of row i are together, without impulses of what holds: where it cannot these say nothing."""
+    """Sum of the absolute terms of row i without impulses of rows at rest, which are wrong if rest is impossible."""
     size = abs(P.row[SCALED_BIAS, i])
     for j in range(x.shape[0]):
         if P.state[j] != AT_REST:
@@ -429,7 +427,7 @@ def driving_size(P, x, i):
 
 @formula
 def update_slip_directions(P):
-    """The ways of pairs that slip, by their velocities now. Returns by how much they turned at most."""
+    """Update the slip directions of pairs from the velocities. Returns the largest change."""
     x, most = P.row[REFINED_IMPULSE], 0.0
     for i in range(P.b.shape[0]):
         if P.rule[i] != FRICTION_DISC or P.state[i] != DISC_SLIPS:
@@ -445,11 +443,11 @@ def update_slip_directions(P):
 
 @formula
 def solve_slow_slip(P):
-    """Pairs that hardly slip, whose ways Newton's method does not find: x = -k u, with k so that |x| is the reach.
+    """Solve with slowly slipping pairs, whose directions Newton's method does not find: x = -k u, |x| = reach.
 
-    |x| grows with k (as in the subproblem of a trust region, More and Sorensen 1983), so k is found by secants. What
-    carries less with any k is at rest: where redundancy leaves open what it carries, only the least sum of squares
-    was more than it can hold.
+    |x| grows with k (as in the trust-region subproblem, More and Sorensen 1983), so k is found by the secant method. A
+    pair with |x| below its bound for every k is at rest. In that case redundancy leaves its impulse undetermined, and
+    only the minimum-norm impulse exceeded the bound.
     """
     most = 0.0
     for i in range(P.b.shape[0]):
@@ -476,10 +474,10 @@ def solve_slow_slip(P):
 
 @formula
 def update_slip_ratio(P, i, turn):
-    """Another k of the pair i, i + 1. Returns by what part its |x| missed the reach."""
+    """Update k of the pair i, i + 1. Returns the relative deviation of |x| from the bound."""
     x = P.row[REFINED_IMPULSE]
     size, reach = sqrt(x[i] * x[i] + x[i + 1] * x[i + 1]), scaled_reach(P, x, i)
-    if not (size > 0.0 and reach > 0.0):  # nothing holds it
+    if not (size > 0.0 and reach > 0.0):  # no friction
         P.row[SLIP_RATIO, i] *= 0.5
         return 0.0 if size <= row_rounding(P, x, i) + row_rounding(P, x, i + 1) else 1.0
     if size < reach and P.row[SLIP_RATIO, i] >= REST_RATIO:
@@ -496,7 +494,7 @@ def update_slip_ratio(P, i, turn):
 
 @formula
 def write_results(P):
-    """Impulses, velocities and reaches in the units of the problem."""
+    """Write impulses, velocities and friction bounds in the units of the problem."""
     n = P.b.shape[0]
     x = P.row[REFINED_IMPULSE]
     for i in range(n):
@@ -511,7 +509,7 @@ def write_results(P):
 
 @formula
 def solve_dense(P):
-    """Solve in place; how it ended stands in ``P.info``."""
+    """Solve in place; the outcome is in ``P.info``."""
     P.info[PASS_COUNT] = P.info[PIVOT_COUNT] = 0
     scale_problem(P)
     admit_states(P)
@@ -529,22 +527,23 @@ def solve_dense(P):
 
 @kernel
 def solve_dense_kernel(P: DenseProblem) -> None:
-    """`solve_dense`, called from Python."""
+    """Entry point of `solve_dense` for Python."""
     solve_dense(P)
 
 
 def solve_dense_problem(P: DenseProblem) -> int:
-    """Impulses, velocities and states of all rows, in place, from the states that stand there.
+    """Solve for impulses, velocities and states of all rows in place, starting from the given states.
 
     Parameters
     ----------
-    P : Dense
-        The problem; see `problem`.
+    P : DenseProblem
+        See `dense_problem`.
 
     Returns
     -------
     int
-        FOUND; NONE_FOUND: no impulses fulfil all rules (or none were found); NOT_HELD: rows that hold cannot.
+        SOLUTION_FOUND; NO_SOLUTION: no impulses fulfil all rules, or none were found; HOLD_IMPOSSIBLE: rows at rest
+        cannot rest.
     """
     solve_dense_kernel(P)
     return int(P.info[OUTCOME])

@@ -1,8 +1,8 @@
-"""Forces in cones that balance given ones: A x = b with x in a product of cones, by Douglas-Rachford splitting.
+"""Forces in cones that balance given loads: A x = b with x in a product of cones, by Douglas-Rachford splitting.
 
-Two projections take turns, on the solutions of the linear equations and on the cones; where both meet, the
-iteration ends at a point of both (Bauschke and Moursi 2017). It starts from the smallest solution, which is the
-answer where that lies in the cones.
+Two projections alternate, on the solutions of the linear equations and on the cones. If both sets intersect, the
+iteration converges to a common point (Bauschke and Moursi 2017). It starts from the minimum-norm solution, which is
+the result if it lies in the cones.
 """
 
 from __future__ import annotations
@@ -12,25 +12,26 @@ from dataclasses import dataclass, field
 import numpy as np
 
 MAX_ITERATIONS = 20_000
-SINGULAR_TOLERANCE = 1e-11  # singular values below this part of the largest are none
-STEP_TOLERANCE = 1e-13  # a step below this part of the forces ends the iteration
-CHECK_INTERVAL = 50  # iterations between looks at whether the answer is there
+SINGULAR_TOLERANCE = 1e-11  # relative to the largest singular value; smaller ones count as zero
+STEP_TOLERANCE = 1e-13  # step relative to the forces that ends the iteration
+CHECK_INTERVAL = 50  # iterations between convergence checks
 
 
 @dataclass(frozen=True)
 class ConeProduct:
-    """Where the unknowns may be.
+    """Admissible set of the unknowns.
 
     Attributes
     ----------
     free : int
-        The first unknowns, which may be anything.
+        Number of leading unknowns without bounds.
     sign : ndarray (m,)
-        Of the next unknowns: +1 not negative, -1 not positive.
+        Signs of the next unknowns: +1 nonnegative, -1 nonpositive.
     friction : ndarray (n,)
-        The others are triples (normal, two tangential): normal >= 0, tangential <= friction * normal.
+        Friction coefficients of the next unknowns, triples (normal, two tangential): normal >= 0, tangential <=
+        friction * normal.
     most : ndarray (l,)
-        Behind those: unknowns that are at most so large, either way.
+        Bounds of the absolute values of the last unknowns.
     """
 
     free: int
@@ -39,7 +40,7 @@ class ConeProduct:
     most: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def project(self, x: np.ndarray) -> np.ndarray:
-        """The nearest point within the cones."""
+        """Project on the cones."""
         out = x.copy()
         a, b = self.free, self.free + len(self.sign)
         out[a:b] = self.sign * np.maximum(self.sign * x[a:b], 0.0)
@@ -57,18 +58,18 @@ class ConeProduct:
 
 @dataclass(frozen=True)
 class ForceBalance:
-    """What was found.
+    """Result of `balance_forces`.
 
     Attributes
     ----------
     x : ndarray
-        Solves the equations as well as anything can.
+        Least-squares solution of the equations.
     outside : float
-        How far it is from the cones, in parts of its largest number.
+        Distance from the cones, relative to its largest number.
     left : ndarray
-        What is left of the equations by the nearest point within the cones.
+        Residual of the equations at the projection on the cones.
     unique : bool
-        Whether the equations leave nothing open.
+        Whether the equations have a unique solution.
     """
 
     x: np.ndarray
@@ -84,7 +85,7 @@ def balance_forces(A: np.ndarray, b: np.ndarray, cones: ConeProduct) -> ForceBal
     ----------
     A : ndarray (m, n)
     b : ndarray (m,)
-    cones : Cones
+    cones : ConeProduct
     """
     U, d, Vt = np.linalg.svd(A, full_matrices=False)
     k = int((d > SINGULAR_TOLERANCE * d.max(initial=0.0)).sum())

@@ -1,8 +1,8 @@
 """The linear complementarity problem: a friction pyramid with d edges in place of the cone, by Gauss-Seidel.
 
-Stewart and Trinkle 1996, Anitescu and Potra 1997: the tangential impulse is a sum of non-negative ones in d
-directions, no more than mu p_n together, and dissipates the most. That is: it is the point of a regular d-gon
-nearest to a step against the velocity. Small problems can be solved by pivoting instead: `lemke`.
+Stewart and Trinkle 1996, Anitescu and Potra 1997: the tangential impulse is a sum of nonnegative impulses in d
+directions, together at most mu p_n, with maximum dissipation. Equivalently, a step against the velocity is projected on
+a regular d-gon. Small problems can be solved by pivoting instead: `lemke`.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ from .packed_contacts import (
     pack_contacts,
 )
 
-ALL_FRICTIONAL = 2  # no contact is taken as one of balls
+ALL_FRICTIONAL = 2  # no contact counts as one of spheres
 
 
 @formula
 def project_on_polygon(d, r, x, y):
-    """The point nearest to (x, y) of the regular polygon with d corners at distance r, the first along x."""
+    """Project (x, y) on the regular polygon with d corners at distance r, the first along x."""
     half = math.pi / d
     side = math.floor(atan2(y, x) / (2.0 * half))  # the corners are at angles 2 half side, 2 half (side + 1)
     middle = (2.0 * side + 1.0) * half
@@ -69,19 +69,19 @@ def project_on_polygon(d, r, x, y):
 
 @formula
 def pyramid_sliding_friction(d, angle):
-    """Friction on a pyramid while it slides, in parts of that on the cone: against the velocity, and across it.
+    """Sliding friction on a pyramid relative to that on the cone: components against the velocity, and across it.
 
     Parameters
     ----------
     d : int
-        Edges of the pyramid.
+        Number of edges of the pyramid.
     angle : float
         Direction of the velocity [rad], from an edge.
 
     Returns
     -------
     tuple of float
-        It acts along the edge that is nearest to the direction against the velocity: (1, 0) on the cone.
+        It acts along the edge nearest to the direction opposite to the velocity; on the cone: (1, 0).
     """
     part = 2.0 * math.pi / d
     off = angle - part * math.floor(angle / part + 0.5)
@@ -90,7 +90,7 @@ def pyramid_sliding_friction(d, angle):
 
 @formula
 def update_pyramid(P, X, W, c, at, d):
-    """One contact: the normal impulse, then the tangential one; the largest change of a velocity."""
+    """Update one contact: the normal impulse, then the tangential one; returns the largest change of a velocity."""
     k = W.packed
     u, p = contact_velocity(P, W.own, X.wide, c), k[at + IMPULSE]
     n = max(p - (u[0] + k[at + BIAS] + k[at + SOFT] * p) * k[at + INVERSE_NN], k[at + LEAST_NORMAL])
@@ -107,7 +107,7 @@ def update_pyramid(P, X, W, c, at, d):
 
 @formula
 def pyramid_residuals(P, X, W, O, worst):
-    """What `finish_solve` wants: the residual is what the last sweep changed, the objective by definition."""
+    """Residuals for `finish_solve`: the residual is the change in the last sweep, the objective is exact."""
     _, _, linear, square = residuals(P, X, O, (W.own, X.wide, W.free, W.free_wide))
     first, last = contact_range(P, O)
     most, step = 0.0, 0.0
@@ -119,7 +119,7 @@ def pyramid_residuals(P, X, W, O, worst):
 
 @formula
 def prepare_pyramids(P, X, W, O):
-    """Lay contacts out, with what is there acting; how many there are."""
+    """Pack contacts, and apply the initial impulses; returns the number of contacts."""
     first, last = contact_range(P, O)
     copy_nodes(P, X, W, node_range(P, O))
     for k in range(X.wide.shape[0]):
@@ -135,10 +135,10 @@ def prepare_pyramids(P, X, W, O):
 def pyramid(
     P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
-    """Sweeps until velocities change by less than `ENOUGH`, at most `MOST`; how many there were.
+    """Sweep until velocities change by less than O.real.enough, or O.count.most times. Returns sweeps.
 
-    Of Coulomb's law on a pyramid of `DIRECTIONS` edges, at least three; without rolling friction. Asked for anything
-    else it ends `SOLVE_FAILED` with everything as it was.
+    Coulomb's law on a pyramid of O.count.directions edges, at least three; without rolling friction. Otherwise it
+    ends with `SOLVE_FAILED` and changes nothing.
     """
     used, O.count.ended, O.count.written = 0, LIMIT_REACHED, 0
     if P.turn.shape[0] > 0 or O.count.directions < 3 or not O.count.coulomb:

@@ -1,13 +1,13 @@
-"""Projected Gauss-Seidel: contacts one after the other, forward and backward in turn.
+"""Projected Gauss-Seidel: contacts one after the other, in alternating forward and backward sweeps.
 
 Jean and Moreau 1992 (as non-smooth contact dynamics), Tasora and Anitescu 2011 (in the convex form). Updates of
-packed contacts are those of `packed_contacts`; contacts of groups, contacts with rolling friction, and lines
-are updated here through `contact_operator`. Residuals are computed from the packed numbers, in a fraction of
-the time of `contact_operator.residuals`: functions of one contact return the square of the missing impulse, its
-step, the square of the impulse, and its terms of b' p and of p' N p.
+packed contacts are in `packed_contacts`; contacts of groups, contacts with rolling friction, and lines are updated
+here through `contact_operator`. Residuals are computed from the packed numbers, much faster than by
+`contact_operator.residuals`: functions of one contact return the square of the missing impulse, its step, the
+square of the impulse, and its terms of b' p and of p' N p.
 
-A solve that ends at the iteration limit gives what it has, scaled down where that would be worse than no
-impulse at all: p' N p / 2 + b' p is never above 0, so that no energy is made.
+A solve that ends at the iteration limit returns its impulses scaled down if they would be worse than no impulse at
+all: p' N p / 2 + b' p is never positive, so that no energy is generated.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ from .packed_contacts import (
 
 @formula
 def update_general(P, X, W, O, c, at):
-    """A contact of nodes and groups."""
+    """Update a contact of nodes and groups."""
     k = W.packed
     n, s, t = k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2]
     if P.turn.shape[0] > 0:
@@ -108,7 +108,7 @@ def update_general(P, X, W, O, c, at):
 
 @formula
 def set_impulse(P, X, W, c, at, q):
-    """Change the impulse to q, and the velocities with it."""
+    """Set the impulse to q, and update the velocities."""
     k = W.packed
     d = q[0] - k[at + IMPULSE], q[1] - k[at + IMPULSE + 1], q[2] - k[at + IMPULSE + 2]
     if d[0] != 0.0 or d[1] != 0.0 or d[2] != 0.0:
@@ -118,7 +118,7 @@ def set_impulse(P, X, W, c, at, q):
 
 @formula
 def set_torque_impulse(P, X, W, c, z, x, y):
-    """Change the torque impulse, and the velocities with it."""
+    """Set the torque impulse, and update the velocities."""
     d = z - X.torque[c, 0], x - X.torque[c, 1], y - X.torque[c, 2]
     X.torque[c, 0], X.torque[c, 1], X.torque[c, 2] = z, x, y
     apply_torque_impulse(P, W.own, X.wide, c, d)
@@ -126,10 +126,10 @@ def set_torque_impulse(P, X, W, c, z, x, y):
 
 @formula
 def update_rolling(P, X, W, O, c, at):
-    """A contact with rolling and spinning friction.
+    """Update a contact with rolling and spinning friction.
 
-    By Coulomb's law the torques are bounded by the normal impulse found just before; in the convex form all six
-    impulses are the nearest point of the cone, in the metric of twice the diagonal blocks.
+    With Coulomb's law the torques are bounded by the normal impulse found just before. In the convex form all six
+    impulses are projected on the cone, in the metric of twice the diagonal blocks.
     """
     steps = local_step_sizes(rolling_diagonal_block(P, c), 0.0, 0)
     spin, roll = steps[0], steps[6]
@@ -168,13 +168,13 @@ def project_rolling_step(P, X, k, c, at, u, w, steps):
 
 @formula
 def metric_factor(a, b):
-    """Square root of a / b; 0 where nothing moves that way."""
+    """Square root of a / b; 0 if nothing moves that way."""
     return sqrt(a / b) if b > 0.0 else 0.0
 
 
 @formula
 def update_line(P, X, k):
-    """A single impulse on a group."""
+    """Update a line: a single impulse on a group."""
     p, d = X.line[k], line_diagonal(P, k)
     if not d > 0.0:
         return 0.0
@@ -187,14 +187,14 @@ def update_line(P, X, k):
 
 @formula
 def centre_velocity(k, v, i, j, at):
-    """Relative velocity of the centres of balls and its normal part."""
+    """Relative velocity of the centres of spheres, and its normal part."""
     a, b, c = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2]
     return a, b, c, k[at] * a + k[at + 1] * b + k[at + 2] * c
 
 
 @formula
 def normal_terms(p, u, before, step, least):
-    """Of a normal impulse alone; u without bias in it, step: its inverse diagonal, bias and compliance; of `of_*`."""
+    """Residual terms of a normal impulse; u without bias; step: inverse diagonal, bias and compliance."""
     inverse, bias, soft = step
     q = p - (u + bias + soft * p) * inverse
     d = (least if q < least else q) - p  # nan stays nan
@@ -203,7 +203,7 @@ def normal_terms(p, u, before, step, least):
 
 @formula
 def smooth_sphere_terms(k, v, free, i, j, at):
-    """Balls without friction."""
+    """Residual terms of a contact of spheres without friction."""
     u, before = centre_velocity(k, v, i, j, at)[3], centre_velocity(k, free, i, j, at)[3]
     return normal_terms(
         k[at + SPHERE_NORMAL],
@@ -216,7 +216,7 @@ def smooth_sphere_terms(k, v, free, i, j, at):
 
 @formula
 def frictionless_terms(k, v, free, i, j, at):
-    """Any nodes without friction."""
+    """Residual terms of a frictionless contact of any nodes."""
     u, before = frictionless_velocity(k, v, i, j, at), frictionless_velocity(k, free, i, j, at)
     return normal_terms(
         k[at + FRICTIONLESS_NORMAL],
@@ -229,7 +229,7 @@ def frictionless_terms(k, v, free, i, j, at):
 
 @formula
 def sphere_terms(k, v, free, i, j, at, coulomb):
-    """Balls."""
+    """Residual terms of a contact of spheres."""
     d, f = centre_velocity(k, v, i, j, at), centre_velocity(k, free, i, j, at)
     x, y, z = sphere_sliding_velocity(k, v, i, j, at, d)
     e, g, h = sphere_sliding_velocity(k, free, i, j, at, f)
@@ -260,7 +260,7 @@ def sphere_terms(k, v, free, i, j, at, coulomb):
 
 @formula
 def frictional_terms(k, v, free, i, j, at, s, coulomb):
-    """Any nodes; s: the step."""
+    """Residual terms of a frictional contact of any nodes; s: the step."""
     u, f = frictional_velocity(k, v, i, j, at), frictional_velocity(k, free, i, j, at)
     p, a, b, mu = k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2], k[at + MU]
     x, y, z = k[at + BIAS], k[at + BIAS + 1], k[at + BIAS + 2]
@@ -276,7 +276,7 @@ def frictional_terms(k, v, free, i, j, at, s, coulomb):
 
 @formula
 def packed_terms(P, X, W, O, kind, s, at):
-    """Of the contact at visit s, of a kind."""
+    """Residual terms of the contact of a kind at visit s."""
     i, j, c = W.sides[s, 0], W.sides[s, 1], W.sides[s, 2]
     if kind == SMOOTH_SPHERE:
         return smooth_sphere_terms(W.packed, W.own, W.free, i, j, at)
@@ -291,7 +291,7 @@ def packed_terms(P, X, W, O, kind, s, at):
 
 @formula
 def packed_residuals(P, X, W, O, many):
-    """As `residuals`, of what `pack_contacts` laid out; impulses are in X too."""
+    """Compute what `residuals` returns from packed contacts; impulses must also be in X."""
     sofar, begin, at = ZERO_RESIDUAL, 0, 0
     for kind in range(CONTACT_KINDS):
         for s in range(begin, begin + many[kind]):
@@ -303,13 +303,13 @@ def packed_residuals(P, X, W, O, many):
 
 @formula
 def visit_index(e, m, backwards):
-    """The e-th of m visits: from the end in a backward sweep."""
+    """Index of the e-th of m visits; counted from the end in a backward sweep."""
     return m - 1 - e if backwards else e
 
 
 @formula
 def sweep_spheres(W, O, many, backwards):
-    """All contacts of balls."""
+    """Update all contacts of spheres."""
     worst = 0.0
     for e in range(many[SMOOTH_SPHERE]):
         s = visit_index(e, many[SMOOTH_SPHERE], backwards)
@@ -325,7 +325,7 @@ def sweep_spheres(W, O, many, backwards):
 
 @formula
 def sweep_other_contacts(P, X, W, O, many, backwards):
-    """All other contacts."""
+    """Update all other contacts."""
     worst, begin = 0.0, many[SMOOTH_SPHERE] + many[SPHERE]
     at = SPHERE_WIDTH * begin
     for e in range(many[FRICTIONLESS]):
@@ -346,7 +346,7 @@ def sweep_other_contacts(P, X, W, O, many, backwards):
 
 @formula
 def sweep_lines(P, X, O, backwards):
-    """All lines."""
+    """Update all lines."""
     worst = 0.0
     first, last = line_range(P, O)
     for e in range(last - first):
@@ -356,7 +356,7 @@ def sweep_lines(P, X, O, backwards):
 
 @formula
 def sweep(P, X, W, O, many, backwards):
-    """Visit everything once; the largest change of a velocity."""
+    """Update all contacts and lines once; returns the largest change of a velocity."""
     if backwards:
         a = sweep_lines(P, X, O, backwards)
         b = sweep_other_contacts(P, X, W, O, many, backwards)
@@ -368,7 +368,7 @@ def sweep(P, X, W, O, many, backwards):
 
 @formula
 def unpack_impulses(P, X, W, many):
-    """Impulses back to where they belong."""
+    """Copy packed impulses back to X."""
     at = 0
     for s in range(many[0] + many[1] + many[2] + many[3] + many[4]):
         c = W.sides[s, 2]
@@ -396,7 +396,7 @@ def unpack_impulses(P, X, W, many):
 
 @formula
 def prepare_sweeps(P, X, W, O):
-    """Lay everything out, with the impulses that are there acting; how many contacts of each kind."""
+    """Pack all contacts, and apply the initial impulses; returns the number of contacts of each kind."""
     first, last = contact_range(P, O)
     copy_nodes(P, X, W, node_range(P, O))
     for k in range(X.wide.shape[0]):
@@ -413,7 +413,7 @@ def prepare_sweeps(P, X, W, O):
 def gauss_seidel(
     P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
-    """Sweeps until velocities change by less than `ENOUGH`, at most `MOST` of them; how many there were."""
+    """Sweep until velocities change by less than O.real.enough, at most O.count.most times; returns the sweeps."""
     many = prepare_sweeps(P, X, W, O)
     used, O.count.ended, O.count.written = 0, LIMIT_REACHED, 0
     while used < O.count.most:

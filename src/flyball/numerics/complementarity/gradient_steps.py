@@ -1,13 +1,12 @@
-"""Projected gradient steps for all contacts at once: what Jacobi, Barzilai-Borwein and APGD are made of.
+"""Projected gradient steps for all contacts at once, used by Jacobi, Barzilai-Borwein and APGD.
 
-The metric is that of diagonal blocks (or 1), so a step of size 1 is of the size of Gauss-Seidel's. Vectors are
-planes of `ContactWorkspace.rows`, by visit: impulses in the first four, their velocities N p in three more, b =
-D v + bias in the last; torques stand eight planes further, lines in `ContactWorkspace.lines`. Impulses of
-spheres are vectors in the world; of all others along the frame. Velocities of products stand in W.own and
-X.wide.
+The metric is that of the diagonal blocks (or 1), so a step of size 1 is comparable to one of Gauss-Seidel. Vectors
+are planes of `ContactWorkspace.rows`, by visit: impulses in the first four, their velocities N p in three more, b =
+D v + bias in the last; torques are eight planes further, lines in `ContactWorkspace.lines`. Impulses of spheres are
+vectors in world axes; of all others along the frame. Velocities of products are in W.own and X.wide.
 
-A pass takes a step of the gradient for all contacts and applies its impulses; another forms the product with N.
-Before the iterations contacts are packed and the warm start is loaded; after them the answer is written back.
+One pass takes a gradient step for all contacts and applies its impulses; another forms the product with N. Before the
+iterations contacts are packed and the warm start is loaded; after them the result is written back.
 """
 
 from __future__ import annotations
@@ -68,13 +67,13 @@ from .packed_contacts import (
     sphere_sliding_velocity,
 )
 
-BIAS_PLANE, TORQUE_OFFSET = 7, 8  # plane of b; by how many planes torques stand further on
-ROLLING_STEPS, LINE_METRIC = 16, 8  # plane of steps of spinning and rolling; row of lines' diagonal
+BIAS_PLANE, TORQUE_OFFSET = 7, 8  # plane of b; offset of the planes of torques
+ROLLING_STEPS, LINE_METRIC = 16, 8  # plane of steps of spinning and rolling; row of the diagonal of lines
 
 
 @formula
 def extrapolated(W, a, b, beta, s):
-    """Vector a + beta (a - b) of visit s."""
+    """Extrapolated vector a + beta (a - b) of visit s."""
     x, y, z = W.rows[a, s, 0], W.rows[a, s, 1], W.rows[a, s, 2]
     if beta == 0.0:
         return x, y, z
@@ -83,13 +82,13 @@ def extrapolated(W, a, b, beta, s):
 
 @formula
 def set_vector(W, a, s, x):
-    """Vector a of visit s."""
+    """Set vector a of visit s to x."""
     W.rows[a, s, 0], W.rows[a, s, 1], W.rows[a, s, 2] = x
 
 
 @formula
 def step_sphere(k, at, y, g, size, coulomb):
-    """Impulse after a step from y against g; sums of d' M d and the square of M d, d: by what it differs from y."""
+    """Impulse after a step from y against g; with d its difference from y, also d' M d and |M d|^2."""
     x0, x1, x2, lean, slide = k[at], k[at + 1], k[at + 2], k[at + SPHERE_INVERSE_N], k[at + SPHERE_INVERSE_T]
     gn, yn, mu = g[0] * x0 + g[1] * x1 + g[2] * x2, y[0] * x0 + y[1] * x1 + y[2] * x2, k[at + SPHERE_MU]
     a, b, c = g[0] - gn * x0, g[1] - gn * x1, g[2] - gn * x2
@@ -106,9 +105,9 @@ def step_sphere(k, at, y, g, size, coulomb):
 
 @formula
 def step_frictional(k, at, y, g, size, coulomb):
-    """As `step_sphere`, of any contact, along its frame."""
+    """As `step_sphere`, for any other contact, along its frame."""
     lean, slide, gn = k[at + INVERSE_NN], k[at + SLIDING_STEP], g[0]
-    if lean == 0.0:  # nothing moves
+    if lean == 0.0:  # immovable
         return y, 0.0, 0.0
     if coulomb:
         gn += k[at + MU] * sqrt(g[1] * g[1] + g[2] * g[2])
@@ -123,7 +122,7 @@ def step_frictional(k, at, y, g, size, coulomb):
 
 @formula
 def step_rolling(P, k, c, at, y, g, way):
-    """As `step_frictional`, impulses and torques together: y and g are two vectors each, way: size, coulomb, steps."""
+    """As `step_frictional`, for impulses and torques together: y, g hold two vectors; way: size, coulomb, steps."""
     size, coulomb, spin, roll = way
     (yn, ys, yt), (yz, yx, yy) = y
     (gn, gs, gt), (gz, gx, gy) = g
@@ -145,7 +144,7 @@ def step_rolling(P, k, c, at, y, g, way):
 
 @formula
 def step_line(P, W, k, ids, par):
-    """As `step_sphere`, of line k, written down; and g times the whole change."""
+    """Step of line k, stored in ``new``; returns d' M d, g times the whole change, |M d|^2."""
     cur, prev, ucur, uprev, new = ids
     beta, size, _ = par
     y = W.lines[cur, k] + beta * (W.lines[cur, k] - W.lines[prev, k])
@@ -158,7 +157,7 @@ def step_line(P, W, k, ids, par):
 
 @formula
 def clear_velocities(P, X, W, O):
-    """No velocities."""
+    """Set the velocities to zero."""
     begin, end = node_range(P, O)
     for e in range(begin, end):
         for k in range(6):
@@ -169,7 +168,7 @@ def clear_velocities(P, X, W, O):
 
 @formula
 def gradient_step(P, X, W, O, many, ids, par):
-    """A step from y = cur + beta (cur - prev) to ``new``, and its impulses on the velocities.
+    """Take a step from y = cur + beta (cur - prev) to ``new``, and apply its impulses to the velocities.
 
     Parameters
     ----------
@@ -178,12 +177,12 @@ def gradient_step(P, X, W, O, many, ids, par):
     ids : tuple
         Vectors cur, prev, their N p, and new.
     par : tuple
-        beta, size of the step, whether by Coulomb's law.
+        beta, size of the step, whether Coulomb's law is used.
 
     Returns
     -------
     tuple
-        d' M d with d = new - y; g . (new - cur); the largest square of M d of a contact.
+        d' M d with d = new - y; g . (new - cur); the largest |M d|^2 of a contact.
     """
     cur, prev, ucur, uprev, new = ids
     beta, size, coulomb = par
@@ -212,7 +211,7 @@ def gradient_step(P, X, W, O, many, ids, par):
 
 @formula
 def apply_vector(P, X, W, O, many, a):
-    """Vector a, without torques and lines, on the velocities."""
+    """Apply vector a, without torques and lines, to the velocities."""
     clear_velocities(P, X, W, O)
     for s in range(many[SPHERE] + many[FRICTIONAL]):
         i, j, x = W.sides[s, 0], W.sides[s, 1], extrapolated(W, a, a, 0.0, s)
@@ -229,7 +228,7 @@ def apply_vector(P, X, W, O, many, a):
 
 @formula
 def apply_frictional_impulse(k, v, B, i, j, at, p):
-    """An impulse along the frame of a rough contact."""
+    """Apply an impulse along the frame of a frictional contact."""
     x = k[at] * p[0] + k[at + 3] * p[1] + k[at + 6] * p[2]
     y = k[at + 1] * p[0] + k[at + 4] * p[1] + k[at + 7] * p[2]
     z = k[at + 2] * p[0] + k[at + 5] * p[1] + k[at + 8] * p[2]
@@ -239,14 +238,14 @@ def apply_frictional_impulse(k, v, B, i, j, at, p):
 
 @formula
 def general_start(many):
-    """First visit, and first number in ``pack``, of contacts of groups."""
+    """First visit, and first packed number, of contacts of groups."""
     first = many[SPHERE] + many[FRICTIONAL]
     return first, SPHERE_WIDTH * many[SPHERE] + 32 * many[FRICTIONAL]
 
 
 @formula
 def gradient_step_general(P, X, W, O, many, ids, par, sums):
-    """Of contacts of groups, of turning and of lines."""
+    """Take the step of contacts of groups, of rolling friction and of lines."""
     cur, prev, ucur, uprev, new = ids
     beta, size, coulomb = par
     dd, gs, worst = sums
@@ -288,7 +287,7 @@ def gradient_step_general(P, X, W, O, many, ids, par, sums):
 
 @formula
 def visit_velocity(P, X, W, s, at, ball, new):
-    """N x of visit s, of vector ``new``; but for its torque."""
+    """N x of visit s for vector ``new``, without torque."""
     k, v, i, j = W.packed, W.own, W.sides[s, 0], W.sides[s, 1]
     x = extrapolated(W, new, new, 0.0, s)
     if ball:
@@ -307,7 +306,7 @@ def difference_product(a, b, c):
 
 @formula
 def apply_operator(P, X, W, O, many, ids, unew, beta):
-    """N new into ``unew``; d' N d with d = new - y, and the square of N d in the inverse metric (without turning)."""
+    """Write N new to ``unew``; returns d' N d with d = new - y, and |N d|^2 in the inverse metric (without rolling)."""
     cur, prev, ucur, uprev, new = ids
     k, total, square = W.packed, 0.0, 0.0
     for s in range(many[SPHERE] + many[FRICTIONAL]):
@@ -332,7 +331,7 @@ def apply_operator(P, X, W, O, many, ids, unew, beta):
 
 @formula
 def apply_operator_general(P, X, W, O, many, ids, unew, beta, sums):
-    """Of contacts of groups, of turning and of lines."""
+    """As `apply_operator`, for contacts of groups, rolling friction and lines."""
     cur, prev, ucur, uprev, new = ids
     k, (total, square) = W.packed, sums
     begin, at = general_start(many)
@@ -374,13 +373,13 @@ def apply_operator_general(P, X, W, O, many, ids, unew, beta, sums):
 
 @formula
 def packed_place(many, s):
-    """Where the numbers of visit s begin."""
+    """First packed number of visit s."""
     return SPHERE_WIDTH * s if s < many[SPHERE] else SPHERE_WIDTH * many[SPHERE] + 32 * (s - many[SPHERE])
 
 
 @formula
 def begin_iterations(P, X, W, O, unit_metric):
-    """Lay contacts out; impulses in vector 0, N p in vector 4, b in its own; how many contacts there are of each kind.
+    """Pack contacts: impulses to vector 0, N p to vector 4, b to its plane. Returns the number of contacts by kind.
 
     The metric is 1 if ``unit_metric``.
     """
@@ -405,7 +404,7 @@ def begin_iterations(P, X, W, O, unit_metric):
                     1.0,
                     1.0,
                 )
-            elif W.packed[at + INVERSE_NN] > 0.0:  # else nothing moves
+            elif W.packed[at + INVERSE_NN] > 0.0:  # otherwise immovable
                 W.packed[at + INVERSE_NN], W.packed[at + SLIDING_STEP], W.packed[at + METRIC_RATIO] = 1.0, 1.0, 1.0
     start, end = line_range(P, O)
     for k in range(start, end):
@@ -421,7 +420,7 @@ def begin_iterations(P, X, W, O, unit_metric):
 
 @formula
 def load_visit(P, X, W, many, s):
-    """Impulses and b of visit s."""
+    """Load impulses and b of visit s."""
     k, at, i, j, c, v = W.packed, packed_place(many, s), W.sides[s, 0], W.sides[s, 1], W.sides[s, 2], W.free
     if s < many[SPHERE]:
         a, b, d, n = k[at], k[at + 1], k[at + 2], k[at + SPHERE_NORMAL]
@@ -449,7 +448,7 @@ def load_visit(P, X, W, many, s):
 
 @formula
 def subtract_free_velocities(P, X, W, O):
-    """Leave the velocities that impulses make in W.own and X.wide."""
+    """Leave only the velocities caused by impulses in W.own and X.wide."""
     first, last = node_range(P, O)
     for e in range(first, last):
         i = P.member[e]
@@ -461,7 +460,7 @@ def subtract_free_velocities(P, X, W, O):
 
 @formula
 def report_iterate(P, X, W, O, many, best, used, last):
-    """The impulses of a vector into X, velocities with them; a row of the history or, at last, the answer."""
+    """Write the impulses of a vector to X, and their velocities; store a history row or, at last, the result."""
     first, end = node_range(P, O)
     for e in range(first, end):
         for k in range(6):
@@ -489,7 +488,7 @@ def report_iterate(P, X, W, O, many, best, used, last):
 
 @formula
 def unused_index(a, b, c, first):
-    """The first of the numbers from ``first`` on that is none of three."""
+    """First number from ``first`` on that differs from all three."""
     for k in range(4):
         if first + k != a and first + k != b and first + k != c:
             return first + k

@@ -1,10 +1,10 @@
 """The margin of indeterminate forces within their cones, by an interior-point method.
 
-It is the largest s with q - w s >= |(a, b)| in every cone. q, a, b are affine in the y that redundancy leaves
-open. s > 0: there are forces strictly within all bounds; s < 0: there are none; its passing through zero is the
-instant at which a contact gives way. It is found along the central path of the logarithmic barriers of
-second-order cones (Boyd and Vandenberghe, *Convex Optimization*, 2004, sections 11.3 and 11.6), in as many
-unknowns as y has and one.
+It is the largest s with q - w s >= |(a, b)| in every cone. q, a, b are affine in the parameters y that redundancy
+leaves undetermined. s > 0: there are forces strictly within all bounds; s < 0: there are none; s passes zero at the
+instant at which a contact starts to slip or separate. The solver follows the central path of the logarithmic barriers
+of second-order cones (Boyd and Vandenberghe, *Convex Optimization*, 2004, sections 11.3 and 11.6); the unknowns are y
+and s.
 """
 
 from __future__ import annotations
@@ -18,34 +18,34 @@ from ...compiler.kernels import kernel
 from ...compiler.struct_layout import Float1, Float2, Float3, Int1
 from ...math.scalar import sqrt
 
-CONE_COUNT, UNKNOWN_COUNT = range(2)  # entries of Shares.count: cells in use, unknowns
-PATH_POINTS = 7  # points of the path: at the last one s is near the best one by some 1e-7
-PATH_FACTOR = 20.0  # factor between two points of the path
-MAX_NEWTON_STEPS = 25  # steps to a point of the path
-DECREMENT_TOLERANCE = 1e-3  # Newton's decrement there
-MAX_MARGIN = 1.0  # s, and
-MAX_LENGTH = 1e3  # length of y, of the largest number: more room than that is not asked for
+CONE_COUNT, UNKNOWN_COUNT = range(2)  # entries of ConeProgram.count: cones in use, unknowns
+PATH_POINTS = 7  # points of the path: at the last one s is within about 1e-7 of the optimum
+PATH_FACTOR = 20.0  # ratio of the barrier parameter between two points of the path
+MAX_NEWTON_STEPS = 25  # maximum steps to a point of the path
+DECREMENT_TOLERANCE = 1e-3  # Newton decrement at a point
+MAX_MARGIN = 1.0  # upper bound of s, and
+MAX_LENGTH = 1e3  # upper bound of |y|, relative to the largest number
 BACKTRACKING = 0.5
 MAX_BACKTRACKS = 40
 
 
 class ConeProgram(NamedTuple):
-    """Cells, and room to work.
+    """Cones (cells) and workspace.
 
-    ``D[c, i, 0]`` is what q, a, b (i = 0, 1, 2) of cell c are at y = 0, ``D[c, i, 1:]`` how they follow y.
+    ``D[c, i, 0]`` are q, a, b (i = 0, 1, 2) of cell c at y = 0, ``D[c, i, 1:]`` their derivatives by y.
     """
 
     count: Int1  # type: ignore[assignment]  # (2,)
     D: Float3  # (cells, 3, 1 + n): each divided by the w of its cell
-    y: Float1  # (n + 1,): the y found, and s
-    now: Float2  # (cells, 3): q, a, b there, less s
+    y: Float1  # (n + 1,): the optimal y, and s
+    now: Float2  # (cells, 3): q - s, a, b there
     slope: Float2  # (2, n + 1)
     step: Float1  # (n + 1,)
     H: Float2  # (n + 1, n + 1)
 
 
 def allocate_cone_program(cells: int, n: int) -> ConeProgram:
-    """Room for as many cells and unknowns."""
+    """Allocate a cone program of this size."""
     z = np.zeros
     return ConeProgram(
         z(2, np.int64), z((cells, 3, 1 + n)), z(n + 1), z((cells, 3)), z((2, n + 1)), z(n + 1), z((n + 1, n + 1))
@@ -54,7 +54,7 @@ def allocate_cone_program(cells: int, n: int) -> ConeProgram:
 
 @formula
 def largest_margin(Q):
-    """The largest s, in the unit of the cells; a place within 1e-7 of it stands in ``Q.y`` and ``Q.now``."""
+    """Compute the largest s, in the unit of the cells; the optimum within 1e-7 is in ``Q.y`` and ``Q.now``."""
     m, k = Q.count[CONE_COUNT], Q.count[UNKNOWN_COUNT]
     size = 0.0
     for c in range(m):
@@ -83,7 +83,7 @@ def largest_margin(Q):
 
 @formula
 def follow_central_path(Q):
-    """Go along the path. Returns what s would be at its end: on the path it is linear in 1 / hard to first order."""
+    """Follow the central path. Returns s extrapolated to its end: s is linear in 1 / hard to first order."""
     k, hard, before, last = Q.count[UNKNOWN_COUNT], 1.0, 0.0, 0.0
     for stage in range(PATH_POINTS):
         left = 1.0
@@ -91,7 +91,7 @@ def follow_central_path(Q):
             left = newton_step(Q, hard)
             if left <= DECREMENT_TOLERANCE:
                 break
-        if stage > 1 and not 0.0 < left <= DECREMENT_TOLERANCE:  # rounding is all that is left of the slopes
+        if stage > 1 and not 0.0 < left <= DECREMENT_TOLERANCE:  # slopes are only rounding
             break
         before, last = last, Q.y[k]
         hard *= PATH_FACTOR
@@ -100,7 +100,7 @@ def follow_central_path(Q):
 
 @formula
 def evaluate_cones(Q):
-    """What q - s, a, b are at y. Returns whether that is within all cones."""
+    """Evaluate q - s, a, b at y. Returns whether y is within all cones."""
     m, k = Q.count[CONE_COUNT], Q.count[UNKNOWN_COUNT]
     inside = Q.y[k] < MAX_MARGIN
     square = 0.0
@@ -121,7 +121,7 @@ def evaluate_cones(Q):
 
 @formula
 def barrier_gradient(Q, hard, row):
-    """Slopes of -hard s and of the barriers at the place last reckoned, into a row of ``Q.slope``."""
+    """Write the gradient of -hard s and the barriers at the point evaluated last to a row of ``Q.slope``."""
     m, k = Q.count[CONE_COUNT], Q.count[UNKNOWN_COUNT]
     g = Q.slope[row]
     square = MAX_LENGTH * MAX_LENGTH
@@ -140,14 +140,14 @@ def barrier_gradient(Q, hard, row):
 
 @formula
 def cone_value(q, a, b):
-    """q^2 - a^2 - b^2, without the loss of digits near the cone."""
+    """q^2 - a^2 - b^2, without cancellation near the cone."""
     size = sqrt(a * a + b * b)
     return (q - size) * (q + size)
 
 
 @formula
 def barrier_hessian(Q):
-    """Second derivatives, the lower half, into ``Q.H``."""
+    """Write the lower half of the second derivatives to ``Q.H``."""
     m, k = Q.count[CONE_COUNT], Q.count[UNKNOWN_COUNT]
     H = Q.H
     square = MAX_LENGTH * MAX_LENGTH
@@ -173,7 +173,7 @@ def barrier_hessian(Q):
 
 @formula
 def newton_step(Q, hard):
-    """One step of Newton's method towards the point of the path. Returns the decrement; 0 where it goes no nearer."""
+    """Take one Newton step towards the point of the path. Returns the decrement; 0 if no step makes progress."""
     k = Q.count[UNKNOWN_COUNT]
     evaluate_cones(Q)
     barrier_gradient(Q, hard, 0)
@@ -205,7 +205,7 @@ def newton_step(Q, hard):
 
 @formula
 def solve_newton_step(Q):
-    """The step -H^-1 slope, by Cholesky's factor in place. Returns whether there is one."""
+    """Compute the step -H^-1 slope by Cholesky factorisation in place. Returns whether that is possible."""
     n = Q.count[UNKNOWN_COUNT] + 1
     H, x = Q.H, Q.step
     for i in range(n):
@@ -234,5 +234,5 @@ def solve_newton_step(Q):
 
 @kernel
 def largest_margin_kernel(Q: ConeProgram) -> float:
-    """`largest_margin`, called from Python."""
+    """Entry point of `largest_margin` for Python."""
     return largest_margin(Q)

@@ -1,17 +1,17 @@
 """An island of contacts as rows over blocks of six velocities, with a sparse 6 x 6 block factorisation.
 
-A node becomes one block: velocities counted so that its mass matrix is 1, v = v_free + C e with C C' its
-inverse mass matrix. A group becomes as many blocks as it takes: the Delassus matrix J Y' of the rows that meet
-it has a Cholesky factor of few columns (pivoted, of the rank of what the group can do there), and u = u_free +
+A node becomes one block. Its velocities are scaled so that its mass matrix is 1: v = v_free + C e with C C' its
+inverse mass matrix. A group becomes as many blocks as it needs: the Delassus matrix J Y' of the rows that act on
+it has a Cholesky factor of few columns (pivoted, with the rank of the motions seen by these rows), and u = u_free +
 G e, e = G' p is the same as u = u_free + J Y' p. So every contact and every line (a *row* here: three
-velocities, of which a line uses the first) sees sum over its *entries* of G (3, 6) times a block, and 1/2 |e|^2
+velocities, of which a line uses the first) is the sum over its *entries* of G (3, 6) times a block, and 1/2 |e|^2
 is the kinetic energy of the change.
 
-Which bodies touch changes from step to step, so the pattern of the factor is found in compiled code: minimum
-degree on the explicit elimination graph (the fill is made as it arises; Rose 1972), then a right-looking L U
-whose inner products are of fixed size. Blocks outside the diagonal stand by columns, rows of a column ascending
-in the order of elimination. There is no pivoting: matrices here are 1 plus something positive semidefinite, or
-close to that. All arrays stand in `FactorStorage`.
+The touching bodies change from step to step, so the pattern of the factor is found in compiled code: minimum
+degree on the explicit elimination graph (with the fill inserted as it arises; Rose 1972), then a right-looking L U
+whose inner products are of fixed size. Off-diagonal blocks are stored by columns, with the rows of a column in
+ascending order of elimination. There is no pivoting: the matrices are 1 plus a positive semidefinite matrix, or
+close to that. All arrays are in `FactorStorage`.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from ...compiler.struct_layout import Float1, Int1
 from ...math.scalar import sqrt
 from .contact_problem import FIXED_SIDE, STORAGE_TOO_SMALL
 
-# entries of Rows.size
-# CONTACTS: contacts, which are the first rows; BEFORE_TURNING: rows before those of their rolling and spinning friction
+# entries of IslandRows.size
+# CONTACTS: contacts, which are the first rows; BEFORE_ROLLING: rows before those of rolling and spinning friction
 ROWS, BLOCKS, ENTRIES, PAIRS, POOL, FILL, CONTACTS, BEFORE_ROLLING = range(8)
 SIZE_COUNT = 16
-RANK_TOLERANCE, ZERO_MOBILITY = 1e-11, 1e-14  # of a row's own mobility, of the largest in its group
+RANK_TOLERANCE, ZERO_MOBILITY = 1e-11, 1e-14  # relative to the row; to the largest in its group
 
 
 class IslandRows(NamedTuple):
-    """Rooms of one island inside `Factor`."""
+    """Storage of one island inside `FactorStorage`."""
 
     size: Int1  # (16,)
     head: Int1  # (nn + 3 ng,): first block of each node and group; blocks of each group; first side in its chain
@@ -40,12 +40,12 @@ class IslandRows(NamedTuple):
     side: Int1  # (2 m,): first entry of each side or -1
     block: Int1  # (ne,): block of each entry, by its place in the order of elimination
     pair_p: Int1  # (m + 1,): first pair of entries of each row
-    pair: Int1  # (np,): where the product of the pair goes
-    graph: Int1  # (7, nb + 1) flat: start, length, room, mark, place, order, Lp
+    pair: Int1  # (np,): place of the product of the pair in the matrix
+    graph: Int1  # (7, nb + 1) flat: start, length, capacity, mark, place, order, Lp
     pool: Int1  # lists of neighbours
     Li: Int1  # rows of the factor's columns
     G: Float1  # (ne, 18)
-    row: Float1  # (m, 32): see the columns in `prox.py`
+    row: Float1  # (m, 32): columns as in `proximal_rows`
     blocks: Float1  # (4, nb, 6) flat: e, gradient, step, e of p
     D: Float1  # (nb, 36)
     L: Float1  # (2, nnz, 36) flat: below the diagonal, above it
@@ -53,7 +53,7 @@ class IslandRows(NamedTuple):
 
 @formula
 def reset_contact_sides(P, c, head):
-    """Forget what was known of what a contact acts on."""
+    """Reset the data of the nodes and groups on which a contact acts."""
     for s in range(2):
         a = P.at[c, s]
         if a >= 0:
@@ -64,7 +64,7 @@ def reset_contact_sides(P, c, head):
 
 @formula
 def reset_group(P, head, g):
-    """Forget what was known of a group."""
+    """Reset the data of a group."""
     nn, ng = P.size[1], P.size[2]
     head[nn + g] = -1
     head[nn + ng + g] = 0
@@ -79,7 +79,7 @@ def is_movable(P, i):
 
 @formula
 def link_group_side(P, head, chain, g, t, rows):
-    """Put side t, of so many scalar rows, in the chain of group g."""
+    """Insert side t, which has this number of scalar rows, into the chain of group g."""
     nn, ng = P.size[1], P.size[2]
     chain[t] = head[nn + 2 * ng + g]
     head[nn + 2 * ng + g] = t
@@ -88,7 +88,7 @@ def link_group_side(P, head, chain, g, t, rows):
 
 @formula
 def number_blocks(P, span, head, chain):
-    """Number the blocks. Returns their count and that of the entries; blocks of a group stand in head[nn + ng + g]."""
+    """Number the blocks; returns their count. The number of blocks of a group is in head[nn + ng + g]."""
     first, last, line, end = span
     for c in range(first, last):
         reset_contact_sides(P, c, head)
@@ -118,7 +118,7 @@ def number_blocks(P, span, head, chain):
 
 @formula
 def number_group(P, head, g, blocks):
-    """Give a group its blocks, once; returns how many blocks there are then."""
+    """Number the blocks of a group, once; returns the new count of blocks."""
     nn, ng = P.size[1], P.size[2]
     if head[nn + g] < 0:
         rank = min(P.group[g + 1] - P.group[g], head[nn + ng + g])
@@ -144,7 +144,7 @@ def side_entries(P, span, head, row, s):
 
 @formula
 def row_subject(span, row):
-    """The contact of a row and -1 (turning: -2), or -1 and the line."""
+    """Contact of a row and -1 (-2: rolling friction), or -1 and the line."""
     contacts, lines = span[1] - span[0], span[3] - span[2]
     if row < contacts:
         return span[0] + row, -1
@@ -155,14 +155,14 @@ def row_subject(span, row):
 
 @formula
 def row_count(P, span):
-    """How many rows there are."""
+    """Number of rows."""
     contacts = span[1] - span[0]
     return contacts + span[3] - span[2] + (contacts if P.turn.shape[0] > 0 else 0)
 
 
 @formula
 def count_entries(P, span, head):
-    """Entries and pairs of entries of all rows."""
+    """Count the entries and pairs of entries of all rows."""
     entries, pairs = 0, 0
     for row in range(row_count(P, span)):
         n = side_entries(P, span, head, row, 0)[1] + side_entries(P, span, head, row, 1)[1]
@@ -173,7 +173,7 @@ def count_entries(P, span, head):
 
 @formula
 def list_entries(P, span, R):
-    """Entries by row and side, their blocks, and where the pairs of each row begin."""
+    """List the entries by row and side, their blocks, and the first pair of each row."""
     e, pairs = 0, 0
     R.entry_p[0], R.pair_p[0] = 0, 0
     for row in range(R.size[ROWS]):
@@ -191,7 +191,7 @@ def list_entries(P, span, R):
 
 @formula
 def inertia_root(P, i):
-    """Lower Cholesky factor of a node's inverse inertia: xx, yx, yy, zx, zy, zz; zero where it cannot turn."""
+    """Lower Cholesky factor of a node's inverse inertia: xx, yx, yy, zx, zy, zz; zero if it cannot rotate."""
     xx, yy, zz = P.node[i, 1], P.node[i, 2], P.node[i, 3]
     xy, xz, yz = P.node[i, 4], P.node[i, 5], P.node[i, 6]
     least = 1e-14 * (xx + yy + zz)
@@ -207,7 +207,7 @@ def inertia_root(P, i):
 
 @formula
 def fill_node_entry(P, c, s, turning, root, G, e):
-    """G of a contact's side on a node, reversed on side 1; of its turning where ``turning`` is 1."""
+    """Compute G of a contact's side on a node, reversed on side 1; ``turning`` 1: of its rotation."""
     i, sign = P.at[c, s], 2.0 * s - 1.0
     m = sign * sqrt(P.node[i, 0]) * (1.0 - turning)
     x, y, z = sign * P.arm[c, 3 * s], sign * P.arm[c, 3 * s + 1], sign * P.arm[c, 3 * s + 2]
@@ -225,7 +225,7 @@ def fill_node_entry(P, c, s, turning, root, G, e):
 
 @formula
 def side_rows(P, span, t):
-    """Where J and Y of a side in a chain begin, and how many scalar rows they have."""
+    """First number of J and Y of a side in a chain, and its number of scalar rows."""
     c, k = row_subject(span, t // 2)
     if c < 0:
         return P.line_at[k, 1], 1
@@ -235,7 +235,7 @@ def side_rows(P, span, t):
 
 @formula
 def most_mobile_row(P, span, R, g, D):
-    """Side and scalar row with the most mobility left beside what it had: (side, row, mobility left)."""
+    """Find the side and scalar row with the largest fraction of its mobility left: (side, row, mobility left)."""
     nn, ng = P.size[1], P.size[2]
     t, best, side, which, left = R.head[nn + 2 * ng + g], RANK_TOLERANCE, -1, 0, 0.0
     while t >= 0:
@@ -250,7 +250,7 @@ def most_mobile_row(P, span, R, g, D):
 
 @formula
 def group_mobilities(P, span, R, g, D):
-    """What every scalar row of a group moves by for its own unit impulse, twice; 0 where that is rounding."""
+    """Store the mobility of every scalar row of a group (velocity per own unit impulse) twice; 0 if it is rounding."""
     nn, ng = P.size[1], P.size[2]
     n, largest = P.group[g + 1] - P.group[g], 0.0
     for again in range(2):
@@ -271,7 +271,7 @@ def group_mobilities(P, span, R, g, D):
 
 @formula
 def fill_group_entries(P, span, R, g, D):
-    """Pivoted Cholesky factor of J Y' into the entries of a group (reversed on side 1). D: (2 m, 6) to work in."""
+    """Write the pivoted Cholesky factor of J Y' to the entries of a group (reversed on side 1). D (2 m, 6): scratch."""
     nn, ng = P.size[1], P.size[2]
     n = P.group[g + 1] - P.group[g]
     group_mobilities(P, span, R, g, D)
@@ -303,7 +303,7 @@ def fill_group_entries(P, span, R, g, D):
 
 @formula
 def fill_entries(P, span, R, D):
-    """All of G."""
+    """Fill all entries of G."""
     nn, ng = P.size[1], P.size[2]
     for k in range(18 * R.size[ENTRIES]):
         R.G[k] = 0.0
@@ -321,7 +321,7 @@ def fill_entries(P, span, R, D):
 
 @formula
 def side_group(P, span, t):
-    """Group that a side is in, or -1."""
+    """Group of a side, or -1."""
     c, k = row_subject(span, t // 2)
     if c < 0:
         return P.line_at[k, 0] if t % 2 == 1 else -1
@@ -334,7 +334,7 @@ BLOCK_SIZE, BLOCK_NUMBERS = 6, 36
 
 @formula
 def add_neighbour(pool, start, length, capacity, i, j, top, size):
-    """Put j among the neighbours of i (known not to be there); returns the pool's new top, or -1 if it is full."""
+    """Add j to the neighbours of i, where it is not yet listed; returns the pool's new top, or -1 if it is full."""
     if length[i] == capacity[i]:
         if top + 2 * capacity[i] + 4 > size:
             return -1
@@ -350,7 +350,7 @@ def add_neighbour(pool, start, length, capacity, i, j, top, size):
 
 @formula
 def eliminate_minimum_degree(n, pool, start, length, capacity, mark, place, order, top, size):
-    """Minimum degree: what is left of each node's neighbours when it is eliminated is its column. -1: pool is full.
+    """Eliminate by minimum degree; a node's remaining neighbours are then its column. Returns -1 if the pool is full.
 
     ``mark`` holds 0 on entry for every node; ``place`` -1 for every node that is not eliminated yet.
     """
@@ -385,7 +385,7 @@ def eliminate_minimum_degree(n, pool, start, length, capacity, mark, place, orde
 
 @formula
 def factor_columns(n, pool, start, length, place, order, Lp, Li):
-    """Columns of the factor in the order of elimination, rows as places, ascending."""
+    """List the columns of the factor in the order of elimination, rows as places, ascending."""
     Lp[0] = 0
     for k in range(n):
         i = order[k]
@@ -402,7 +402,7 @@ def factor_columns(n, pool, start, length, place, order, Lp, Li):
 
 @formula
 def find_factor_entry(Lp, Li, row, column):
-    """Which block (row, column) is, row > column, both places."""
+    """Index of block (row, column), row > column, both places; -1 if it is zero."""
     for e in range(Lp[column], Lp[column + 1]):
         if Li[e] == row:
             return e
@@ -411,7 +411,7 @@ def find_factor_entry(Lp, Li, row, column):
 
 @formula
 def factor_diagonal_block(D, d):
-    """Factor the block at d in place: unit L below, U above, its diagonal inverted. False if a pivot is 0 or nan."""
+    """Factor the block at d in place: unit L below, U above, inverse diagonal. False if a pivot is 0 or nan."""
     for c in range(BLOCK_SIZE):
         o = d + BLOCK_SIZE * c
         if not abs(D[o + c]) > 0.0:
@@ -429,7 +429,7 @@ def factor_diagonal_block(D, d):
 
 @formula
 def divide_by_upper(L, e, D, d):
-    """Block e becomes itself times the inverse of U at d."""
+    """Multiply block e from the right by the inverse of U at d."""
     for r in range(BLOCK_SIZE):
         o = e + BLOCK_SIZE * r
         for c in range(BLOCK_SIZE):
@@ -441,7 +441,10 @@ def divide_by_upper(L, e, D, d):
 
 @formula
 def divide_by_lower(L, e, u, D, d, symmetric):
-    """Block u becomes the inverse of L at d times itself; for a symmetric matrix that is what `divide_by_upper` made of e."""
+    """Multiply block u from the left by the inverse of L at d.
+
+    For a symmetric matrix it is derived from the result of `divide_by_upper` for e.
+    """
     for r in range(BLOCK_SIZE):
         o = u + BLOCK_SIZE * r
         for c in range(BLOCK_SIZE):
@@ -454,7 +457,7 @@ def divide_by_lower(L, e, u, D, d, symmetric):
 
 @formula
 def subtract_block_product(C, c, A, a, b):
-    """Block c of C less block a of A times its block b."""
+    """Subtract block a of A times its block b from block c of C."""
     for r in range(BLOCK_SIZE):
         o, p = a + BLOCK_SIZE * r, c + BLOCK_SIZE * r
         a0, a1, a2, a3, a4, a5 = A[o], A[o + 1], A[o + 2], A[o + 3], A[o + 4], A[o + 5]
@@ -466,9 +469,9 @@ def subtract_block_product(C, c, A, a, b):
 
 @formula
 def factor_blocks(n, Lp, Li, D, L, symmetric):
-    """Factor in place; diagonal blocks in D by place, those below it in L, those above it behind them.
+    """Factor in place; diagonal blocks in D by place, those below it in L, followed by those above it.
 
-    Of a symmetric matrix what is above need not be filled. False if a pivot is 0.
+    For a symmetric matrix the blocks above need not be filled. False if a pivot is 0.
     """
     above = BLOCK_NUMBERS * Lp[n]
     for k in range(n):
@@ -516,7 +519,7 @@ def solve_blocks(n, Lp, Li, D, L, x):
 
 @formula
 def subtract_block_vector(L, e, x, i, j):
-    """The six of x at i less block e times the six at j."""
+    """Subtract block e times the six entries of x at j from those at i."""
     for r in range(BLOCK_SIZE):
         o = e + BLOCK_SIZE * r
         for c in range(BLOCK_SIZE):
@@ -528,7 +531,7 @@ ROW_WIDTH = 32  # numbers of a row
 
 @formula
 def island_rows(P, F, size):
-    """The rooms by their sizes; ``size`` is the head of `Factor.places`."""
+    """Divide the storage by ``size``, which is the head of `FactorStorage.places`."""
     q, x = F.places, F.numbers
     m, nb, ne, np, pool, fill = size[ROWS], size[BLOCKS], size[ENTRIES], size[PAIRS], size[POOL], size[FILL]
     a = SIZE_COUNT
@@ -567,7 +570,7 @@ def island_rows(P, F, size):
 
 @formula
 def places_needed(P, size):
-    """How long `Factor.places` must be."""
+    """Required length of `FactorStorage.places`."""
     m, nb = size[ROWS], size[BLOCKS]
     fixed = SIZE_COUNT + P.size[1] + 3 * P.size[2] + 6 * m + 2
     return fixed + size[ENTRIES] + size[PAIRS] + 7 * (nb + 1) + size[POOL] + size[FILL]
@@ -575,13 +578,13 @@ def places_needed(P, size):
 
 @formula
 def numbers_needed(size):
-    """How long `Factor.numbers` must be."""
+    """Required length of `FactorStorage.numbers`."""
     return 18 * size[ENTRIES] + ROW_WIDTH * size[ROWS] + 60 * size[BLOCKS] + 72 * size[FILL]
 
 
 @formula
 def storage_fits(P, F, O, size):
-    """Whether the rooms are large enough; if not, what is needed is said."""
+    """Whether the storage is large enough; otherwise writes the required sizes to O."""
     numbers, places = numbers_needed(size), places_needed(P, size)
     if numbers <= F.numbers.shape[0] and places <= F.places.shape[0]:
         return True
@@ -593,7 +596,7 @@ def storage_fits(P, F, O, size):
 
 @formula
 def measure_island(P, span, F, O, size):
-    """Sizes of all but the factor. False if the rooms are too small."""
+    """Compute the sizes of all but the factor. False if the storage is too small."""
     for k in range(SIZE_COUNT):
         size[k] = 0
     size[ROWS] = row_count(P, span)
@@ -608,13 +611,13 @@ def measure_island(P, span, F, O, size):
     if not storage_fits(P, F, O, size):
         return False
     left = F.places.shape[0] - places_needed(P, size) + size[POOL]
-    size[POOL] = left // 2  # the columns are no longer than the lists that they are made of
+    size[POOL] = left // 2  # the columns are no longer than the lists from which they are made
     return True
 
 
 @formula
 def find_neighbours(R, nb):
-    """The graph of the matrix. Returns the pool's top, -1 if it is full."""
+    """Build the graph of the matrix. Returns the pool's top, -1 if it is full."""
     g, n = R.graph, nb + 1
     start, length, room = g[:n], g[n : 2 * n], g[2 * n : 3 * n]
     for k in range(nb):
@@ -635,7 +638,7 @@ def find_neighbours(R, nb):
 
 @formula
 def is_listed(pool, start, length, j):
-    """Whether j is in a list; contacts of a pair stand together, so its end is looked at first."""
+    """Whether j is in a list, searched from its end because contacts of a pair are consecutive."""
     k = length - 1
     while k >= 0 and pool[start + k] != j:
         k -= 1
@@ -644,7 +647,7 @@ def is_listed(pool, start, length, j):
 
 @formula
 def find_elimination_order(R, nb):
-    """Order of elimination. Returns the number of blocks outside the diagonal of the factor, -1: the pool is full."""
+    """Find the order of elimination. Returns the number of off-diagonal blocks of the factor, -1: the pool is full."""
     top = find_neighbours(R, nb)
     if top < 0:
         return -1
@@ -665,7 +668,7 @@ def find_elimination_order(R, nb):
 
 @formula
 def fill_factor_pattern(R, nb):
-    """Columns of the factor, entries by places, and where the products of pairs go (-1: to the diagonal)."""
+    """List the columns of the factor, entries by places, and places of the products of pairs (-1: the diagonal)."""
     g, n = R.graph, nb + 1
     place, Lp = g[4 * n : 5 * n], g[6 * n : 7 * n]
     factor_columns(nb, R.pool, g[:n], g[n : 2 * n], place, g[5 * n : 6 * n], Lp, R.Li)
@@ -682,7 +685,7 @@ def fill_factor_pattern(R, nb):
 
 @formula
 def prepare_island(P, span, F, O):
-    """Rooms, pattern and G of an island. False if the rooms are too small: `Choices.count` says what is needed."""
+    """Prepare storage, pattern and G of an island. False if the storage is too small (sizes in O)."""
     size = F.places[:SIZE_COUNT]
     if F.places.shape[0] < SIZE_COUNT:
         O.count.ended, O.count.needed_places, O.count.needed_numbers = STORAGE_TOO_SMALL, 4096, 16384

@@ -1,6 +1,6 @@
-"""Contact islands: what contacts and lines connect, by union-find (`graphs`).
+"""Contact islands: sets of nodes and groups connected by contacts and lines, found by union-find (`graphs`).
 
-What stands still (`FIXED_SIDE`) connects nothing; nodes and groups do, also those that no impulse moves.
+Immovable sides (`FIXED_SIDE`) connect nothing; nodes and groups do, even those that no impulse moves.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from .contact_problem import FIXED_SIDE
 
 
 class Islands(NamedTuple):
-    """Contacts, lines, nodes and groups by island; islands in the order of their first contacts, then first lines."""
+    """Contacts, lines, nodes and groups sorted by island; islands in the order of their first contacts, then lines."""
 
-    parent: Int1  # (nn + ng,): forest over nodes, then groups; afterwards the island of each or -1
-    order: Int1  # (nc,): contact that stands at each place when those of an island stand together
-    island: Int1  # (ni + 1,): as in `Problem`; room for one more than there are contacts and lines
-    line_order: Int1  # (nl,): likewise of lines
+    parent: Int1  # (nn + ng,): forest over nodes, then groups; afterwards the island of each, or -1
+    order: Int1  # (nc,): contacts sorted by island
+    island: Int1  # (ni + 1,): as in `ContactProblem`; allocated for the largest possible number
+    line_order: Int1  # (nl,): lines sorted by island
     line_p: Int1  # (ni + 1,)
     member: Int1  # (nn,): nodes of islands; the rest of the array is not used
     member_p: Int1  # (ni + 1,)
@@ -32,20 +32,20 @@ class Islands(NamedTuple):
 
 @formula
 def side_vertex(at, nodes):
-    """A side's place among nodes and groups, or -1."""
+    """Vertex number of a side among nodes, then groups, or -1."""
     return at if at >= 0 else nodes - 2 - at if at < FIXED_SIDE else -1
 
 
 @formula
 def contact_vertex(at, c, nodes):
-    """Something that contact c acts on, -1 if nothing."""
+    """A vertex on which contact c acts, -1 if there is none."""
     a = side_vertex(at[c, 0], nodes)
     return a if a >= 0 else side_vertex(at[c, 1], nodes)
 
 
 @formula
 def number_islands(at, line_at, sizes, I):
-    """Number the islands in I.island (of each root, as -2 - island in ``parent``); returns how many there are."""
+    """Number the islands in ``parent`` (entry of each root: -2 - island); returns their count."""
     nc, nn, ng, nl = sizes
     for i in range(nn + ng):
         I.parent[i] = i
@@ -65,7 +65,7 @@ def number_islands(at, line_at, sizes, I):
 
 @formula
 def number_root(parent, a, count):
-    """Give the root of a, all paths being of length one, the next number if it has none; how many have one then."""
+    """Give the root of a the next number if it has none (all paths have length one); returns the new count."""
     if a < 0 or parent[a] < 0:
         return count
     r = parent[a]
@@ -77,8 +77,8 @@ def number_root(parent, a, count):
 
 @formula
 def label_vertices(I, n):
-    """From roots to islands: -1 for what nothing touches."""
-    # a root that was numbered holds -2 - island, all below it the root; roots lead what is larger only
+    """Convert roots to island numbers; -1 for vertices without contacts and lines."""
+    # a numbered root holds -2 - island, its members hold the root; a root precedes its members
     for i in range(n - 1, -1, -1):
         r = I.parent[i]
         if r >= 0:
@@ -88,7 +88,7 @@ def label_vertices(I, n):
 
 @formula
 def sort_contacts(at, nc, nn, count, I):
-    """Contacts by island, in the order that they had; those on nothing that moves come last, in no island."""
+    """Sort contacts by island, stable; those on nothing movable come last, in no island."""
     for k in range(count + 1):
         I.island[k] = 0
     for c in range(nc):
@@ -115,7 +115,7 @@ def sort_contacts(at, nc, nn, count, I):
 
 @formula
 def sort_vertices(first, count, number, parent, order, start):
-    """Numbers 0 to number - 1 by the island of ``parent[first + i]``, ascending; those of none are left out."""
+    """Sort 0 to number - 1 by the island ``parent[first + i]``, ascending; those without island are left out."""
     for k in range(count + 1):
         start[k] = 0
     for i in range(number):
@@ -136,7 +136,7 @@ def sort_vertices(first, count, number, parent, order, start):
 
 @formula
 def sort_lines(line_at, nl, nn, count, I):
-    """Lines by island, in the order that they had."""
+    """Sort lines by island, stable."""
     for k in range(count + 1):
         I.line_p[k] = 0
     for k in range(nl):
@@ -154,7 +154,7 @@ def sort_lines(line_at, nl, nn, count, I):
 
 @formula
 def find_islands(at, line_at, sizes, I):
-    """Find islands; see `islands_of`. Returns how many there are."""
+    """Find islands; see `islands_of`. Returns their count."""
     nc, nn, ng, nl = sizes
     count = number_islands(at, line_at, sizes, I)
     label_vertices(I, nn + ng)
@@ -172,7 +172,7 @@ def islands_kernel(at: Int2, line_at: Int2, sizes: Int1, I: Islands) -> int:
 
 
 def allocate_islands(contacts: int, nodes: int, groups: int, lines: int) -> Islands:
-    """Room for the islands of a problem."""
+    """Allocate the islands of a problem."""
     most = min(contacts + lines, nodes + groups) + 1
 
     def whole(n: int) -> np.ndarray:
@@ -192,20 +192,20 @@ def allocate_islands(contacts: int, nodes: int, groups: int, lines: int) -> Isla
 
 
 def islands_of(at: np.ndarray, line_at: np.ndarray, nodes: int, groups: int) -> tuple[int, Islands]:
-    """Islands of contacts and lines.
+    """Find the islands of contacts and lines.
 
     Parameters
     ----------
     at : ndarray (nc, 2)
-        Sides of contacts, as `Problem.at`.
+        Sides of contacts, as `ContactProblem.at`.
     line_at : ndarray (nl, 2)
-        As `Problem.line_at`.
+        As `ContactProblem.line_at`.
     nodes, groups : int
 
     Returns
     -------
     int
-        How many islands there are.
+        Number of islands.
     Islands
     """
     I = allocate_islands(len(at), nodes, groups, len(line_at))

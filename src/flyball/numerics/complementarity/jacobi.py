@@ -1,7 +1,7 @@
 """Projected Jacobi with mass splitting: all contacts at once, each against its own part of the bodies.
 
-A body of n contacts is treated as n bodies of an n-th of its mass (Tonge, Benevolenski and Voroshilov 2012): a
-step of diagonal block / n is then safe, whatever the problem, and the objective falls in every iteration. It
+A body with n contacts is treated as n bodies of an n-th of its mass (Tonge, Benevolenski and Voroshilov 2012). A
+step of diagonal block / n is then safe for every problem, and the objective decreases in every iteration. It
 converges slowly, and is the only solver here whose result does not depend on the order of contacts.
 """
 
@@ -35,7 +35,7 @@ from .packed_contacts import INVERSE_NN, SLIDING_STEP, SPHERE, SPHERE_INVERSE_N,
 
 @formula
 def count_contacts(P, W, O):
-    """How many contacts, and lines, each node and group has: in W.nodes[0, i, 0] and at W.wide[0, first of group]."""
+    """Count contacts and lines of each node (in W.nodes[0, i, 0]) and group (at W.wide[0, first of group])."""
     first, last = contact_range(P, O)
     start, end = line_range(P, O)
     for again in range(2):  # first zero, then count
@@ -53,7 +53,7 @@ def count_contacts(P, W, O):
 
 @formula
 def most_contacts_of_side(P, W, c):
-    """Most contacts of a side of contact c."""
+    """Larger contact count of the two sides of contact c."""
     n = 1.0
     for side in range(2):
         i = P.at[c, side]
@@ -66,7 +66,7 @@ def most_contacts_of_side(P, W, c):
 
 @formula
 def split_masses(P, W, O, many):
-    """Shorten the steps of all contacts and lines."""
+    """Shorten the steps of all contacts and lines by the counts."""
     count_contacts(P, W, O)
     for s in range(many[0] + many[1] + many[2] + many[3] + many[4]):
         at, n = packed_place(many, s), most_contacts_of_side(P, W, W.sides[s, 2])
@@ -88,7 +88,7 @@ def split_masses(P, W, O, many):
 def jacobi(
     P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
-    """Iterations until a step changes velocities by less than `ENOUGH`, at most `MOST`; how many there were."""
+    """Iterate until velocities change by less than O.real.enough, or O.count.most times. Returns iterations."""
     many = begin_iterations(P, X, W, O, False)
     split_masses(P, W, O, many)
     cur, new, used, O.count.ended = 0, 1, 0, LIMIT_REACHED

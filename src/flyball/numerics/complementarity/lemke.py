@@ -1,9 +1,9 @@
 """Lemke's pivoting for small linear complementarity problems, and for small pyramids of contacts.
 
 w = M z + q, w >= 0, z >= 0, w . z = 0 (Lemke 1965; Cottle, Pang and Stone 1992, algorithm 4.4.5). Ties are
-broken lexicographically, so that it cannot cycle. For copositive-plus M, as those of friction pyramids are
-(Stewart and Trinkle 1996), it finds a solution where there is one. Dense and in NumPy: a pivot costs the square
-of the size, and as a rule there are about as many pivots as unknowns.
+broken lexicographically, so that it cannot cycle. For copositive-plus M, as those of friction pyramids
+(Stewart and Trinkle 1996), it finds a solution if one exists. Dense and in NumPy: a pivot costs the square
+of the size, and the number of pivots is usually similar to that of unknowns.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from ...errors import AnalysisError
 from .contact_operator import apply_contact_impulse, apply_line_impulse, contact_velocity, line_velocity
 from .contact_problem import LINE_BIAS, LINE_SOFT, ContactProblem, ContactState
 
-MAX_UNKNOWNS = 2000  # unknowns: seconds
-PIVOT_TOLERANCE = 1e-11  # of the largest entry of the column: no pivot
+MAX_UNKNOWNS = 2000  # maximum number of unknowns: takes seconds
+PIVOT_TOLERANCE = 1e-11  # relative to the largest entry of the column; smaller pivots count as zero
 
 
 def lemke(M: np.ndarray, q: np.ndarray, pivots: int = 0) -> np.ndarray:
-    """A z with w = M z + q, w >= 0, z >= 0, w . z = 0.
+    """Find z with w = M z + q, w >= 0, z >= 0, w . z = 0.
 
     Parameters
     ----------
     M : ndarray (n, n)
     q : ndarray (n,)
     pivots : int
-        At most that many; 50 n if 0.
+        Maximum number of pivots; 50 n if 0.
 
     Returns
     -------
@@ -35,8 +35,8 @@ def lemke(M: np.ndarray, q: np.ndarray, pivots: int = 0) -> np.ndarray:
     Raises
     ------
     AnalysisError
-        If it ends on a ray: for copositive-plus M there is no solution then. If there are more than 2000 unknowns, or
-        pivots run out.
+        If pivoting ends on a ray: for copositive-plus M there is no solution then. If there are more than 2000
+        unknowns, or the maximum number of pivots is reached.
     """
     n = len(q)
     if n > MAX_UNKNOWNS:
@@ -61,14 +61,14 @@ def lemke(M: np.ndarray, q: np.ndarray, pivots: int = 0) -> np.ndarray:
         held = np.flatnonzero(basis[rows] == 2 * n)
         ratios = T[rows, -1] / column[rows]
         if held.size and ratios[held[0]] <= ratios.min() * (1 + 1e-12) + 1e-300:
-            row = int(rows[held[0]])  # z0 may leave: done
+            row = int(rows[held[0]])  # z0 may leave: solved
         else:
             row = _lexicographic_row(T, rows, column, n)
     raise AnalysisError(f"pivoting found no solution in {pivots or 50 * n + 50} pivots")
 
 
 def _lexicographic_row(T: np.ndarray, rows: np.ndarray, column: np.ndarray, n: int, start: bool = False) -> int:
-    """The row of the lexicographically least (q, inverse of the basis) / column: there is only one."""
+    """Row with the lexicographically smallest (q, inverse of the basis) / column; it is unique."""
     order = [-1, *range(n)]
     for k in order:
         if len(rows) == 1:
@@ -93,7 +93,7 @@ def _read_solution(T: np.ndarray, basis: np.ndarray, n: int) -> np.ndarray:
 
 
 def delassus(P: ContactProblem, X: ContactState) -> tuple[np.ndarray, np.ndarray]:
-    """N and b of a problem as dense arrays, impulses contact by contact, then lines; without rolling friction."""
+    """Compute N and b as dense arrays: impulses contact by contact, then lines; without rolling friction."""
     nc, nl = int(P.size[0]), int(P.size[3])
     v, wide = np.zeros_like(X.v), np.zeros_like(X.wide)
     N = np.zeros((3 * nc + nl, 3 * nc + nl))
@@ -116,21 +116,21 @@ def delassus(P: ContactProblem, X: ContactState) -> tuple[np.ndarray, np.ndarray
 
 
 def pyramid_by_lemke(P: ContactProblem, X: ContactState, directions: int = 8) -> None:
-    """Impulses of contacts with friction pyramids by pivoting, and the velocities with them, in X.
+    """Solve contacts with friction pyramids by pivoting; writes impulses and velocities to X.
 
     Parameters
     ----------
-    P : Problem
+    P : ContactProblem
         Contacts of nodes and groups, without lines and rolling friction.
-    X : State
+    X : ContactState
         Velocities without impulses on entry.
     directions : int
-        Edges of a pyramid, at least three.
+        Number of edges of a pyramid, at least three.
 
     Raises
     ------
     AnalysisError
-        If there are lines, rolling friction, or fewer than three directions; as `lemke`.
+        If there are lines, rolling friction, or fewer than three directions; also as `lemke`.
     """
     nc = int(P.size[0])
     if P.size[3] or len(P.turn) or directions < 3:
@@ -147,7 +147,7 @@ def pyramid_by_lemke(P: ContactProblem, X: ContactState, directions: int = 8) ->
     bound = -E.T
     bound[:, :nc] = np.diag(P.mu[:nc])
     M = np.block([[G.T @ N @ G, E], [bound, np.zeros((nc, nc))]])
-    size = np.trace(N) / len(N)  # velocities and impulses of one size
+    size = np.trace(N) / len(N)  # scales velocities and impulses to one size
     z = lemke(
         np.block([[M[:-nc, :-nc] / size, E], [bound, np.zeros((nc, nc))]]), np.concatenate([G.T @ b, np.zeros(nc)])
     )

@@ -1,13 +1,12 @@
 """Newton's method on velocities with the method of multipliers.
 
-It is of second order, for few bodies and any ratio of masses. The contact problem is the limit of ones with a
-compliance R, min 1/2 |e|^2 + sum of envelopes (`proximal_rows`), a convex function once differentiable,
-piecewise smooth: Newton's method with the exact Hessian of the piece at hand, factored in 6 x 6 blocks, and an
-exact line search along the step ends in few steps (Todorov 2014; Castro et al. 2022 in velocities with finite
-compliance). Impulses then become the multipliers (p0 = p, the method of multipliers: Rockafellar 1976), so that
-contact is hard however large R is, and a warm start that is right costs no factor at all. R falls as the
-multipliers get closer. Coulomb's law: De Saxce's addition mu |u_t| to the normal velocity is renewed with the
-multipliers (Cadoux 2009).
+It is of second order, for few bodies and any ratio of masses. The contact problem is the limit of problems with a
+compliance R, min 1/2 |e|^2 + sum of envelopes (`proximal_rows`). This function is convex, once differentiable and
+piecewise smooth. Newton's method with the exact Hessian of the current piece, factored in 6 x 6 blocks, and an
+exact line search along the step converges in few steps (Todorov 2014; Castro et al. 2022 in velocities with finite
+compliance). The impulses then become the multipliers (p0 = p, the method of multipliers: Rockafellar 1976), so that
+contact is hard for any R, and an exact warm start needs no factorisation. R decreases as the multipliers converge.
+Coulomb's law: De Saxce's term mu |u_t| of the normal velocity is updated with the multipliers (Cadoux 2009).
 """
 
 from __future__ import annotations
@@ -63,23 +62,23 @@ from .proximal_rows import (
     write_back_rows,
 )
 
-# compliance, in parts of the mobility: far from the solution, near it, the least
-MAX_RHO, SMALL_RHO, MIN_RHO, FRICTIONLESS_RHO = 0.1, 1e-3, 1e-9, 1e-6  # FLAT: without friction
+# compliance relative to the mobility: far from the solution, near it, minimum, without friction
+MAX_RHO, SMALL_RHO, MIN_RHO, FRICTIONLESS_RHO = 0.1, 1e-3, 1e-9, 1e-6  # bounds of R / mobility
 RHO_DECREASE, RHO_DECREASE_NEAR, NEAR_RESIDUAL = (
     0.1,
     0.01,
     1e-3,
-)  # where impulses come closer slowly; residual over velocities that is near
-RHO_INCREASE = 3.0  # of the compliance where Newton's method on the law itself does not come closer
+)  # factors of R when impulses converge slowly, far and near; residual over velocities that is near
+RHO_INCREASE = 3.0  # factor of the compliance when Newton's method on Coulomb's law fails
 RHO_MARGIN, MAX_STEPS_AT_RHO = 1.0, 12  # see `next_rho`; steps at one compliance, after which it was too small
-SLOW_CHANGE = 0.05  # change of impulses over the one before, from which on the compliance falls
-LINE_SEARCH_TOLERANCE = 0.1  # what is left of the slope along a step when its length is right
+SLOW_CHANGE = 0.05  # ratio of successive changes of impulses above which the compliance decreases
+LINE_SEARCH_TOLERANCE = 0.1  # remaining part of the slope along a step at which the line search ends
 MAX_LINE_SEARCHES, MAX_HALVINGS = 30, 4
 
 
 @formula
 def newton_direction(R, symmetric):
-    """Step from the gradient; its e . step, |step|^2 and gradient . step. False if the matrix could not be factored."""
+    """Compute the Newton step, its e . step, |step|^2 and gradient . step. First value False if factoring failed."""
     n = R.size[BLOCKS]
     b, g, s = R.blocks, 6 * n, 12 * n
     assemble_hessian(R, symmetric)
@@ -99,7 +98,7 @@ def newton_direction(R, symmetric):
 
 @formula
 def exact_line_search(R, first, second, down):
-    """How much of a step makes the objective least along it: the slope is continuous, rising and piecewise smooth."""
+    """Find the part of a step with minimum objective; the slope is continuous, increasing and piecewise smooth."""
     low, high, a = 0.0, 1e300, 1.0
     at_low, at_high = down, 0.0
     for _ in range(MAX_LINE_SEARCHES):
@@ -145,7 +144,7 @@ def gradient_square(R, a):
 
 @formula
 def halved_step_length(R):
-    """How much of a step leaves less of what is to vanish, where that is no gradient; 0 if nothing does."""
+    """Find a part of a step that reduces the equations' residual, if it is no gradient; 0 if none does."""
     n = 6 * R.size[BLOCKS]
     now, a = 0.0, 1.0
     for k in range(n):
@@ -159,10 +158,11 @@ def halved_step_length(R):
 
 @formula
 def take_step(R, a):
-    """e and the scaled y move by the part a of the step.
+    """Move e and the scaled y by the part a of the step.
 
-    y is not found anew from e: velocities are differences of large numbers where a heavy body stands on light ones, and
-    their rounding over R would be seen in every impulse; in this way it is only once, and solved for.
+    y is not recomputed from e: if a heavy body stands on light ones, velocities are differences of large numbers, and
+    their rounding divided by R would affect every impulse. Updated in this way, the rounding enters once and is
+    corrected.
     """
     x, n = R.row, 6 * R.size[BLOCKS]
     for k in range(n):
@@ -175,9 +175,9 @@ def take_step(R, a):
 
 @formula
 def convergence_measures(R, coulomb):
-    """Of the impulses at y: residuals, velocity that is still to come of the gradient, compliance times change [m/s].
+    """Measures for the impulses at y: residuals, velocity error of the gradient, compliance times change [m/s].
 
-    The velocities that these impulses make are left in column OWN of the rows.
+    Writes the velocities that these impulses cause to column ROW_VELOCITY of the rows.
     """
     x, g = R.row, 6 * R.size[BLOCKS]
     near, change = 0.0, 0.0
@@ -200,7 +200,7 @@ def convergence_measures(R, coulomb):
 
 @formula
 def update_multipliers(R, coulomb):
-    """Hold on to the impulses at y."""
+    """Set the multipliers to the impulses at y."""
     x, n = R.row, 6 * R.size[BLOCKS]
     for row in range(R.size[ROWS]):
         o = ROW_NUMBERS * row
@@ -216,7 +216,7 @@ def update_multipliers(R, coulomb):
 
 @formula
 def iterate_newton(R, O, coulomb, law, steps):
-    """Newton steps at what is held on to: (how it ended, residual, change of what is held on to, steps)."""
+    """Take Newton steps at fixed multipliers: (outcome, residual, change of the multipliers, steps)."""
     enough, last = O.real.enough, steps + MAX_STEPS_AT_RHO
     while True:
         set_impulses(R)
@@ -242,7 +242,7 @@ def iterate_newton(R, O, coulomb, law, steps):
 
 @formula
 def largest_velocity(R):
-    """The largest velocity without impulses, or of an impulse that is held on to, by itself [m/s]."""
+    """Largest velocity without impulses, or caused by a multiplier in its own row [m/s]."""
     s = 0.0
     for row in range(R.size[ROWS]):
         o = ROW_NUMBERS * row
@@ -253,7 +253,7 @@ def largest_velocity(R):
 
 @formula
 def has_friction(R):
-    """Whether there is friction anywhere; without it all pieces are flat, and a small compliance is as easy as any."""
+    """Whether any contact has friction; otherwise the problem is piecewise quadratic, for any compliance."""
     f = 0.0
     for row in range(R.size[CONTACTS]):
         f = max(f, R.row[ROW_NUMBERS * row + FRICTION])
@@ -263,7 +263,7 @@ def has_friction(R):
 @formula
 def next_rho(rho, slow, near):
     """Compliance of the next problem; ``near``: residual over the largest velocity."""
-    if slow:  # but not so small that a velocity as large as the residual moves impulses by as much as they are
+    if slow:  # lower bound: a velocity as large as the residual must not change impulses by 100 %
         rho = max(
             (RHO_DECREASE if near > NEAR_RESIDUAL else RHO_DECREASE_NEAR) * rho, min(rho, RHO_MARGIN * near), MIN_RHO
         )
@@ -272,9 +272,9 @@ def next_rho(rho, slow, near):
 
 @formula
 def iterate_multipliers(R, O, coulomb, worst):
-    """Impulses within `ENOUGH`, held on to. Returns how it ended and the residual.
+    """Iterate the multipliers to the tolerance. Returns the outcome and the residual.
 
-    Coulomb's law by turns: convex problems with De Saxce's additions held on to, and Newton's method on the law itself.
+    Coulomb's law alternates convex problems with fixed De Saxce terms, and Newton's method on the law itself.
     """
     steps, before, law, best, force = 0, 1e300, False, 1e300, 0.0
     rho = min(max(worst / largest_velocity(R), SMALL_RHO), MAX_RHO) if has_friction(R) else FRICTIONLESS_RHO
@@ -288,7 +288,7 @@ def iterate_multipliers(R, O, coulomb, worst):
         O.count.used = steps
         if law:
             set_kind(R, COULOMB_CONTACT, CONTACT)
-            if ended != CONVERGED or not worst < best:  # it has not come closer: on as before it
+            if ended != CONVERGED or not worst < best:  # no improvement: continue from the state before
                 if ended == LIMIT_REACHED:
                     O.real.force_residual = force
                     return LIMIT_REACHED, best
@@ -337,9 +337,9 @@ def newton_solve(P, X, O, F):
 def newton(
     P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: FactorStorage, task: int
 ) -> int:
-    """Newton's method; returns factorisations.
+    """Newton's method; returns the number of factorisations.
 
-    In `Choices.count[ENDED]` SMALL: enlarge `FactorStorage`, call again; BROKEN: not finite, or the convex form with rolling
-    friction, which it does not take. Then nothing was changed.
+    Outcomes in O.count.ended: STORAGE_TOO_SMALL: enlarge `FactorStorage` and call again; SOLVE_FAILED: not finite, or
+    the convex form with rolling friction, which is not supported. In both cases nothing was changed.
     """
     return newton_solve(P, X, O, F)

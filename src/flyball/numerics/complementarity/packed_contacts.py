@@ -1,13 +1,12 @@
-"""Contacts packed in visiting order, all numbers of each in one place, and their local updates.
+"""Contacts packed in visiting order, all numbers of each together, and their local updates.
 
-Contacts of one kind stand together, the kinds with the least work first: spheres without friction, spheres,
-others without friction, others with friction, and general ones (groups, rolling friction). Within a kind,
-contacts that follow each other are taken from distant places of the list, so that they share no body and the
-processor works at several of them at once.
+Contacts are grouped by kind, the kinds with the least work first: spheres without friction, spheres, others without
+friction, others with friction, and general ones (groups, rolling friction). Within a kind, successive contacts are
+taken from distant places of the list, so that they share no body and the processor works on several at once.
 
-A local update returns the largest change of a velocity that its new impulse made [m/s]. The law is Coulomb's:
-the normal impulse first, then the tangential one within mu times that. In the convex form (``coulomb`` 0) the
-impulse is the point of the cone nearest to a step, in the metric of the diagonal block.
+A local update returns the largest change of a velocity that its new impulse causes [m/s]. With Coulomb's law the
+normal impulse is found first, then the tangential one within mu times that. In the convex form (``coulomb`` 0) the
+impulse after a step is projected on the cone, in the metric of the diagonal block.
 """
 
 from __future__ import annotations
@@ -20,14 +19,14 @@ from .contact_operator import angular_response, apply_contact_impulse, apply_tor
 from .contact_problem import FIXED_SIDE, IS_ISOTROPIC
 
 SMOOTH_SPHERE, SPHERE, FRICTIONLESS, FRICTIONAL, GENERAL, CONTACT_KINDS = range(6)
-SPHERE_WIDTH, FRICTIONLESS_WIDTH = 16, 20  # numbers of a contact; the rest have 32
+SPHERE_WIDTH, FRICTIONLESS_WIDTH = 16, 20  # numbers per contact; other kinds have 32
 INTERLEAVED_STREAMS = 4
 PARALLEL_TOLERANCE = (
-    1e-20  # square of the sine below which an arm is along the normal: poses far from the origin are rounded
+    1e-20  # largest squared sine of the angle between an arm and the normal; poses far from the origin are rounded
 )
-# columns of Scratch.own
+# columns of ContactWorkspace.own
 INVERSE_MASS_COLUMN, MEAN_INERTIA_COLUMN = 6, 7  # 1/m, mean of the block's diagonal
-# where a ball's numbers stand
+# places of the numbers of a sphere contact
 (
     SPHERE_ARM1,
     SPHERE_ARM2,
@@ -41,7 +40,7 @@ INVERSE_MASS_COLUMN, MEAN_INERTIA_COLUMN = 6, 7  # 1/m, mean of the block's diag
     SPHERE_TANGENT,
     SPHERE_LEAST,
 ) = 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 15
-# of a smooth contact: normal, torques of a unit impulse on both sides, what they turn by
+# of a frictionless contact: normal, torques of a unit impulse on both sides, angular velocities they cause
 (
     UNIT_TORQUE1,
     UNIT_TORQUE2,
@@ -53,14 +52,14 @@ INVERSE_MASS_COLUMN, MEAN_INERTIA_COLUMN = 6, 7  # 1/m, mean of the block's diag
     FRICTIONLESS_NORMAL,
     FRICTIONLESS_LEAST,
 ) = 3, 6, 9, 12, 15, 16, 17, 18, 19
-# of a rough one: frame, arms, bias; what `local_step_sizes` says; impulse
+# of a frictional contact: frame, arms, bias; results of `local_step_sizes`; impulse
 ARM1, ARM2, BIAS, SOFT, INVERSE_NN, NS, NT = 9, 12, 15, 18, 19, 20, 21
 ISS, IST, ITT, SLIDING_STEP, METRIC_RATIO, MU, IMPULSE, LEAST_NORMAL = 22, 23, 24, 25, 26, 27, 28, 31
 
 
 @formula
 def copy_nodes(P, X, W, nodes):
-    """Velocities of the nodes ``member[first:last]`` and what each weighs into their own rooms."""
+    """Copy velocities and inverse masses of the nodes ``member[first:last]`` to the workspace."""
     for e in range(nodes[0], nodes[1]):
         i = P.member[e]
         for k in range(6):
@@ -75,7 +74,7 @@ def copy_nodes(P, X, W, nodes):
 
 @formula
 def arm_along_normal(P, c, side):
-    """Whether the arm is along the normal, and its length in that direction."""
+    """Whether the arm is parallel to the normal, and its length along the normal."""
     a, b, d = P.arm[c, 3 * side], P.arm[c, 3 * side + 1], P.arm[c, 3 * side + 2]
     x, y, z = P.frame[c, 0], P.frame[c, 1], P.frame[c, 2]
     r = a * x + b * y + d * z
@@ -85,8 +84,9 @@ def arm_along_normal(P, c, side):
 
 @formula
 def contact_kind(P, W, c, friction_level):
-    """What is to be done for a contact, the arms of balls in W.rows[0]; ``friction_level``: 1 if none is taken
-    as smooth, 2 if none as one of balls either.
+    """Kind of a contact; writes the arms of spheres to W.rows[0].
+
+    ``friction_level``: 1: no contact counts as frictionless; 2: no contact counts as one of spheres either.
     """
     i, j = P.at[c, 0], P.at[c, 1]
     if i < FIXED_SIDE or j < FIXED_SIDE or P.turn.shape[0] > 0:
@@ -112,7 +112,7 @@ def contact_kind(P, W, c, friction_level):
 
 @formula
 def packed_width(kind):
-    """Numbers of a contact of a kind."""
+    """Number of packed numbers of a contact of this kind."""
     if kind == SMOOTH_SPHERE or kind == SPHERE:
         return SPHERE_WIDTH
     return FRICTIONLESS_WIDTH if kind == FRICTIONLESS else 32
@@ -120,7 +120,7 @@ def packed_width(kind):
 
 @formula
 def interleaved_place(e, m):
-    """Where the e-th of m stands in a sweep."""
+    """Place of the e-th of m contacts in a sweep."""
     q = m // INTERLEAVED_STREAMS
     if e < q * INTERLEAVED_STREAMS:
         return (e % q) * INTERLEAVED_STREAMS + e // q
@@ -129,7 +129,7 @@ def interleaved_place(e, m):
 
 @formula
 def pack_sphere(P, X, W, c, place):
-    """A contact of balls."""
+    """Pack a contact of spheres."""
     k, i, j, r1, r2 = W.packed, P.at[c, 0], P.at[c, 1], W.rows[0, c, 1], -W.rows[0, c, 2]
     dn, dt, p, q = 0.0, 0.0, X.p[c, 1], X.p[c, 2]
     for s in range(3):
@@ -150,7 +150,7 @@ def pack_sphere(P, X, W, c, place):
 
 @formula
 def pack_frictionless(P, W, c, place):
-    """A contact without friction between any nodes."""
+    """Pack a contact without friction between any nodes."""
     k, n = W.packed, frame_axis(P, c, 0)
     d = P.soft[c]
     for side in range(2):
@@ -171,7 +171,7 @@ def pack_frictionless(P, W, c, place):
 
 @formula
 def pack_frictional(P, coulomb, W, c, place):
-    """A contact with friction of any kind."""
+    """Pack a contact with friction, of nodes or groups."""
     k, D = W.packed, diagonal_block(P, c)
     for s in range(9):
         k[place + s] = P.frame[c, s]
@@ -189,9 +189,9 @@ def pack_frictional(P, coulomb, W, c, place):
 
 @formula
 def local_step_sizes(D, soft, coulomb):
-    """Inverse of nn, ns, nt, the inverse of the tangential block, a step of one size for it, its ratio to nn.
+    """Inverse of nn, ns, nt, the inverse of the tangential block, a common tangential step, its ratio to nn.
 
-    For the convex form (``coulomb`` 0) those of a diagonal block that is nowhere less than D: with c = |(ns, nt)| and l
+    For the convex form (``coulomb`` 0) of a diagonal matrix that bounds D from above: with c = |(ns, nt)| and l
     the larger eigenvalue of the tangential block, D <= (1 + c / sqrt(nn l)) diag(nn, l, l).
     """
     nn, ns, nt, ss, st, tt = D[0] + soft, D[1], D[2], D[3], D[4], D[5]
@@ -205,14 +205,14 @@ def local_step_sizes(D, soft, coulomb):
         more = 1.0 + sqrt((ns * ns + nt * nt) / (nn * most))
         return 1.0 / (more * nn), ns, nt, 0.0, 0.0, 0.0, 1.0 / (more * most), most / nn
     det = ss * tt - st * st
-    if det <= 1e-12 * most * most:  # one direction only in which it can slide
+    if det <= 1e-12 * most * most:  # sliding is possible in one direction only
         det, ss, st, tt = most * most, tt, -st, ss
     return 1.0 / nn, ns, nt, tt / det, -st / det, ss / det, 1.0 / most, most / nn
 
 
 @formula
 def count_contact_kinds(P, W, first, last, friction_level):
-    """How many contacts there are of each kind; the kind of each is left in W.rows[0, c, 0]."""
+    """Count the contacts of each kind; writes the kind of each to W.rows[0, c, 0]."""
     a, b, d, e, f = 0, 0, 0, 0, 0
     for c in range(first, last):
         kind = contact_kind(P, W, c, friction_level)
@@ -232,7 +232,7 @@ def count_contact_kinds(P, W, first, last, friction_level):
 
 @formula
 def pack_contacts(P, X, W, coulomb, first, many):
-    """Put contacts in their order, and their impulses on the velocities in W.own and X.wide."""
+    """Pack contacts in visiting order, and apply their impulses to the velocities in W.own and X.wide."""
     begin, at = 0, 0  # first visit and first number of a kind
     last = first + many[0] + many[1] + many[2] + many[3] + many[4]
     for kind in range(CONTACT_KINDS):
@@ -247,7 +247,7 @@ def pack_contacts(P, X, W, coulomb, first, many):
 
 @formula
 def make_admissible(P, X, c):
-    """Make an impulse to start from one of the cone: where it presses less, or not, its friction is less."""
+    """Make the initial impulse admissible: nonnegative normal part, friction reduced to its cone."""
     n = X.p[c, 0] if X.p[c, 0] > 0.0 else 0.0  # nan too
     n = max(n, least_normal_impulse(P, c))
     a, b = X.p[c, 1], X.p[c, 2]
@@ -263,7 +263,7 @@ def make_admissible(P, X, c):
 
 @formula
 def pack_contact(P, X, W, coulomb, c, kind, visit, place):
-    """One contact, with its impulse acting."""
+    """Pack one contact, and apply its impulse."""
     i, j = P.at[c, 0], P.at[c, 1]
     i, j = i if i >= 0 else P.size[1], j if j >= 0 else P.size[1]
     W.sides[visit, 0], W.sides[visit, 1], W.sides[visit, 2] = i, j, c
@@ -303,7 +303,7 @@ def pack_contact(P, X, W, coulomb, c, kind, visit, place):
 
 @formula
 def apply_sphere_impulse(k, v, i, j, at, p):
-    """What an impulse of a contact of balls does: normal part, tangential vector in the world."""
+    """Apply an impulse of a contact of spheres: normal part, tangential vector in world axes."""
     x, y, z, r1, r2 = k[at], k[at + 1], k[at + 2], k[at + SPHERE_ARM1], k[at + SPHERE_ARM2]
     n, a, b, c = p
     e, f, g = y * c - z * b, z * a - x * c, x * b - y * a  # n x tangential
@@ -326,7 +326,7 @@ def apply_sphere_impulse(k, v, i, j, at, p):
 
 @formula
 def limit_friction(n, r, mu, ratio, coulomb, least):
-    """Normal impulse and the part of the tangential one that is kept, of a step to (n, r): see above."""
+    """Limit a step to (n, r): normal impulse, and the factor of the tangential one; see the module docstring."""
     near = n if n > least else least
     if r <= mu * near:
         return near, 1.0
@@ -338,7 +338,7 @@ def limit_friction(n, r, mu, ratio, coulomb, least):
 
 @formula
 def update_smooth_sphere(k, v, i, j, at):
-    """Balls without friction: only velocities along the normal change."""
+    """Update a contact of spheres without friction: only velocities along the normal change."""
     x, y, z, p = k[at], k[at + 1], k[at + 2], k[at + SPHERE_NORMAL]
     u = x * (v[j, 0] - v[i, 0]) + y * (v[j, 1] - v[i, 1]) + z * (v[j, 2] - v[i, 2])
     q = p - (u + k[at + SPHERE_BIAS] + k[at + SPHERE_SOFT] * p) * k[at + SPHERE_INVERSE_N]
@@ -359,7 +359,7 @@ def update_smooth_sphere(k, v, i, j, at):
 
 @formula
 def frictionless_velocity(k, v, i, j, at):
-    """Normal velocity of any nodes."""
+    """Normal velocity of a frictionless contact, without bias."""
     u = k[at] * (v[j, 0] - v[i, 0]) + k[at + 1] * (v[j, 1] - v[i, 1]) + k[at + 2] * (v[j, 2] - v[i, 2])
     u += k[at + UNIT_TORQUE2] * v[j, 3] + k[at + UNIT_TORQUE2 + 1] * v[j, 4] + k[at + UNIT_TORQUE2 + 2] * v[j, 5]
     return u - (
@@ -369,7 +369,7 @@ def frictionless_velocity(k, v, i, j, at):
 
 @formula
 def update_frictionless(k, v, i, j, at):
-    """Any nodes without friction."""
+    """Update a frictionless contact of any nodes."""
     x, y, z, p = k[at], k[at + 1], k[at + 2], k[at + FRICTIONLESS_NORMAL]
     u = frictionless_velocity(k, v, i, j, at)
     q = p - (u + k[at + FRICTIONLESS_BIAS] + k[at + FRICTIONLESS_SOFT] * p) * k[at + FRICTIONLESS_INVERSE]
@@ -396,18 +396,18 @@ def update_frictionless(k, v, i, j, at):
 
 @formula
 def sphere_sliding_velocity(k, v, i, j, at, d):
-    """Tangential velocity in the world of balls, d: that of their centres and its normal part."""
+    """Tangential velocity of spheres in world axes; d: relative velocity of the centres and its normal part."""
     x, y, z, r1, r2 = k[at], k[at + 1], k[at + 2], k[at + SPHERE_ARM1], k[at + SPHERE_ARM2]
     e, f, g = r2 * v[j, 3], r2 * v[j, 4], r2 * v[j, 5]
     e, f, g = e + r1 * v[i, 3], f + r1 * v[i, 4], g + r1 * v[i, 5]
-    # u = v2 - v1 - (r2 w2 + r1 w1) x n, less its normal part
+    # u = v2 - v1 - (r2 w2 + r1 w1) x n, minus its normal part
     a, b, c, n = d
     return a - n * x - (f * z - g * y), b - n * y - (g * x - e * z), c - n * z - (e * y - f * x)
 
 
 @formula
 def update_sphere(k, v, i, j, at, coulomb):
-    """Balls: the tangential impulse is a vector in the world, and no block couples it with the normal one."""
+    """Update a contact of spheres: the tangential impulse is a vector in world axes, uncoupled from the normal one."""
     a, b, c, p = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2], k[at + SPHERE_NORMAL]
     un = k[at] * a + k[at + 1] * b + k[at + 2] * c
     n = p - (un + k[at + SPHERE_BIAS] + k[at + SPHERE_SOFT] * p) * k[at + SPHERE_INVERSE_N]
@@ -433,7 +433,7 @@ def update_sphere(k, v, i, j, at, coulomb):
 
 @formula
 def packed_point_velocity(k, v, i, at):
-    """Velocity of a point of node i whose arm stands at ``at``."""
+    """Velocity of the point of node i whose arm is packed at ``at``."""
     a, b, c = k[at], k[at + 1], k[at + 2]
     e, f, g = v[i, 3], v[i, 4], v[i, 5]
     return v[i, 0] + f * c - g * b, v[i, 1] + g * a - e * c, v[i, 2] + e * b - f * a
@@ -441,7 +441,7 @@ def packed_point_velocity(k, v, i, at):
 
 @formula
 def frictional_velocity(k, v, i, j, at):
-    """Velocity of a rough contact along its frame, without bias."""
+    """Velocity of a frictional contact along its frame, without bias."""
     a, b, c = packed_point_velocity(k, v, j, at + ARM2)
     e, f, g = packed_point_velocity(k, v, i, at + ARM1)
     a, b, c = a - e, b - f, c - g
@@ -454,7 +454,7 @@ def frictional_velocity(k, v, i, j, at):
 
 @formula
 def apply_point_impulse(k, v, B, i, at, x, y, z):
-    """What an impulse at that point does to node i."""
+    """Apply an impulse at that point to node i."""
     a, b, c, m = k[at], k[at + 1], k[at + 2], v[i, INVERSE_MASS_COLUMN]
     e, f, g = b * z - c * y, c * x - a * z, a * y - b * x
     v[i, 0] += m * x
@@ -467,7 +467,7 @@ def apply_point_impulse(k, v, B, i, at, x, y, z):
 
 @formula
 def local_impulse(k, at, u, coulomb):
-    """The new impulse of a rough contact at velocities u without bias; what it was is still there."""
+    """New impulse of a frictional contact at velocities u without bias; the old impulse is still in k."""
     p, s, t = k[at + IMPULSE], k[at + IMPULSE + 1], k[at + IMPULSE + 2]
     n = p - (u[0] + k[at + BIAS] + k[at + SOFT] * p) * k[at + INVERSE_NN]
     us, ut = u[1] + k[at + BIAS + 1], u[2] + k[at + BIAS + 2]
@@ -479,7 +479,7 @@ def local_impulse(k, at, u, coulomb):
         b = t - (k[at + IST] * us + k[at + ITT] * ut)
         if a * a + b * b <= k[at + MU] * k[at + MU] * n * n:
             return n, a, b
-    # it slides: only a step of one size in all directions ends with friction against the velocity
+    # sliding: only an equal step in all directions converges to friction opposite to the velocity
     a, b = s - k[at + SLIDING_STEP] * us, t - k[at + SLIDING_STEP] * ut
     q, part = limit_friction(n, sqrt(a * a + b * b), k[at + MU], k[at + METRIC_RATIO], coulomb, k[at + LEAST_NORMAL])
     return q, part * a, part * b
@@ -487,7 +487,7 @@ def local_impulse(k, at, u, coulomb):
 
 @formula
 def update_frictional(k, v, B, i, j, at, coulomb):
-    """Any nodes."""
+    """Update a frictional contact of any nodes."""
     u = frictional_velocity(k, v, i, j, at)
     n, s, t = local_impulse(k, at, u, coulomb)
     dn, ds, dt = n - k[at + IMPULSE], s - k[at + IMPULSE + 1], t - k[at + IMPULSE + 2]

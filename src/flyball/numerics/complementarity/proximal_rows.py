@@ -1,14 +1,14 @@
 """The smoothed contact objective of Newton and ADMM: proximal maps of rows, gradient, Hessian, residual.
 
-What is minimised over the velocities e of an island is 1/2 |e|^2 + sum of the rows' envelopes. An envelope is
-that of the impulse nearest to y = p0 - u / R, u = u0 + G e (the augmented Lagrangian of the contact problem, p0
-the multipliers): its gradient is -p, so that at the minimum e = sum G' p, and p0 = p there is the solution
+The function that is minimised over the velocities e of an island is 1/2 |e|^2 + sum of the rows' envelopes. The
+envelope is that of the impulse nearest to y = p0 - u / R, u = u0 + G e (the augmented Lagrangian of the contact
+problem, p0 the multipliers). Its gradient is -p, so that at the minimum e = sum G' p, and p0 = p there is the solution
 without any compliance (Rockafellar 1976).
 
-A row's impulses p minimise R_n (p_n - y_n)^2 / 2 + R_t |p_t - y_t|^2 / 2: in the scaled impulses sqrt(R) p a
-plain projection on a scaled cone, |p_t| <= mu p_n, cut at p_n >= least; of a line, on an interval. The
-derivative of a projection is symmetric with eigenvalues in [0, 1] (Hiriart-Urruty 1982). Row numbers are filled
-from the problem and the state, and written back.
+A row's impulses p minimise R_n (p_n - y_n)^2 / 2 + R_t |p_t - y_t|^2 / 2. In the scaled impulses sqrt(R) p this is a
+projection on a scaled cone, |p_t| <= mu p_n, cut at p_n >= least; for a line, on an interval. The derivative of a
+projection is symmetric with eigenvalues in [0, 1] (Hiriart-Urruty 1982). Row data are filled from the problem and the
+state, and written back.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from .contact_operator import (
 from .contact_problem import LINE_BIAS, LINE_HIGH, LINE_LOW, LINE_SOFT
 from .island_rows import BEFORE_ROLLING, BLOCKS, CONTACTS, ROWS, row_subject
 
-# columns of Rows.row: velocities with bias and no impulse; scaled y; its change along a step; scaled impulse; impulse
-# that is held on to; room of solvers
+# columns of IslandRows.row: velocities with bias and no impulse; scaled y; its change along a step; scaled impulse;
+# multiplier (reference impulse); velocities of the row
 FREE_VELOCITY, SCALED_TARGET, TARGET_CHANGE, SCALED_IMPULSE, MULTIPLIER, ROW_VELOCITY = 0, 3, 6, 9, 12, 15
-# mean mobility; roots of R_n, R_t; scaled mu, least (or lowest), highest; R; compliance; De Saxce's addition; kind; mu
+# mean mobility; roots of R_n, R_t; scaled mu, lower bound, upper bound; R; compliance; De Saxce's term; kind; mu
 (
     MOBILITY,
     NORMAL_SCALE,
@@ -47,14 +47,14 @@ FREE_VELOCITY, SCALED_TARGET, TARGET_CHANGE, SCALED_IMPULSE, MULTIPLIER, ROW_VEL
     FRICTION,
 ) = range(21, 32)
 ROW_NUMBERS = 32
-# kinds; idle: nothing that it acts on moves; turning: within LEAST about the tangents, HIGHEST about the normal, which
-# are FRICTION and SLIP times the normal impulse of the contact
+# kinds; IDLE: all that it acts on is immovable; ROLLING: torques bounded by LOWEST about the tangents and by HIGHEST
+# about the normal, which are FRICTION and ADDED_VELOCITY times the normal impulse of the contact
 CONTACT, LINE, IDLE, COULOMB_CONTACT, ROLLING = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @formula
 def cone_derivative(mu, least, n, s, t):
-    """Of `project_on_cone_above`: nn, ns, nt, ss, st, tt, and sn, tn, here the same as ns and nt."""
+    """Derivative of `project_on_cone_above`: nn, ns, nt, ss, st, tt, and sn, tn, here equal to ns and nt."""
     r = sqrt(s * s + t * t)
     if r <= mu * n and n >= least:
         return 1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0
@@ -68,7 +68,7 @@ def cone_derivative(mu, least, n, s, t):
 
 @formula
 def disc_derivative(normal, bound, s, t, r):
-    """Derivative of the tangential part cut at a bound; ``normal``: what the bound changes by, along it."""
+    """Derivative of the tangential part cut at a bound; ``normal``: derivative of the bound by the normal part."""
     one = 1.0 if normal > 0.0 else 0.0
     if r <= bound:
         b = 1.0 if bound > 0.0 else 0.0
@@ -79,7 +79,7 @@ def disc_derivative(normal, bound, s, t, r):
 
 @formula
 def project_by_coulomb(mu, least, n, s, t):
-    """The normal part at least ``least``, then the tangential part within mu times that (Alart and Curnier 1991)."""
+    """Cut the normal part at ``least``, then the tangential part at mu times that (Alart and Curnier 1991)."""
     n = max(n, least)
     r = sqrt(s * s + t * t)
     a = 1.0 if r <= mu * n else mu * n / r
@@ -88,7 +88,7 @@ def project_by_coulomb(mu, least, n, s, t):
 
 @formula
 def coulomb_derivative(mu, least, n, s, t):
-    """Of `project_by_coulomb`, as `cone_derivative`; not symmetric where it slides."""
+    """Derivative of `project_by_coulomb`, as `cone_derivative`; not symmetric while sliding."""
     r = sqrt(s * s + t * t)
     if n > least:
         p = disc_derivative(mu, mu * n, s, t, r)
@@ -98,7 +98,7 @@ def coulomb_derivative(mu, least, n, s, t):
 
 @formula
 def nearest_impulse(x, o, n, s, t):
-    """Scaled impulse nearest to a scaled one, of the row that begins at o in x."""
+    """Admissible scaled impulse nearest to a scaled one, for the row that begins at o in x."""
     if x[o + KIND] == CONTACT:
         return project_on_cone_above(x[o + SCALED_MU], x[o + LOWEST], n, s, t)
     if x[o + KIND] == COULOMB_CONTACT:
@@ -127,13 +127,13 @@ def nearest_impulse_derivative(x, o, n, s, t):
 
 @formula
 def de_saxce_velocity(x, o):
-    """De Saxce's addition to the normal velocity, where it stands for Coulomb's law."""
+    """De Saxce's term of the normal velocity, if it represents Coulomb's law."""
     return x[o + ADDED_VELOCITY] if x[o + KIND] == CONTACT else 0.0
 
 
 @formula
 def set_kind(R, old, new):
-    """Contacts of one kind become another."""
+    """Change all rows of one kind to another."""
     for row in range(R.size[ROWS]):
         if R.row[ROW_NUMBERS * row + KIND] == old:
             R.row[ROW_NUMBERS * row + KIND] = new
@@ -141,7 +141,7 @@ def set_kind(R, old, new):
 
 @formula
 def set_metric(R, rho):
-    """R of every row: ``rho`` times its mobility, and its compliance in the normal direction."""
+    """Set R of every row: ``rho`` times its mobility, plus its compliance in the normal direction."""
     x = R.row
     for row in range(R.size[ROWS]):
         o = ROW_NUMBERS * row
@@ -155,12 +155,12 @@ def set_metric(R, rho):
         x[o + HIGHEST] *= x[o + NORMAL_SCALE] / old
 
 
-E, GRADIENT, STEP, SPARE = range(4)  # rows of Rows.blocks
+E, GRADIENT, STEP, SPARE = range(4)  # rows of IslandRows.blocks
 
 
 @formula
 def row_product(R, row, a):
-    """G x of a row; x begins at a in Rows.blocks."""
+    """G x of a row; x begins at a in IslandRows.blocks."""
     n, s, t = 0.0, 0.0, 0.0
     for e in range(R.entry_p[row], R.entry_p[row + 1]):
         o, b = 18 * e, a + 6 * R.block[e]
@@ -174,7 +174,7 @@ def row_product(R, row, a):
 
 @formula
 def add_impulse(R, row, a, n, s, t):
-    """Add G' p of a row to the vector that begins at a in Rows.blocks."""
+    """Add G' p of a row to the vector that begins at a in IslandRows.blocks."""
     for e in range(R.entry_p[row], R.entry_p[row + 1]):
         o, b = 18 * e, a + 6 * R.block[e]
         for k in range(6):
@@ -183,7 +183,7 @@ def add_impulse(R, row, a, n, s, t):
 
 @formula
 def velocities_of_multipliers(R):
-    """e of the impulses held on to."""
+    """Compute e from the multipliers."""
     for k in range(6 * R.size[BLOCKS]):
         R.blocks[k] = 0.0
     for row in range(R.size[ROWS]):
@@ -195,7 +195,7 @@ def velocities_of_multipliers(R):
 
 @formula
 def set_targets(R):
-    """Scaled y of every row at e."""
+    """Compute the scaled y of every row from e."""
     x = R.row
     for row in range(R.size[ROWS]):
         o = ROW_NUMBERS * row
@@ -210,7 +210,7 @@ def set_targets(R):
 
 @formula
 def set_impulses(R):
-    """Impulses of every row at y, and the gradient e - sum G' p."""
+    """Compute the impulses of every row at y, and the gradient e - sum G' p."""
     x, g = R.row, 6 * R.size[BLOCKS]
     for k in range(g):
         R.blocks[g + k] = R.blocks[k]
@@ -257,7 +257,7 @@ def add_row_to_matrix(R, row, W, symmetric):
 
 @formula
 def set_unit_matrix(R):
-    """The matrix 1."""
+    """Set the matrix to 1."""
     for k in range(R.L.shape[0]):
         R.L[k] = 0.0
     for k in range(R.D.shape[0]):
@@ -269,7 +269,7 @@ def set_unit_matrix(R):
 
 @formula
 def assemble_hessian(R, symmetric):
-    """1 + sum G' R^-1/2 (derivative) R^-1/2 G."""
+    """Assemble 1 + sum G' R^-1/2 (derivative) R^-1/2 G."""
     x = R.row
     set_unit_matrix(R)
     for row in range(R.size[ROWS]):
@@ -284,7 +284,7 @@ def assemble_hessian(R, symmetric):
 
 @formula
 def set_target_changes(R):
-    """Change of the scaled y of every row along the step."""
+    """Compute the change of the scaled y of every row along the step."""
     x, a = R.row, 12 * R.size[BLOCKS]
     for row in range(R.size[ROWS]):
         o = ROW_NUMBERS * row
@@ -295,7 +295,7 @@ def set_target_changes(R):
 
 @formula
 def slope_along_step(R, a, first, second):
-    """Derivative along the step at its part a; ``first`` and ``second``: e . step, |step|^2."""
+    """Derivative of the objective along the step at its part a; ``first``, ``second``: e . step, |step|^2."""
     x = R.row
     total = first + a * second
     for row in range(R.size[ROWS]):
@@ -310,7 +310,7 @@ def slope_along_step(R, a, first, second):
 
 @formula
 def island_span(P, O):
-    """First contact, the one after the last, and the same of lines, of the island that is meant."""
+    """First and end index of the contacts and of the lines of the selected island."""
     first, last = contact_range(P, O)
     line, end = line_range(P, O)
     return first, last, line, end
@@ -318,7 +318,7 @@ def island_span(P, O):
 
 @formula
 def row_mobility(R, row, kind):
-    """Mean of what the row's velocities change by for their own unit impulses."""
+    """Mean change of the row's velocities per own unit impulse."""
     s = 0.0
     for k in range(18 * R.entry_p[row], 18 * R.entry_p[row + 1]):
         s += R.G[k] * R.G[k]
@@ -327,7 +327,7 @@ def row_mobility(R, row, kind):
 
 @formula
 def fill_rows(P, X, R, span):
-    """Numbers of every row; impulses to begin with are those of the state, made admissible. Metric is 1."""
+    """Fill the data of every row; multipliers are the impulses of the state, made admissible. The metric is 1."""
     x = R.row
     for row in range(R.size[ROWS]):
         o = ROW_NUMBERS * row
@@ -351,7 +351,7 @@ def fill_rows(P, X, R, span):
 
 @formula
 def set_rolling_bounds(R, row, at):
-    """Bounds of rolling and spinning friction from the normal impulse in column ``at`` of the contact."""
+    """Set the bounds of rolling and spinning friction from the normal impulse in column ``at`` of the contact."""
     o, c = ROW_NUMBERS * row, ROW_NUMBERS * (row - R.size[BEFORE_ROLLING])
     n = R.row[c + at]
     if at == SCALED_IMPULSE:
@@ -362,7 +362,7 @@ def set_rolling_bounds(R, row, at):
 
 @formula
 def fill_rolling(P, X, x, o, c):
-    """Numbers of the rolling and spinning friction of a contact."""
+    """Fill the data of the rolling and spinning friction of a contact."""
     u = contact_angular_velocity(P, X.v, X.wide, c)
     for k in range(3):
         x[o + FREE_VELOCITY + k], x[o + MULTIPLIER + k] = u[k], X.torque[c, k]
@@ -373,7 +373,7 @@ def fill_rolling(P, X, x, o, c):
 
 @formula
 def fill_contact(P, X, x, o, c):
-    """Numbers of a contact."""
+    """Fill the data of a contact."""
     u = contact_velocity(P, X.v, X.wide, c)
     for k in range(3):
         x[o + FREE_VELOCITY + k] = u[k] + P.bias[c, k]
@@ -386,7 +386,7 @@ def fill_contact(P, X, x, o, c):
 
 @formula
 def fill_line(P, X, x, o, k):
-    """Numbers of a line."""
+    """Fill the data of a line."""
     x[o + FREE_VELOCITY], x[o + FREE_VELOCITY + 1], x[o + FREE_VELOCITY + 2] = (
         line_velocity(P, X.wide, k) + P.line_x[k, LINE_BIAS],
         0.0,
@@ -404,7 +404,7 @@ def fill_line(P, X, x, o, k):
 
 @formula
 def write_back_rows(P, X, R, span):
-    """Impulses held on to become the state's, and its velocities those with them."""
+    """Write the multipliers to the state as impulses, and apply them to its velocities."""
     for row in range(R.size[ROWS]):
         o = ROW_NUMBERS * row + MULTIPLIER
         p = R.row[o], R.row[o + 1], R.row[o + 2]
@@ -423,7 +423,7 @@ def write_back_rows(P, X, R, span):
 
 @formula
 def missing_impulse(x, o, n, s, t, u, v, w):
-    """How far the impulse (n, s, t) of a row with velocities u, v, w is from p = nearest(p - u / mobility)."""
+    """Distance of the impulse (n, s, t) of a row with velocities u, v, w from nearest(p - u / mobility)."""
     m, r = x[o + MOBILITY] + x[o + SOFTNESS], x[o + NORMAL_SCALE]
     u += x[o + SOFTNESS] * n
     if x[o + KIND] == CONTACT or x[o + KIND] == COULOMB_CONTACT:
@@ -437,10 +437,10 @@ def missing_impulse(x, o, n, s, t, u, v, w):
 
 @formula
 def added_velocity(R, row, coulomb):
-    """What is added to the normal velocity of a contact (velocities in column OWN), so that the cone makes the law.
+    """Term added to the normal velocity of a contact, so that the cone projection represents the law.
 
-    Coulomb's: mu |u_t| (De Saxce and Feng 1998). The convex form: of rolling and spinning, which are cut at bounds that
-    the normal impulse has, what makes them parts of its cone.
+    Coulomb's law: mu |u_t| (De Saxce and Feng 1998). Convex form: the terms of rolling and spinning friction, whose
+    bounds depend on the normal impulse, that make them parts of its cone. Velocities are in column ROW_VELOCITY.
     """
     x, o, o2 = R.row, ROW_NUMBERS * row + ROW_VELOCITY, ROW_NUMBERS * (row + R.size[BEFORE_ROLLING]) + ROW_VELOCITY
     if coulomb > 0.0:
@@ -455,10 +455,10 @@ def added_velocity(R, row, coulomb):
 
 @formula
 def rows_residual(R, coulomb):
-    """Residual [m/s] and force residual [1] of the impulses in column Q (scaled), velocities in column OWN.
+    """Residual [m/s] and force residual [1] of the scaled impulses, with the velocities in column ROW_VELOCITY.
 
-    The impulse that is lacking is a velocity by the row's mobility, and a number by the largest impulse; torques are
-    counted as the impulses that make as much energy.
+    The missing impulse is converted to a velocity by the row's mobility, and to a dimensionless number by the largest
+    impulse. Torques are converted to impulses of equal energy.
     """
     x, worst, lacking, largest = R.row, 0.0, 0.0, 0.0
     for row in range(R.size[ROWS]):
@@ -484,7 +484,7 @@ def rows_residual(R, coulomb):
 
 @formula
 def set_row_velocities(R):
-    """Velocities at e of every row into column OWN."""
+    """Compute the velocities of every row at e into column ROW_VELOCITY."""
     for row in range(R.size[ROWS]):
         o = ROW_NUMBERS * row
         u = row_product(R, row, 0)
@@ -503,7 +503,7 @@ def velocity_square(R):
 
 @formula
 def make_dissipative(R):
-    """Scale impulses so that they take energy: least 1/2 p' N p + b' p along them."""
+    """Scale the impulses to minimise 1/2 p' N p + b' p along them, so that they dissipate energy."""
     velocities_of_multipliers(R)
     square, linear = velocity_square(R), 0.0
     for row in range(R.size[ROWS]):
@@ -519,7 +519,7 @@ def make_dissipative(R):
 
 @formula
 def set_added_velocities(R, coulomb):
-    """What is added to normal velocities, and bounds of rolling and spinning, of what is held on to."""
+    """Set the terms added to normal velocities, and the bounds of rolling and spinning friction, at the multipliers."""
     for row in range(R.size[CONTACTS]):
         R.row[ROW_NUMBERS * row + ADDED_VELOCITY] = added_velocity(R, row, coulomb)
     for row in range(R.size[BEFORE_ROLLING], R.size[ROWS]):

@@ -1,8 +1,8 @@
-"""Contact solvers by name, and which solver takes which island: ``solver="auto"``.
+"""Contact solvers by name, and the choice of a solver for each island: ``solver="auto"``.
 
-Solvers are called by addresses, so that only those in use are compiled. Contacts of several islands are copied
-into arrays of their own where each island's stand together, those that sweeps take at the end as one. A new
-solver is a file with a kernel, and a line in ``SOLVERS``.
+Solvers are called by address, so that only those in use are compiled. Contacts of several islands are copied to
+arrays sorted by island; the islands that sweeps solve come last and are solved as one. A new solver is a file with a
+kernel, and a line in ``SOLVERS``.
 """
 
 from __future__ import annotations
@@ -36,32 +36,32 @@ from .islands import Islands, allocate_islands, find_islands
 from .jacobi import jacobi
 from .newton import newton
 
-# entries of Auto.doors: addresses of what takes small islands and of what takes the rest (0: all are small)
+# entries of IslandSolver.doors: addresses of the solvers of small islands and of the rest (0: all are small)
 SMALL_ISLAND_SOLVER, OTHER_SOLVER, SOLVER_SLOTS = range(3)
-# entries of Auto.limit: most contacts and most nodes of an island that is small; the same where masses are UNEVEN;
-# contacts of all islands above which it is a CROWD: what falls together hits anew in every step, and Newton's method
-# has no warm start there
+# entries of IslandSolver.limit: largest number of contacts and of nodes of a small island; the same with uneven masses;
+# number of contacts of all islands above which they are a crowd: in a crowd contacts are new in every step, and
+# Newton's method has no warm start
 MAX_CONTACTS, MAX_NODES, MAX_CONTACTS_UNEVEN, MAX_NODES_UNEVEN, CROWD_CONTACTS, LIMITS = range(6)
 NEWTON_TOLERANCE_FACTOR, MIN_NEWTON_TOLERANCE = (
     1e-5,
     1e-10,
-)  # times the residual that is enough; but no finer than this [m/s], which rounding may hide
-UNEVEN_MASS_RATIO = 30.0  # ratio of masses in an island from which on sweeps take too long
-CROWD_ISLAND_CONTACTS, CROWD_ISLAND_NODES = 12, 4  # of an island that is small in a crowd
-# entries of Auto.told, added up over calls: calls, islands, islands by the one and by the other, what the one had to
-# hand on to the other, contacts by the one; the largest island's contacts
+)  # relative to the requested residual; and lower bound [m/s], because of rounding
+UNEVEN_MASS_RATIO = 30.0  # ratio of masses in an island above which sweeps converge too slowly
+CROWD_ISLAND_CONTACTS, CROWD_ISLAND_NODES = 12, 4  # limits of a small island in a crowd
+# entries of IslandSolver.told, summed over calls: calls, islands, islands by the small-island solver and by the other,
+# islands passed on from the former to the latter, contacts by the former; contacts of the largest island
 CALLS, ISLANDS, SMALL_SOLVED, OTHER_SOLVED, PASSED_ON, SMALL_CONTACTS, LARGEST_ISLAND, STATISTICS = range(8)
 
 
 class IslandSolver(NamedTuple):
-    """In place of `FactorStorage`: rooms for factors, a copy of the problem by islands, addresses, what was picked."""
+    """Replaces `FactorStorage`: storage for factors, a copy of the problem by islands, solver addresses, statistics."""
 
     numbers: Float1
     places: Int1
     P: ContactProblem
     X: ContactState
     islands: Islands
-    pick: Int1  # (ni,): islands, the small ones first
+    pick: Int1  # (ni,): islands, small ones first
     doors: Int1
     limit: Int1
     told: Int1
@@ -69,7 +69,7 @@ class IslandSolver(NamedTuple):
 
 @formula
 def copy_contact(P, X, Q, Y, c, k):
-    """Contact c of (P, X) becomes contact k of (Q, Y)."""
+    """Copy contact c of (P, X) to contact k of (Q, Y)."""
     for s in range(2):
         Q.at[k, s], Q.block[k, s] = P.at[c, s], P.block[c, s]
     for s in range(9):
@@ -89,7 +89,7 @@ def copy_contact(P, X, Q, Y, c, k):
 
 @formula
 def copy_impulse_back(X, Y, c, k, turning):
-    """Impulses of contact k of Y become those of contact c of X."""
+    """Copy impulses of contact k of Y to contact c of X."""
     for s in range(3):
         X.p[c, s] = Y.p[k, s]
         if turning:
@@ -98,7 +98,7 @@ def copy_impulse_back(X, Y, c, k, turning):
 
 @formula
 def copy_line(P, X, Q, Y, line, k):
-    """Line ``line`` of (P, X) becomes line k of (Q, Y)."""
+    """Copy line ``line`` of (P, X) to line k of (Q, Y)."""
     Q.line_at[k, 0], Q.line_at[k, 1], Y.line[k] = P.line_at[line, 0], P.line_at[line, 1], X.line[line]
     for s in range(4):
         Q.line_x[k, s] = P.line_x[line, s]
@@ -106,7 +106,7 @@ def copy_line(P, X, Q, Y, line, k):
 
 @formula
 def is_small_island(P, F, I, k):
-    """Whether island k is for the solver of small islands."""
+    """Whether island k goes to the solver of small islands."""
     if P.turn.shape[0] > 0:
         return False
     contacts, nodes = I.island[k + 1] - I.island[k], I.member_p[k + 1] - I.member_p[k]
@@ -120,7 +120,7 @@ def is_small_island(P, F, I, k):
 
 @formula
 def mass_ratio(P, I, k):
-    """Largest over smallest mass of the nodes of an island that impulses move."""
+    """Largest over smallest mass of the movable nodes of an island."""
     least, most = 1e300, 0.0
     for e in range(I.member_p[k], I.member_p[k + 1]):
         a = P.node[I.member[e], 0]
@@ -131,7 +131,7 @@ def mass_ratio(P, I, k):
 
 @formula
 def pick_islands(P, F, I, count):
-    """Islands in a new order, in ``F.pick``: the small ones first; returns how many these are."""
+    """Order the islands in ``F.pick``, small ones first; returns the number of small ones."""
     some = 0
     for k in range(count):
         F.told[LARGEST_ISLAND] = max(F.told[LARGEST_ISLAND], I.island[k + 1] - I.island[k])
@@ -153,7 +153,7 @@ def pick_islands(P, F, I, count):
 
 @formula
 def copy_islands(P, X, Q, Y, F, I, count, some):
-    """Copy by islands: the small ones, then the others as one."""
+    """Copy the problem by islands: the small ones, then all others as one."""
     c, l, m = 0, 0, 0
     Q.island[0] = Q.line_p[0] = Q.member_p[0] = 0
     for i in range(count):
@@ -174,7 +174,7 @@ def copy_islands(P, X, Q, Y, F, I, count, some):
 
 @formula
 def copy_impulses_back(P, X, Y, F, I, count):
-    """Impulses back to where they came from."""
+    """Copy the impulses back to the original order."""
     c, l, turning = 0, 0, P.turn.shape[0] > 0
     for i in range(count):
         k = F.pick[i]
@@ -188,7 +188,7 @@ def copy_impulses_back(P, X, Y, F, I, count):
 
 @formula
 def worst_outcome(O, sofar):
-    """The worst of what solvers said: (residual, force residual, used, status)."""
+    """Worst of the solvers' outcomes: (residual, force residual, used, status)."""
     a, b, used, ended = sofar
     return (
         max(a, O.real.residual),
@@ -200,10 +200,10 @@ def worst_outcome(O, sofar):
 
 @formula
 def solve_small_island(P, X, W, O, F, f):
-    """An island by the solver of small ones, or by the other where that cannot.
+    """Solve an island by the solver of small ones, or by the other one if that fails.
 
-    It is asked for ``FINER`` digits than are enough, since Newton's last steps bring many of them: what sticks then
-    does not creep. That it has not got them all is no fault.
+    The tolerance is smaller by `NEWTON_TOLERANCE_FACTOR`, because Newton's last steps gain many digits; sticking
+    contacts then do not creep. Missing the smaller tolerance is no failure.
     """
     enough, most = O.real.enough, O.count.most
     O.real.enough = max(NEWTON_TOLERANCE_FACTOR * enough, min(enough, MIN_NEWTON_TOLERANCE))
@@ -220,7 +220,7 @@ def solve_small_island(P, X, W, O, F, f):
 
 @formula
 def solve_islands(P, X, Y, W, O, F, f, count, some):
-    """Islands each by its solver, on the copy."""
+    """Solve each island of the copy by its solver."""
     Q, I = F.P, F.islands
     copy_islands(P, X, Q, Y, F, I, count, some)
     sofar = (0.0, 0.0, 0, 0)
@@ -239,7 +239,7 @@ def solve_islands(P, X, Y, W, O, F, f, count, some):
 
 @formula
 def solve_all_islands(P, X, W, O, F):
-    """See `auto`."""
+    """Solve all islands; see `auto`."""
     f, I = by_address(FactorStorage(F.numbers[:], F.places[:])), F.islands
     O.count.used, O.count.ended, O.count.island = 0, CONVERGED, -1
     O.real.residual, O.real.force_residual = 0.0, 0.0
@@ -269,7 +269,7 @@ def solve_all_islands(P, X, W, O, F):
 
 @kernel
 def auto(P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings, F: IslandSolver, task: int) -> int:
-    """Every island by the solver picked for it; returns the most iterations that one took. F is `IslandSolver`."""
+    """Solve every island by the solver chosen for it; returns the most iterations of any. F is an `IslandSolver`."""
     return solve_all_islands(P, X, W, O, F)
 
 
@@ -285,52 +285,52 @@ SOLVERS: dict[str, Kernel] = {
 FACTORISING_SOLVERS = {
     "newton",
     "admm",
-}  # those that want `FactorStorage`: each island by itself, the rest to sweeps where it cannot
+}  # solvers that need `FactorStorage`: called island by island; sweeps solve islands they cannot
 
-# islands up to this size go to Newton, contacts and nodes: with masses that are alike, where 50 sweeps take as long as
-# five of its steps, and with uneven ones or joints, where sweeps do not get there
+# largest islands for Newton's method (contacts, nodes): with similar masses, where 50 sweeps take as long as five
+# Newton steps, and with uneven masses or joints, where sweeps do not converge
 EVEN_ISLAND, UNEVEN_ISLAND = (200, 40), (800, 150)
-CROWD_LIMIT = 400  # contacts of a crowd
+CROWD_LIMIT = 400  # contacts above which all islands are a crowd
 PLACES_PER_ITEM, NUMBERS_PER_ITEM = (
     60,
     250,
-)  # of `FactorStorage`, for each contact and node of the largest island that is to fit
+)  # size of `FactorStorage` per contact and node of the largest island to be factored
 
 
 class PreparedSolver(NamedTuple):
-    """A solver with its rooms."""
+    """A solver with its storage."""
 
     kernel: Kernel
     F: IslandSolver
-    told: np.ndarray  # see `choose`; empty for a solver that does all at once
+    told: np.ndarray  # statistics, see `STATISTICS`; empty for a solver that handles all islands at once
 
 
 def solver_names() -> tuple[str, ...]:
-    """What solvers may be called."""
+    """Names of the solvers."""
     return ("auto", *SOLVERS)
 
 
 def prepare_solver(
     name: str, P: ContactProblem, X: ContactState, W: ContactWorkspace, O: SolverSettings
 ) -> PreparedSolver:
-    """A solver for problems of these capacities; compiles what it needs.
+    """Prepare a solver for problems of these capacities; compiles what it needs.
 
     Parameters
     ----------
     name : str
         One of `solver_names`.
-    P, X, W, O : Problem, State, Scratch, Choices
-        As large as they will be.
+    P, X, W, O : ContactProblem, ContactState, ContactWorkspace, SolverSettings
+        With their final capacities.
 
     Returns
     -------
-    Ready
-        To be asked for anew when the rooms are enlarged.
+    PreparedSolver
+        To be prepared again when the capacities grow.
 
     Raises
     ------
     KeyError
-        For another name.
+        If the name is unknown.
     """
     if name != "auto" and name not in FACTORISING_SOLVERS:
         made = allocate_island_solver(P, False)
@@ -341,25 +341,25 @@ def prepare_solver(
     first = SOLVERS["newton" if name == "auto" else name]
     made.doors[SMALL_ISLAND_SOLVER] = first.address
     if name == "auto" and newton_suffices(len(P.node), len(P.group) - 1, len(P.turn) > 0):
-        made.limit[:] = unlimited_islands(P)  # few bodies: nothing is left for sweeps, which have no door
+        made.limit[:] = unlimited_islands(P)  # few bodies: nothing is left for sweeps
     else:
         made.doors[OTHER_SOLVER] = gauss_seidel.address
     return PreparedSolver(auto, made, made.told)
 
 
 def newton_suffices(nodes: int, groups: int, turning: bool) -> bool:
-    """Whether Newton's method is all that `auto` needs."""
+    """Whether Newton's method alone solves every island for `auto`."""
     return nodes <= EVEN_ISLAND[1] and groups == 0 and not turning
 
 
 def unlimited_islands(P: ContactProblem) -> tuple[int, ...]:
-    """Limits by which every island is small, of problems of these capacities."""
+    """Limits with which every island of such problems is small."""
     nc, nn = len(P.mu), len(P.node)
     return nc, nn, nc, nn, nc
 
 
 def allocate_island_solver(P: ContactProblem, whole: bool) -> IslandSolver:
-    """Rooms of `auto`; ``whole``: for islands of any size."""
+    """Allocate the storage of `auto`; ``whole``: for islands of any size."""
     nc, nn, ng, nl = len(P.mu), len(P.node), len(P.group) - 1, len(P.line_at)
     limit = np.zeros(LIMITS, np.int64)
     limit[:] = unlimited_islands(P) if whole or nn <= EVEN_ISLAND[1] else (*EVEN_ISLAND, *UNEVEN_ISLAND, CROWD_LIMIT)

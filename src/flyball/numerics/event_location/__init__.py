@@ -2,9 +2,13 @@
 
 `guards` holds the guard state and guard values within a step, `root_finding` the search for sign changes and
 their refinement, `event_steps` the steps that end on the first event. A guard is a number that depends on time
-and state; what it stands for (a stop, friction, a corner of a law) is unknown here. The time loop
+and state; its meaning (a stop, friction, a nonsmooth point of a law) does not matter here. The time loop
 (`integrators/time_loop`) receives `event_steps.start_event_segment` and `event_steps.finish_step_with_events`
 as callbacks.
 
 Imports: NumPy, `compiler/`, `math/`, `errors`, `integrators/time_loop`.
+
+A step is searched in subintervals of eight nodes and two that check them, halved where they are not resolved; an event
+is then located by the equations, and the step taken again to end on it, which is as exact as the integration. A guard
+has a rounding floor and leaves its side only beyond it, so nothing triggers twice.
 """

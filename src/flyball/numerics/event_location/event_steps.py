@@ -1,14 +1,14 @@
-"""Steps that end on events: the first event in a step, and the callbacks of the `time_loop` that look for it.
+"""Steps that end on events: the first event in a step, and the callbacks of the `time_loop` for it.
 
 Guards are numbers that depend on time and state; an event is where one of them passes zero. Besides the
 callbacks of the loop there are ``watch(t, y, S, W, row)``, ``note(S, W, row)`` and ``look(t, h, x, S, W,
-row)``, which write guards to a row of ``W.g``: by the equations, at the state last evaluated (which it also
-keeps), and as predicted. W is a `GuardState`. The loop also returns when a step ends on events; the caller then
-changes the state as they require, sets ``c.count.started`` to 0 and calls again.
+row)``. They write guards to a row of ``W.g``: from the equations at a given state; at the state evaluated last,
+storing the quantities on which they depend; and predicted. W is a `GuardState`. The loop also returns when a step
+ends on events; the caller then changes the state, sets ``c.count.started`` to 0 and calls again.
 
 Where a guard may pass zero (`root_finding.find_crossing_interval`), the crossing is located with the equations,
-and the step is taken again. As a last check, whatever was found in between: what has to stay above zero does so
-at the step's end, or where it first does not is found by bisection.
+and the step is repeated. A last check is independent of the search: if a guard that must stay above zero is below
+at the end of the step, bisection finds where it becomes negative.
 """
 
 from __future__ import annotations
@@ -66,25 +66,23 @@ from .root_finding import (
     triggers,
 )
 
-SIMULTANEOUS_FRACTION = 1e-11  # part of the step within which events are at the same instant
-MIN_SKIP = 2.0**-20  # part of the step that is gone on by at least, where there was no event after all
-SLOPE_STEP_FRACTION = (
-    1e-2  # part of the distance between places between which a guard passes zero over which its slope is found
-)
-MIN_SLOPE_PLACE = 1e-7  # part of the step before which no slope is found
-END_SLOPE_STEP = 1e-4  # part of the step over which slopes at its end are found
-SLOPE_STEP_GROWTH = 100.0  # times that part where a guard changes by no more than rounding over it
-MAX_EARLIER_EVENTS = 20  # guards that may turn out to be earlier
-MAX_BISECTIONS = 44  # times that it is halved where a guard has been left unseen
-MAX_START_CUTS = 6  # times that a step is made shorter since what begins at zero does not go as expected
-STEP_CUT, EVALUATION_FAILED = 2, 1  # why a step is not gone on from: not looked through; not to be evaluated
+SIMULTANEOUS_FRACTION = 1e-11  # part of the step within which events count as simultaneous
+MIN_SKIP = 2.0**-20  # smallest advance after a place without an event, as a part of the step
+SLOPE_STEP_FRACTION = 1e-2  # part of the bracket width over which the slope of a guard is computed
+MIN_SLOPE_PLACE = 1e-7  # part of the step before which no slope is computed
+END_SLOPE_STEP = 1e-4  # part of the step over which slopes at its end are computed
+SLOPE_STEP_GROWTH = 100.0  # factor on that part where a guard changes only by rounding over it
+MAX_EARLIER_EVENTS = 20  # repetitions in which another event may turn out to be earlier
+MAX_BISECTIONS = 44  # bisections of a step with a missed crossing
+MAX_START_CUTS = 6  # times that a step is shortened because a guard that begins at zero is not as predicted
+STEP_CUT, EVALUATION_FAILED = 2, 1  # why a step is rejected: not searched completely; equations not evaluable
 
 
 @formula
 def end_on_first_event(callbacks, S, W, R, c):
     """End the step on the first event in it, if there is one: (status, width to try next, whether there is one).
 
-    Where the status is `STEP_CUT` the step is not gone on from, and the width is one to try next.
+    With status `STEP_CUT` the step is rejected, and the width is the one to try next.
     """
     watch, look = callbacks[5], callbacks[7]
     h = most = c.real.tried
@@ -113,9 +111,9 @@ def end_on_first_event(callbacks, S, W, R, c):
         else:
             slope = predicted_slope(callbacks, S, W, R, c, h, x, i)
             status, found = end_step_on_event(callbacks, S, W, R, c, x * h, slope, i, s, (W.real.beyond * h, most))
-            if not found and W.count.cuts < MAX_BISECTIONS:  # the dense output told of what the step does not do
+            if not found and W.count.cuts < MAX_BISECTIONS:  # the dense output was wrong
                 return STEP_CUT, 0.5 * h, False
-            if status == 0 and not found and s * W.g[END_VALUES, i] > 0.0:  # nothing happened
+            if status == 0 and not found and s * W.g[END_VALUES, i] > 0.0:  # no event
                 break
         h = c.real.tried
         if status != 0:
@@ -128,7 +126,7 @@ def end_on_first_event(callbacks, S, W, R, c):
         mark_simultaneous(callbacks, S, W, R, c, h, i)
     if not hit and h == c.real.t_end - c.real.t:
         hit = mark_at_final_time(callbacks, S, W, R, c, h)
-    if hit and c.count.extended > 0:  # places within were looked at: back to the end
+    if hit and c.count.extended > 0:  # other places were evaluated: restore the end
         return watch(c.real.t + h, c.y[PROPOSED], S, W, EXACT_VALUES), h, True
     return 0, h, hit
 
@@ -145,7 +143,7 @@ def begins_at_zero(W):
 
 @formula
 def find_next_event(callbacks, S, W, R, c, h):
-    """The first place where a guard leaves its side: (status, guard or -1, place, side)."""
+    """Find the first place where a guard leaves its side: (status, guard or -1, place, side)."""
     W.real.searched_to = 1.0
     i, a, b, at = find_start_sides(callbacks, S, W, R, c, h)
     if i >= 0 and W.count.leaves_kept_side == 1:
@@ -159,7 +157,7 @@ def find_next_event(callbacks, S, W, R, c, h):
         if status != 0 or x > 0.0:
             return status, i, x, (s if triggers(W.way[i], s) else -s)
         before, at = at, max(at + skip, b)
-        skip *= 2.0  # of what is rounding there is no end
+        skip *= 2.0  # rounding can produce endlessly many
         if at >= 1.0:
             break
         status, i, x, s = update_sides(callbacks, S, W, R, c, h, before, at)
@@ -175,11 +173,10 @@ def find_next_event(callbacks, S, W, R, c, h):
 
 @formula
 def find_missed_crossing(callbacks, S, W, R, c, h):
-    """The first guard that is not where it began, or not above zero as it has to be, as `find_next_event` returns it.
+    """Find the first guard that ends the step on a wrong side, returned as by `find_next_event`.
 
-    Or on the other side than that which was taken for it, as the side of a law's corner is.
-
-    Whatever was seen of it within the step.
+    These are guards that have left their initial side, that must be above zero and are not, or that are beyond the
+    allowed depth of a nonsmooth point of a law. The search within the step has no influence.
     """
     best, at, side, away = -1, 2.0, 0.0, 0
     for i in range(W.way.shape[0]):
@@ -205,7 +202,7 @@ def find_missed_crossing(callbacks, S, W, R, c, h):
 
 @formula
 def bisect_violation(callbacks, S, W, R, c, h, i, b, least):
-    """Where guard i, below zero at b, goes there by more than rounding, as `find_next_event` returns it."""
+    """Find by bisection where guard i, negative at b, passes the rounding depth; returned as by `find_next_event`."""
     W.count.leaves_kept_side = 1
     a = 0.0
     for _ in range(MAX_BISECTIONS):
@@ -222,9 +219,9 @@ def bisect_violation(callbacks, S, W, R, c, h, i, b, least):
 
 @formula
 def update_sides(callbacks, S, W, R, c, h, a, x):
-    """Sides at a place in the step, by the equations, nothing having happened up to a; as `find_next_event` returns it.
+    """Set the sides at a place from the equations, without an event up to a; returned as by `find_next_event`.
 
-    What has left its side in between is an event.
+    A guard that has left its side in between is an event.
     """
     if evaluate_guards_exactly(callbacks, S, W, R, c, h, x, PREDICTED_VALUES) != 0:
         return EVALUATION_FAILED, -1, 0.0, 0.0
@@ -246,9 +243,9 @@ def update_sides(callbacks, S, W, R, c, h, a, x):
 
 @formula
 def predicted_slope(callbacks, S, W, R, c, h, x, i):
-    """How fast guard i is expected to change as it gets there [1/s]; 0 where that is so soon that it is rounding.
+    """Slope [1/s] with which guard i approaches the crossing; 0 if that is too near to the start for rounding.
 
-    Beyond it may be another function: one that jumps, or has a corner.
+    Only places before the crossing are used: the guard may jump or have a corner there.
     """
     d = min(END_SLOPE_STEP, SLOPE_STEP_FRACTION * W.real.bracket, 0.25 * x)
     if x < MIN_SLOPE_PLACE:
@@ -261,9 +258,9 @@ def predicted_slope(callbacks, S, W, R, c, h, x, i):
 
 @formula
 def end_slopes(callbacks, S, W, R, c, h):
-    """Slopes of guards at the end of the step into W.g[SLOPE]; 0 of what has none that is more than rounding.
+    """Write slopes of guards at the end of the step to W.g[END_SLOPES]; 0 if the change does not exceed rounding.
 
-    Where it changes by no more than that so close to the end, it is asked farther off.
+    If a guard changes only by rounding so close to the end, a larger difference is used.
     """
     back, asked = END_SLOPE_STEP, True
     for i in range(W.way.shape[0]):
@@ -284,22 +281,22 @@ def end_slopes(callbacks, S, W, R, c, h):
 
 @formula
 def mark_simultaneous(callbacks, S, W, R, c, h, first):
-    """Note in W.fired all other guards that leave their sides with the first, at the end of the step."""
+    """Mark in W.fired the other guards that leave their sides together with the first, at the end of the step."""
     end_slopes(callbacks, S, W, R, c, h)
     for i in range(W.way.shape[0]):
         if i == first:
             continue
         f, slope = W.g[END_VALUES, i], W.g[END_SLOPES, i]
-        came = -1.0 if slope > 0.0 else 1.0  # the side that it comes from
+        came = -1.0 if slope > 0.0 else 1.0  # the side from which it comes
         if triggers(W.way[i], came) and abs(f) <= W.real.same * abs(slope) and slope != 0.0:
             W.fired[i] = 1
 
 
 @formula
 def mark_at_final_time(callbacks, S, W, R, c, h):
-    """Note in W.fired the guards that are zero where the motion ends, to rounding of time; whether there are any.
+    """Mark in W.fired the guards that are zero at the final time, within rounding of time; returns if there are any.
 
-    What passes zero at the very end belongs to the motion that ends there.
+    A sign change at the final time belongs to the motion that ends there.
     """
     n = 0
     end_slopes(callbacks, S, W, R, c, h)
@@ -313,13 +310,13 @@ def mark_at_final_time(callbacks, S, W, R, c, h):
     return n > 0
 
 
-MAX_EVENT_STEP_RATIO = 64.0  # times as long as from event to event that the step after one is at most
-EVENT_TIME_ULPS = 4.0  # units in the last place: an output time so little before an event is the event's
+MAX_EVENT_STEP_RATIO = 64.0  # largest step after an event, relative to the time between the last two events
+EVENT_TIME_ULPS = 4.0  # units in the last place: an output time this close before an event is replaced by the event
 
 
 @formula
 def start_event_segment(callbacks, S, W, c, back):
-    """See where guards are as a stretch of the motion begins, or where a step was taken back to. Returns a status."""
+    """Evaluate the guards at the start of a segment, or after the step was taken back. Returns a status."""
     watch, note = callbacks[5], callbacks[6]
     W.count.fresh = 1
     note_state_drift(W, c)
@@ -331,9 +328,9 @@ def start_event_segment(callbacks, S, W, c, back):
 
 @formula
 def finish_step_with_events(callbacks, S, W, R, c, out, used):
-    """Go on to the end of a step that is good, or to the first event in it.
+    """Complete an accepted step, up to its end or to the first event in it.
 
-    Returns (rows written, whether the loop returns); a step that cannot be taken makes the next one shorter.
+    Returns (rows written, whether the loop returns). A rejected step makes the next one shorter.
     """
     ask, own, note = callbacks[0], callbacks[1], callbacks[6]
     most = c.real.tried
@@ -351,11 +348,11 @@ def finish_step_with_events(callbacks, S, W, R, c, out, used):
         W.count.cuts += 1
         set_rejected_width(c, h)
         return used, False
-    if status != 0:  # what lies inside the step cannot be told: take a shorter one
+    if status != 0:  # the step cannot be evaluated within: take a shorter one
         shorten_for_interpolation(c, most)
         return used, False
     at_once = step_end_time(c) - EVENT_TIME_ULPS * ULP * abs(step_end_time(c))
-    if hit and used > 0 and out[used - 1, 0] >= at_once:  # written when it is known how the motion goes on
+    if hit and used > 0 and out[used - 1, 0] >= at_once:  # written once the motion after the event is known
         used -= 1
         c.count.next -= 1
     elif output_buffer_full(c):
@@ -365,7 +362,7 @@ def finish_step_with_events(callbacks, S, W, R, c, out, used):
     W.count.cuts = 0
     if hit:
         c.real.h, c.real.wide = max(c.real.h, most), max(c.real.wide, most)
-        if c.real.t > W.real.latest:  # as wide as it can be looked through for more that come as soon
+        if c.real.t > W.real.latest:  # limited so that the next event, if as soon, is resolved
             c.real.h = min(c.real.h, MAX_EVENT_STEP_RATIO * (c.real.t - W.real.latest))
             W.real.latest = c.real.t
         c.count.status = EVENT_FOUND
@@ -378,11 +375,11 @@ def finish_step_with_events(callbacks, S, W, R, c, out, used):
 
 @formula
 def evaluate_start_guards(watch, note, S, W, c):
-    """Guards where the next step begins, and what they depend on. Returns a status."""
+    """Evaluate the guards, and what they depend on, at the start of the next step. Returns a status."""
     status = watch(c.real.t, c.y[CURRENT], S, W, START_VALUES)
     if status == 0:
         note(S, W, START_VALUES)
-    for i in range(W.side.shape[0]):  # what jumped since is on no known side
+    for i in range(W.side.shape[0]):  # a guard that jumped since has no known side
         f = W.side[i] * W.g[START_VALUES, i] + 2.0 * crossing_floor(W, i, 0.0)
         if abs(W.side[i]) == 1.0 and not f >= 0.5 * abs(W.g[END_VALUES, i]):
             W.side[i] = UNKNOWN_SIDE
@@ -391,9 +388,10 @@ def evaluate_start_guards(watch, note, S, W, c):
 
 @formula
 def set_sides_after_event(W, c, h):
-    """Sides of guards at the end of a step that ends on an event: 0 of what fired; others are known beyond rounding.
+    """Set the sides after a step that ends on an event: 0 for triggered guards; others if they exceed rounding.
 
-    So what is to fire next, however soon, is not taken for what has just fired. W.g[MARK] is what is zero of each.
+    So a guard that triggers soon after is not mistaken for one that has just triggered. W.g[ZERO_BANDS] holds the zero
+    band of each.
     """
     for i in range(W.side.shape[0]):
         f, s, slope = W.g[END_VALUES, i], side_at_start(W, i), (W.g[HIGHEST_VALUES, i] - W.g[LOWEST_VALUES, i]) / h
@@ -407,14 +405,14 @@ def set_sides_after_event(W, c, h):
                 nothing = max(nothing, ROUNDING_FACTOR * abs(f))
         elif W.kept[i] == 0 and f - f == 0.0 and abs(f) > nothing:
             W.side[i] = side_of(f)
-        elif W.kept[i] == 0 and abs(f) < crossing_floor(W, i, 1.0):  # it may be about to pass: it has not yet
+        elif W.kept[i] == 0 and abs(f) < crossing_floor(W, i, 1.0):  # it may be about to cross, but has not yet
             W.side[i] = s if s != 0.0 else UNKNOWN_SIDE
         W.g[ZERO_BANDS, i] = nothing
 
 
 @formula
 def shift_guards_to_start(W):
-    """The end of the step is the start of the next."""
+    """Make the guards at the end of the step those at the start of the next."""
     W.count.fresh = 0
     for i in range(W.way.shape[0]):
         W.side[i] = 0.0 if W.kept[i] == 1 and abs(W.g[END_VALUES, i]) <= ROUNDING_FACTOR * W.grain[i] else W.g[SIDES, i]

@@ -1,24 +1,24 @@
 """Guard functions within a step: their state, their values, their rounding floor.
 
-Between the ends of a step guards are predicted without evaluating the equations: measured quantities by
-polynomials of degree five through their values, rates and accelerations at the ends; quantities without a known
-rate (multipliers, loads) by the polynomial through the ends and late stages. Where the stages of the step do
-not confirm the prediction, the equations are evaluated on the dense output instead.
+Between the ends of a step guards are predicted without evaluating the equations. Measured quantities are
+interpolated by polynomials of degree five through their values, rates and accelerations at the ends; quantities
+without a known rate (multipliers, loads) by the polynomial through the ends and late stages. If the stages of the
+step do not confirm the prediction, the equations are evaluated on the dense output instead.
 
-Rounding: a guard of the user's may be zero all along, as a difference of two quantities that symmetry keeps
-equal; then it is rounding and has neither side nor slope. So a guard leaves its side only when it gets to the
-other one by more than the rounding floor; the event is where it passed zero before. The state drifts from step
-to step as the sum of so many roundings does, by the root of their number. The guard of a law's corner leaves
-its side at zero, because forces are those of the other branch from there on.
+Rounding: a guard of a user-defined event may be zero throughout, such as the difference of two quantities that
+symmetry keeps equal. Its values are then rounding errors without a meaningful sign or slope. So a guard changes its
+side only when it passes zero by more than the rounding floor; the event is located at the zero before that. The
+rounding error of the state grows from step to step like a random walk, with the square root of the number of
+steps. The guard of a nonsmooth point of a law changes side exactly at zero, because forces follow the other branch
+from there on.
 
-The guard of a group of indeterminate contact forces is the smallest of several distances at best, a concave
-function of smooth terms (bounds and forces of each cone, see `complementarity.interior_point`). It is flat
-while another distance is the smallest, then has a corner, so its terms are checked with it. Between two places
-it is no less than
+The guard of a group of indeterminate contact forces is the smallest of several distances, a concave function of
+smooth terms (bounds and forces of each cone, see `complementarity.interior_point`). It has a corner where another
+distance becomes the smallest, so its terms are checked with it. Between two places it is at least
 
     (1 - u) f + u g - D u (1 - u),
 
-f, g being its values there, u in (0, 1), D = h^2 |terms''| / 2.
+with f, g its values there, u in (0, 1), D = h^2 |terms''| / 2.
 """
 
 from __future__ import annotations
@@ -34,12 +34,13 @@ from ...errors import ModelError
 from ...math.scalar import sqrt
 from ..integrators.time_loop import INTERPOLATE, INTERPOLATED, ULP
 
-# what a guard's way means: which passing of zero is an event
+# direction of a guard: which sign changes are events
 FALLING, EITHER, RISING = -1, 0, 1
-# rows of Watch.g: guards at the start and end of the step; of the equations within; expected within; sides in the
-# making; what is zero of those that begin near it; what they were as they fired; what is rounding of them at the start
-# and the end; least, largest and farthest from what is expected at stages; how far below zero they may end, nan where
-# that tells nothing; their slopes at the end; then at the nodes of a panel, and where these are checked
+# rows of GuardState.g: guards at the start and end of the step; from the equations within the step; predicted within
+# the step; current sides during the search; zero bands of guards that begin near zero; values when they triggered;
+# rounding at the start and the end; smallest value, largest value and largest prediction error at stages; allowed
+# depth below zero of law corners, nan for other guards; slopes at the end; then values at the nodes of a subinterval,
+# and at its check places
 (
     START_VALUES,
     END_VALUES,
@@ -59,99 +60,99 @@ FALLING, EITHER, RISING = -1, 0, 1
 ) = range(15)
 NODES, CHECK_NODES = 8, 2
 GUARD_ROWS = NODE_VALUES + NODES + CHECK_NODES
-CHECK_PLACES = (0.131, 0.567)  # places in a panel, far from those that are the same in a half of it
-UNKNOWN_SIDE = 2.0  # a side that follows from the value where the next step begins
-EVENT_FOUND = 6  # a status beside those of the clock: the step ends on events, told in Watch.fired
+CHECK_PLACES = (0.131, 0.567)  # places in a subinterval; halving it does not map them onto each other
+UNKNOWN_SIDE = 2.0  # the side is taken from the value where the next step begins
+EVENT_FOUND = 6  # status besides those of StepState: the step ends on events, marked in GuardState.fired
 
 
 class GuardReals(Record, kind="Float"):
-    """Where guards are looked for within the step."""
+    """Real numbers of the search for events within the step."""
 
-    subinterval: float  # begin of the panel
+    subinterval: float  # start of the subinterval
     width: float  # its width
-    same: float  # time within which events are at the same instant
-    searched_to: float  # part of the step that was looked through
-    beyond: float  # where a guard that comes back is beyond zero
-    bracket: float  # how far apart places are between which it passes
-    drift: float  # how many roundings the state may be off by (`grains`)
-    latest: float  # when the last event was
+    same: float  # time within which events count as simultaneous
+    searched_to: float  # part of the step that was searched
+    beyond: float  # place where a guard that changes side twice is on the other side
+    bracket: float  # width of the bracket of a sign change
+    drift: float  # rounding error of the state in units of the rounding of one evaluation
+    latest: float  # time of the last event
     fastest: float  # the fastest rate so far
 
 
 class GuardCounts(Record, kind="Int"):
-    """What was looked at."""
+    """Counters and flags of the search for events."""
 
     stage: int  # calls of the right-hand side since the step began
-    fresh: int  # whether the side of guards near zero is to be found
-    steps: int  # watched
-    looks: int  # places looked at
-    again: int  # steps taken again
+    fresh: int  # whether the sides of guards near zero must be determined
+    steps: int  # number of steps with event detection
+    looks: int  # places evaluated
+    again: int  # steps repeated
     events: int
-    plain: int  # whether what is expected within the step is borne out
-    exact_looks: int  # places looked at with the equations since the step was taken,
-    all_exact_looks: int  # and in all
-    lost: int  # whether they could not be evaluated at one
-    cuts: int  # times that a step was cut since it could not be looked through
-    leaves_kept_side: int  # whether a guard leaves the side that it has to keep
-    terms: int  # of the last guard, that of a group: see `concave`
-    short_step: int  # whether the step is so short that only rates tell of rates
+    plain: int  # whether the predictions within the step are confirmed
+    exact_looks: int  # places evaluated with the equations in this step
+    all_exact_looks: int  # the same in total
+    lost: int  # whether the equations could not be evaluated at a place
+    cuts: int  # times that a step was cut because it could not be searched completely
+    leaves_kept_side: int  # whether a guard leaves the side on which it must stay
+    terms: int  # number of terms of the last guard, that of a group of contact forces
+    short_step: int  # whether the step is so short that rates are more accurate than differences of values
 
 
 class GuardState(NamedTuple):
-    """What a watched integration keeps besides its clock."""
+    """Workspace of event detection, besides the StepState."""
 
-    way: Int1  # (ng,): which passing of zero is an event
-    kept: Int1  # (ng,): 1 of those that are above zero by what holds now
-    no_deeper: Int1  # (ng,): 1 of those that get no farther below zero by rounding than they begin
-    grain: Float1  # (ng,): what is rounding of them; of those that may be anything, the less of both ends
-    least: Float1  # (ng,): force that is rounding, of guards of forces; 0 of the rest
-    tied: Float1  # (ng,): size of what those are of that others keep at zero; 0 of the rest
-    still: Float1  # (nm,): size of rates that others keep at zero; 0 of the rest
-    side: Float1  # (ng,): 1 where the guard is above zero, -1 below; as a segment begins 0 if it has just fired
-    fired: Int1  # (ng,): 1 for those that the step ends on
-    g: Float2  # (GUARDS, ng + terms of a group)
-    polynomial: Float1  # (NODES,): a guard over a panel, in powers
-    basis: Float2  # (NODES, NODES): powers from values at the nodes
-    nodes: Float1  # (NODES + CHECKS,): places in a panel
-    checks: Float2  # (CHECKS, NODES): the polynomial through the nodes where it is checked
+    way: Int1  # (ng,): direction of sign changes that are events
+    kept: Int1  # (ng,): 1 for guards that the active constraints keep above zero
+    no_deeper: Int1  # (ng,): 1 for guards that rounding does not take farther below zero than they begin
+    grain: Float1  # (ng,): rounding error of the guard; if it may have either sign, the smaller one of both ends
+    least: Float1  # (ng,): rounding error of a force, for guards of forces; else 0
+    tied: Float1  # (ng,): scale of guards of quantities that constraints keep at zero; else 0
+    still: Float1  # (nm,): scale of rates that constraints keep at zero; else 0
+    side: Float1  # (ng,): 1 above zero, -1 below; 0 at the start of a segment if the guard has just triggered
+    fired: Int1  # (ng,): 1 for guards that end the step
+    g: Float2  # (GUARD_ROWS, ng + terms of a group)
+    polynomial: Float1  # (NODES,): power coefficients of a guard over a subinterval
+    basis: Float2  # (NODES, NODES): power coefficients from values at the nodes
+    nodes: Float1  # (NODES + CHECK_NODES,): places in a subinterval
+    checks: Float2  # (CHECK_NODES, NODES): interpolation from the nodes to the check places
     real: GuardReals  # type: ignore[assignment]
     count: GuardCounts  # type: ignore[assignment]
-    stages: Int1  # of a step, where levels are kept
-    compared_stages: Int1  # of a step, at which guards are kept
-    compared_places: Float1  # where in the step these are
-    compared_values: Float2  # (met, ng + terms): guards there
+    stages: Int1  # stages of a step at which levels are stored
+    compared_stages: Int1  # stages of a step at which guards are stored
+    compared_places: Float1  # their places in the step
+    compared_values: Float2  # (compared stages, ng + terms): guards there
     moving: Float3  # (2, 3, nm): measured quantities, rates, accelerations, at the start and the end
-    levels: Float2  # (2 + stages, rows + spots): what has no known rate: multipliers, loads
-    places: Float1  # (2 + stages,): where in the step these were seen
+    levels: Float2  # (2 + stages, rows + spots): quantities without a known rate: multipliers, loads
+    places: Float1  # (2 + stages,): their places in the step
     rows: Int1  # multipliers that guards depend on
-    sensed_places: Int2  # (..., 2): rows and columns of what else is sensed
-    sensed: Float2  # what is expected to be sensed: values and rates in its first rows; then rates as values
-    lam: Float1  # multipliers expected
+    sensed_places: Int2  # (..., 2): rows and columns of other sensed quantities
+    sensed: Float2  # predicted sensed quantities: values and rates in its first rows; then rates as values
+    lam: Float1  # predicted multipliers
 
 
 @lru_cache(maxsize=1)
 def chebyshev_nodes() -> np.ndarray:
-    """Places of a panel's nodes in it: Chebyshev's, ends included."""
+    """Chebyshev nodes of a subinterval [0, 1], ends included."""
     return 0.5 - 0.5 * np.cos(np.pi * np.arange(NODES) / (NODES - 1))
 
 
 @lru_cache(maxsize=1)
 def power_basis() -> np.ndarray:
-    """What takes values at the nodes to powers of the place in the panel."""
+    """Matrix from values at the nodes to power coefficients."""
     return np.ascontiguousarray(np.linalg.inv(np.vander(chebyshev_nodes(), increasing=True)))
 
 
 @lru_cache(maxsize=1)
 def check_weights() -> np.ndarray:
-    """What takes values at the nodes to those of the polynomial where it is checked."""
+    """Matrix from values at the nodes to polynomial values at the check places."""
     return np.ascontiguousarray(np.vander(CHECK_PLACES, NODES, increasing=True) @ power_basis())
 
 
 def sampled_stages(c: np.ndarray, stages: int) -> tuple[list[int], list[int]]:
-    """Stages of a method at which levels are kept, as evenly apart as there are, and at which guards are.
+    """Choose the stages of a method at which levels are stored, evenly spaced, and those at which guards are compared.
 
-    Not the first ones, whose order is low, unless there are no others. One at least tells whether levels are what
-    those kept let expect.
+    The first stages have low order and are used only if there are no others. At least one stage with compared guards
+    has no stored levels, so that it tests the prediction.
 
     Raises
     ------
@@ -188,29 +189,29 @@ def allocate_guard_state(
     expected: tuple[np.ndarray, np.ndarray],
     terms: int = 0,
 ) -> GuardState:
-    """What a watched integration keeps, empty.
+    """Allocate the workspace of event detection.
 
     Parameters
     ----------
     way : ndarray (ng,)
-        Of the guards.
+        Directions of the guards.
     holding : ndarray (ng,)
-        1 for those that are above zero as long as what holds now is right, 2 for those of them that get no
-        farther below by rounding than they begin: distances, rates.
+        1 for guards that stay above zero as long as the active constraints are right; 2 for those of them that
+        rounding does not take farther below zero than they begin: distances, rates.
     c : ndarray
-        Where in a step a method's stages are.
+        Places of the stages in a step.
     stages : int
-        How many stages a step has.
+        Number of stages of a step.
     measured : int
-        Quantities with rates.
+        Number of quantities with rates.
     rows : ndarray
         Multipliers that guards depend on.
     spots : ndarray (..., 2)
-        Rows and columns of what else is sensed.
+        Rows and columns of other sensed quantities.
     expected : tuple of ndarray
-        Where expected values of what is sensed, and of multipliers, are written.
+        Arrays for predicted sensed quantities and multipliers.
     terms : int, optional
-        Room for terms of the guard of a group.
+        Number of terms of the guard of a group.
     """
     ng, real = len(way), GuardReals.blank()
     real.latest = -np.inf
@@ -249,16 +250,16 @@ def allocate_guard_state(
     )
 
 
-POLYNOMIAL_TOLERANCE = 1e-2  # part of its change over a step by which a guard may differ from what is expected
-DISTANCE_TOLERANCE = 0.05  # part of its least distance from zero by which it may
-SIZE_ROUNDING = 1e-9  # part of its size that is nothing
-ROUNDING_FACTOR = 4.0  # times what is rounding of a guard
-CURVATURE_SAFETY = 1.5  # times the second differences that are seen that there may be
+POLYNOMIAL_TOLERANCE = 1e-2  # largest prediction error of a guard, relative to its change over a step
+DISTANCE_TOLERANCE = 0.05  # the same, relative to its smallest distance from zero
+SIZE_ROUNDING = 1e-9  # relative size of a guard that counts as rounding
+ROUNDING_FACTOR = 4.0  # safety factor on the rounding of a guard
+CURVATURE_SAFETY = 1.5  # safety factor on the second differences at the nodes
 
 
 @formula
 def terms_confirmed(W):
-    """Whether terms are as expected where stages of the step have met them."""
+    """Whether the stages of the step confirm the predicted terms."""
     if W.count.terms == 0:
         return True
     last = W.way.shape[0] - 1
@@ -278,7 +279,7 @@ def terms_confirmed(W):
 
 @formula
 def group_may_dip(W):
-    """Whether the guard may dip below zero between two nodes of a panel, or its terms are not resolved there."""
+    """Whether the guard may become negative between two nodes of a subinterval, or its terms are not resolved."""
     last, n = W.way.shape[0] - 1, W.count.terms
     if n == 0:
         return False
@@ -300,7 +301,7 @@ def group_may_dip(W):
 
 @formula
 def is_polynomial(W, i, near):
-    """Whether a term is the polynomial through its values at the nodes, or as near to it as does not matter."""
+    """Whether the polynomial through the nodes represents a term within the tolerance."""
     low, high = W.g[NODE_VALUES, i], W.g[NODE_VALUES, i]
     for j in range(1, NODES + CHECK_NODES):
         low, high = min(low, W.g[NODE_VALUES + j, i]), max(high, W.g[NODE_VALUES + j, i])
@@ -320,7 +321,7 @@ def is_polynomial(W, i, near):
 
 @formula
 def largest_curvature(W, j, first, n):
-    """Half the most by which terms of a cell bend about the interval that ends at node j, by divided differences."""
+    """Half the largest curvature of the terms of a cell in the interval that ends at node j, by divided differences."""
     most = 0.0
     for c in range(first, first + n, 3):
         bend = 0.0
@@ -335,38 +336,38 @@ def largest_curvature(W, j, first, n):
 
 @formula
 def second_difference(W, m, i):
-    """The second divided difference of column i at nodes m - 2, m - 1, m."""
+    """Second divided difference of column i at nodes m - 2, m - 1, m."""
     x, y, z = W.nodes[m - 2], W.nodes[m - 1], W.nodes[m]
     f, g, e = W.g[NODE_VALUES + m - 2, i], W.g[NODE_VALUES + m - 1, i], W.g[NODE_VALUES + m, i]
     return ((e - g) / (z - y) - (g - f) / (y - x)) / (z - x)
 
 
-DRIFT_PER_STEP = 8.0  # grains that a step adds, as a random walk
-INITIAL_DRIFT_STEPS = 16.0  # steps that it takes to stray as far as a state does that has just been made
-TIME_RESOLUTION = 16.0 * ULP  # part of the largest time that is none
+DRIFT_PER_STEP = 8.0  # rounding errors that a step adds, as a random walk
+INITIAL_DRIFT_STEPS = 16.0  # steps whose random walk is as large as the error of an initial state
+TIME_RESOLUTION = 16.0 * ULP  # relative resolution of time
 
 
 @formula
 def note_state_drift(W, c):
-    """Note how many grains the state may be off by."""
+    """Store the rounding error of the state, in units of the rounding of one evaluation."""
     W.real.drift = DRIFT_PER_STEP * sqrt(INITIAL_DRIFT_STEPS + c.count.accepted)
 
 
 @formula
 def is_law_corner(W, i):
-    """Whether guard i is that of a law's corner: it is told how far it may be on the wrong side."""
+    """Whether guard i is that of a nonsmooth point of a law; only these have an allowed depth (not nan)."""
     return W.g[CORNER_DEPTHS, i] == W.g[CORNER_DEPTHS, i]
 
 
 @formula
 def crossing_floor(W, i, x):
-    """By how much guard i is beyond zero at most at a part x of the step where it has not left its side."""
+    """Largest amount by which guard i may be past zero at x without having changed side; x: fraction of the step."""
     return 0.0 if is_law_corner(W, i) else rounding_floor(W, i, x)
 
 
 @formula
 def rounding_floor(W, i, x):
-    """What is rounding of guard i at a part x of the step."""
+    """Rounding error of guard i at a fraction x of the step."""
     if W.kept[i] == 1 or is_law_corner(W, i):
         return ROUNDING_FACTOR * W.grain[i]
     return W.real.drift * ((1.0 - x) * W.g[START_ROUNDING, i] + x * W.g[END_ROUNDING, i])
@@ -374,13 +375,13 @@ def rounding_floor(W, i, x):
 
 @formula
 def rounding_floor_with_time(W, c, i, slope, x):
-    """What is no more than rounding of a guard at a part x of the step, or of time, by which it changes so fast."""
+    """Rounding error of a guard at a fraction x of the step, including that of time for a guard of this slope."""
     return rounding_floor(W, i, x) + TIME_RESOLUTION * max(abs(c.real.t), c.real.largest) * abs(slope)
 
 
 @formula
 def side_at_start(W, i):
-    """The side that guard i is on as the step begins: that which it was last on beyond rounding; 0 if that is none."""
+    """Side of guard i at the start of the step: the last one beyond rounding; 0 if there was none."""
     f = W.g[START_VALUES, i]
     if abs(f) > crossing_floor(W, i, 0.0):
         return 1.0 if f > 0.0 else -1.0
@@ -389,7 +390,7 @@ def side_at_start(W, i):
 
 @formula
 def has_left_side(W, i, s, f, x):
-    """Whether guard i, which was on side s, has left it where it is f: beyond zero, or at zero and was not before."""
+    """Whether guard i has left side s where its value is f: beyond rounding, or newly at zero."""
     return s * f < -crossing_floor(W, i, x) or (
         f == 0.0 and max(s * W.g[LOWEST_VALUES, i], s * W.g[HIGHEST_VALUES, i]) > crossing_floor(W, i, x)
     )
@@ -397,7 +398,7 @@ def has_left_side(W, i, s, f, x):
 
 @formula
 def predict_sensed(W, x, h):
-    """What is measured at a part x of the step, and its rates, to W.sensed; multipliers to W.lam."""
+    """Predict measured quantities and rates at a fraction x of the step in W.sensed, and multipliers in W.lam."""
     n = W.moving.shape[2]
     for m in range(n):
         value, rate = quintic_hermite(W.moving, m, x, h, W.count.short_step == 1)
@@ -417,7 +418,7 @@ def predict_sensed(W, x, h):
 
 @formula
 def write_sensed(W, m, rows, x):
-    """Write what has no known rate to where guards look for it."""
+    """Write a quantity without a known rate to the place where guards read it."""
     if m < rows:
         W.lam[W.rows[m]] = x
     else:
@@ -426,16 +427,16 @@ def write_sensed(W, m, rows, x):
 
 @formula
 def read_sensed(W, m, rows):
-    """What stands there."""
+    """Read a quantity from the place where `write_sensed` writes it."""
     return W.lam[W.rows[m]] if m < rows else W.sensed[W.sensed_places[m - rows, 0], W.sensed_places[m - rows, 1]]
 
 
 @formula
 def quintic_hermite(ends, m, x, h, brief):
-    """Value and rate at a part x of the step of what has values, rates and accelerations ``ends[end, :, m]``."""
+    """Interpolate from ``ends[end, :, m]`` (value, rate, acceleration): value and rate at a fraction x of the step."""
     f, u, a = ends[0, 0, m], h * ends[0, 1, m], h * h * ends[0, 2, m]
     change = ends[1, 0, m] - f
-    if brief or (f == 0.0 and ends[1, 0, m] == 0.0):  # the integral of the rate's own cubic; some are rates of nothing
+    if brief or (f == 0.0 and ends[1, 0, m] == 0.0):  # integrate the rate; it may have no value
         change = 0.5 * (u + h * ends[1, 1, m]) + (a - h * h * ends[1, 2, m]) / 12.0
     d0 = change - u - 0.5 * a
     d1 = h * ends[1, 1, m] - u - a
@@ -447,12 +448,12 @@ def quintic_hermite(ends, m, x, h, brief):
     return value, (u + x * (a + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)))) / h
 
 
-SHORT_STEP_FRACTION = 1e-7  # part of the time span: in steps so short there is nothing but rounding to be found
+SHORT_STEP_FRACTION = 1e-7  # part of the time span; shorter steps contain no events beyond rounding
 
 
 @formula
 def evaluate_guards(callbacks, S, W, R, c, h, x, row):
-    """Write guards at a part x of the step to a row."""
+    """Write the guards at a fraction x of the step to a row."""
     W.count.looks += 1
     if W.count.plain == 1:
         callbacks[7](c.real.t, h, x, S, W, row)
@@ -462,7 +463,7 @@ def evaluate_guards(callbacks, S, W, R, c, h, x, row):
 
 @formula
 def evaluate_guards_exactly(callbacks, S, W, R, c, h, x, row):
-    """Write guards of the equations on the dense output at a part x of the step to a row. Returns a status."""
+    """Write the guards from the equations on the dense output, at a fraction x, to a row. Returns a status."""
     ask, own, watch = callbacks[0], callbacks[1], callbacks[5]
     c.real.part = x
     if ask(own, S, W, R, c, INTERPOLATE) != 0:
@@ -474,7 +475,7 @@ def evaluate_guards_exactly(callbacks, S, W, R, c, h, x, row):
 
 @formula
 def exact_guard(callbacks, S, W, R, c, h, x, i):
-    """Guard i on the dense output at a part x of the step. Returns (status, value)."""
+    """Evaluate guard i on the dense output at a fraction x of the step. Returns (status, value)."""
     if x <= 0.0:
         return 0, W.g[START_VALUES, i]
     if x >= 1.0:
@@ -486,7 +487,7 @@ def exact_guard(callbacks, S, W, R, c, h, x, i):
 
 @formula
 def compare_predictions(predict, S, W, t, h, span):
-    """Note in W.count[PLAIN] whether guards are as expected where stages of the step have met them."""
+    """Compare predictions with the guards at stages of the step; sets W.count.plain to 1 if they agree."""
     ng = W.way.shape[0]
     W.count.exact_looks = W.count.lost = 0
     W.count.plain = 1
@@ -502,7 +503,7 @@ def compare_predictions(predict, S, W, t, h, span):
             f, g = W.compared_values[j, i], W.g[PREDICTED_VALUES, i]
             if f == g or (f != f and g != g):
                 continue
-            if not f - g == f - g:  # a number, and none
+            if not f - g == f - g:  # one is finite, the other is not
                 W.count.plain = 0
             W.g[LOWEST_VALUES, i] = min(W.g[LOWEST_VALUES, i], f, g)
             W.g[HIGHEST_VALUES, i] = max(W.g[HIGHEST_VALUES, i], f, g)

@@ -1,12 +1,12 @@
-"""Where in a step a guard passes zero: search in subintervals, brackets, root refinement.
+"""Search of a step for zeros of guards: subintervals, brackets, root refinement.
 
-A step is searched in subintervals. In each the guards are a polynomial through their values at eight nodes; two
-more places check that, else the subinterval is halved. `guards.evaluate_guards` writes the guards at t + x h to
-a row of ``W.g``.
+A step is searched in subintervals. In each the guards are a polynomial through their values at eight nodes. Two
+more places check it; if it does not fit, the subinterval is halved. `guards.evaluate_guards` writes the guards at
+t + x h to a row of ``W.g``.
 
 Where a guard may pass zero, the sign change is bracketed on the dense output, or shown not to exist. Then the
-step is taken again, by the secant of its width, until it ends on the event: the instant is as accurate as the
-integration, not as its interpolant.
+step is repeated with a width from the secant method until it ends on the event. The event time is therefore as
+accurate as the integration, not as its interpolant.
 """
 
 from __future__ import annotations
@@ -39,35 +39,32 @@ from .guards import (
     rounding_floor_with_time,
 )
 
-MAX_LOOKS = 4000  # places that are looked at before panels are taken as they are: what is not smooth then is rounding
-MAX_EXACT_LOOKS = 1000  # of those with the equations, before the step is cut where it was looked through to
-MIN_CUT_PLACE = 0.1  # part of a step below which it is not cut but taken as it is
-MAX_CUTS = 8  # times that a step is cut before it is taken as it is
-MIN_SUBINTERVAL = 2.0**-14  # part of a step that a panel is not narrower than
-NEAR_ZERO_TOLERANCE = (
-    1e-6  # the same, where it might be zero between two places that are looked at, at slopes seen in the panel
-)
-SLOPE_SAFETY = 1.5  # times the steepest of these that its slope may be between them
-QUIET_DISTANCE = 0.3  # a guard that stays farther from zero than this part of its change has nothing to hide
-ZERO_GUARD = 1e-200  # a guard that is no larger is zero
-GRAZING_DISTANCE = 2e-2  # part of its change within which an extremum is looked at with the equations
-SLOPE_SAMPLES = 16  # of a panel, in which slopes are compared
-START_SLOPE_STEP = 2.0**-40  # part of a step over which slopes at its start are found
+MAX_LOOKS = 4000  # places evaluated before unresolved subintervals are accepted: remaining roughness is rounding
+MAX_EXACT_LOOKS = 1000  # of those with the equations, before the step is cut to the part already searched
+MIN_CUT_PLACE = 0.1  # part of a step below which it is not cut
+MAX_CUTS = 8  # times that a step is cut before it is accepted as it is
+MIN_SUBINTERVAL = 2.0**-14  # smallest subinterval, as a part of the step
+NEAR_ZERO_TOLERANCE = 1e-6  # tolerance instead of `POLYNOMIAL_TOLERANCE` if the guard might be zero between two nodes
+SLOPE_SAFETY = 1.5  # safety factor on the steepest slope between nodes
+QUIET_DISTANCE = 0.3  # a guard farther from zero than this part of its change cannot cross
+ZERO_GUARD = 1e-200  # a smaller guard counts as zero
+GRAZING_DISTANCE = 2e-2  # distance of an extremum from zero, relative to the change, within which it is checked exactly
+SLOPE_SAMPLES = 16  # intervals of a subinterval in which slopes are compared
+START_SLOPE_STEP = 2.0**-40  # part of a step over which slopes at its start are computed
 CLOSEST_START_POWER, FARTHEST_START_POWER = (
     44,
     5,
-)  # powers of a half: places near the start where a guard that begins at zero is looked at
-TRIGGERED_ZERO_TOLERANCE = (
-    1e-6  # part of its size in a step by which a guard that has just fired is not more than about zero
-)
-START_ZERO_TOLERANCE = 1e-12  # part of its size in a step by which any other guard is not more than zero
+)  # powers of one half: places near the start where a guard that begins at zero is evaluated
+TRIGGERED_ZERO_TOLERANCE = 1e-6  # relative size within which a guard that has just triggered counts as zero
+START_ZERO_TOLERANCE = 1e-12  # relative size within which any other guard counts as zero
 
 
 @formula
 def find_crossing_interval(callbacks, S, W, R, c, h, first):
-    """The first place after ``first`` where a guard passes zero or comes near: (guard or -1, from, to).
+    """Find the first interval after ``first`` in which a guard passes or approaches zero: (guard or -1, from, to).
 
-    From and to are parts of the step. Sides go on from W.g[SIDE]. W.real[DONE_TO] is 1, or how far it has come.
+    From and to are parts of the step. The search continues with the sides in W.g[SIDES]. W.real.searched_to is 1, or
+    the place where the search stopped.
     """
     a = first
     w = 1.0 - first
@@ -107,7 +104,7 @@ def find_crossing_interval(callbacks, S, W, R, c, h, first):
 
 @formula
 def evaluate_subinterval(callbacks, S, W, R, c, h, a, w):
-    """Guards at the nodes of a panel and where it is checked; at the ends of the step they are known."""
+    """Write the guards at the nodes and check places of a subinterval; values at the ends of the step are known."""
     for j in range(NODES + CHECK_NODES):
         x = a + w * W.nodes[j]
         row = NODE_VALUES + j
@@ -120,10 +117,10 @@ def evaluate_subinterval(callbacks, S, W, R, c, h, a, w):
 
 @formula
 def subinterval_resolved(W):
-    """Whether every guard is the polynomial through its values at the nodes.
+    """Whether the polynomial through the nodes represents every guard.
 
-    A corner, as of the distance of what flies past or through something, is hardly seen where this is checked: 8 in 30
-    differ by less than `POLYNOMIAL_TOLERANCE`. So it is asked closely of a guard that may have been zero between two nodes.
+    The check places hardly detect a corner, such as the distance to an object that is passed or hit: 8 in 30 differ by
+    less than `POLYNOMIAL_TOLERANCE`. So a guard that may have been zero between two nodes gets a smaller tolerance.
     """
     for i in range(W.way.shape[0]):
         low, high = value_range(W, i)
@@ -142,7 +139,7 @@ def subinterval_resolved(W):
 
 @formula
 def may_cross_between_nodes(W, i):
-    """Whether a guard may fire and come back between two nodes: the sum of both is less than it can fall and rise."""
+    """Whether a guard may cross zero twice between two nodes: its slope allows a change by the sum of both."""
     steepest = 0.0
     for j in range(1, NODES):
         steepest = max(
@@ -158,7 +155,7 @@ def may_cross_between_nodes(W, i):
 
 @formula
 def value_range(W, i):
-    """Least and largest value of a guard in the panel; both nan if it is not a number somewhere."""
+    """Smallest and largest value of a guard in the subinterval; both nan if it is nan somewhere."""
     low = W.g[NODE_VALUES, i]
     high = low
     for j in range(1, NODES + CHECK_NODES):
@@ -172,15 +169,15 @@ def value_range(W, i):
 
 @formula
 def both_finite(low, high):
-    """Whether both are numbers."""
+    """Whether both numbers are finite."""
     return low - low == 0.0 and high - high == 0.0
 
 
 @formula
 def may_cross(W, i):
-    """Whether a guard comes near zero in the panel. One that does not is on the side that it stays on."""
+    """Whether a guard comes near zero in the subinterval. Otherwise its side is set to that of its values."""
     low, high = value_range(W, i)
-    if not both_finite(low, high):  # not watched, or not everywhere
+    if not both_finite(low, high):  # not defined, or not everywhere
         return both_finite(W.g[NODE_VALUES, i], 0.0) or both_finite(W.g[NODE_VALUES + NODES - 1, i], 0.0)
     if max(abs(low), abs(high)) < ZERO_GUARD + (0.0 if is_law_corner(W, i) else subinterval_floor(W, i)):
         return False
@@ -196,25 +193,25 @@ def may_cross(W, i):
 
 @formula
 def subinterval_floor(W, i):
-    """What is rounding of guard i anywhere in the panel."""
+    """Rounding floor of guard i, the smaller one of both ends of the subinterval."""
     return min(rounding_floor(W, i, W.real.subinterval), rounding_floor(W, i, W.real.subinterval + W.real.width))
 
 
 @formula
 def side_of(f):
-    """On which side of zero a value is; 0 if it is none."""
+    """Sign of a value: 1, -1, or 0."""
     return 1.0 if f > 0.0 else (-1.0 if f < 0.0 else 0.0)
 
 
 @formula
 def triggers(way, side):
-    """Whether a guard that leaves that side fires."""
+    """Whether leaving that side is an event of a guard with this direction."""
     return side != 0.0 and way * side <= 0.0
 
 
 @formula
 def crossing_of_polynomial(W, i):
-    """Where in a panel guard i first passes zero, or may: (from, to), or to < 0. Its side goes on to there."""
+    """Find where guard i first passes zero in a subinterval, or may: (from, to), or to < 0. Updates its side."""
     low, high = value_range(W, i)
     if not both_finite(low, high):
         return crossing_at_nodes(W, i)
@@ -228,7 +225,7 @@ def crossing_of_polynomial(W, i):
         f1, d1 = polynomial_value(W, y)
         if n == SLOPE_SAMPLES - 1:
             f1 = W.g[NODE_VALUES + NODES - 1, i]
-        if s * d < 0.0 and s * d1 >= 0.0:  # it goes towards zero, and away again
+        if s * d < 0.0 and s * d1 >= 0.0:  # it approaches zero and then recedes
             z = x + (y - x) * d / (d - d1)
             fz, _ = polynomial_value(W, z)
             left = has_left_side(W, i, s, fz, place_in_step(W, z)) and triggers(W.way[i], s)
@@ -249,7 +246,7 @@ def crossing_of_polynomial(W, i):
 
 @formula
 def crossing_at_nodes(W, i):
-    """As `crossing_of_polynomial`, of a guard that is no polynomial: by its values at the nodes."""
+    """Find the crossing as `crossing_of_polynomial`, from values at the nodes, for an unresolved guard."""
     s = W.g[SIDES, i]
     for j in range(1, NODES):
         f = W.g[NODE_VALUES + j, i]
@@ -270,13 +267,13 @@ def crossing_at_nodes(W, i):
 
 @formula
 def place_in_step(W, y):
-    """What place in the step a place in the panel is."""
+    """Convert a place in the subinterval to a place in the step."""
     return W.real.subinterval + W.real.width * y
 
 
 @formula
 def polynomial_coefficients(W, i):
-    """The polynomial of guard i in powers of the place in the panel."""
+    """Compute the power coefficients of guard i over the subinterval."""
     for p in range(NODES):
         s = 0.0
         for j in range(NODES):
@@ -286,7 +283,7 @@ def polynomial_coefficients(W, i):
 
 @formula
 def polynomial_value(W, x):
-    """That polynomial and its slope."""
+    """Value and slope of the polynomial in W.polynomial."""
     f = 0.0
     d = 0.0
     for p in range(NODES - 1, -1, -1):
@@ -297,11 +294,11 @@ def polynomial_value(W, x):
 
 @formula
 def find_start_sides(callbacks, S, W, R, c, h):
-    """Sides as the step begins, in W.g[SIDE]: (guard that leaves its side at once or -1, from, to, where to go on).
+    """Find the sides at the start of the step: (guard that leaves its side at once or -1, from, to, where to continue).
 
-    A guard that is about zero as a segment of the motion begins, above all one that has just fired (its side is 0), is
-    on the side that it goes to: places closer and closer to the start tell which that is, and whether it comes back
-    soon. One that has to stay above zero (W.kept) has not to go below: W.count[AWAY] says that it does.
+    A guard about zero at the start of a segment, above all one that has just triggered (side 0), gets the side to which
+    it moves. It is evaluated at places near the start, in order of distance, which show the side and an early return. A
+    guard that must stay above zero (W.kept) must not go below; W.count.leaves_kept_side is 1 if it does.
     """
     look, t, ng = callbacks[7], c.real.t, W.way.shape[0]
     W.count.leaves_kept_side = 0
@@ -318,7 +315,7 @@ def find_start_sides(callbacks, S, W, R, c, h):
         look(t, h, x, S, W, PREDICTED_VALUES)
         W.count.looks += 1
         i = leaves_start_side(W, 0)
-        while i >= 0 and W.count.leaves_kept_side == 1:  # the equations tell whether it is: interpolation is less exact
+        while i >= 0 and W.count.leaves_kept_side == 1:  # check with the equations: interpolation is less accurate
             status, f = exact_guard(callbacks, S, W, R, c, h, x, i)
             if status != 0 or not f >= -allowed_depth(W, i):
                 break
@@ -334,7 +331,7 @@ def find_start_sides(callbacks, S, W, R, c, h):
 
 @formula
 def has_doubtful_side(W):
-    """Whether a guard that has to stay above zero is about zero since the motion's segment began."""
+    """Whether a guard that must stay above zero has been about zero since the start of the segment."""
     n = 0
     for i in range(W.way.shape[0]):
         if W.kept[i] == 1 and W.side[i] <= 0.0 and W.g[START_VALUES, i] == W.g[START_VALUES, i]:
@@ -344,7 +341,7 @@ def has_doubtful_side(W):
 
 @formula
 def mark_zero_starts(callbacks, S, W, R, c, h):
-    """Note in W.g[MARK] what is zero of guards that begin about there, -1 of others; whether there are any."""
+    """Write zero bands of guards that begin near zero to W.g[ZERO_BANDS], else -1; returns if there are any."""
     evaluate_subinterval(callbacks, S, W, R, c, h, 0.0, 1.0)
     first = min(1.0, max(START_SLOPE_STEP, 4.0 * TIME_RESOLUTION * max(abs(c.real.t), c.real.largest) / h))
     callbacks[7](c.real.t, h, first, S, W, PREDICTED_VALUES)
@@ -378,7 +375,7 @@ def mark_zero_starts(callbacks, S, W, R, c, h):
 
 @formula
 def leaves_start_side(W, first):
-    """A guard from ``first`` on that leaves at once the side that it went to, or has to keep, by W.g[THERE]; or -1."""
+    """Return the first guard from ``first`` on that leaves its side near the start, by the predicted values; or -1."""
     for i in range(first, W.way.shape[0]):
         f = W.g[PREDICTED_VALUES, i]
         s = W.g[SIDES, i]
@@ -399,7 +396,7 @@ def leaves_start_side(W, first):
 
 @formula
 def has_undecided_side(W):
-    """Whether a guard that begins about zero is on no side yet, or has to be followed to the end."""
+    """Whether a guard that begins about zero has no side yet, or must be followed to the end of the search."""
     n = 0
     for i in range(W.way.shape[0]):
         if W.g[ZERO_BANDS, i] >= 0.0 and (W.g[SIDES, i] == 0.0 or W.kept[i] == 1):
@@ -409,7 +406,7 @@ def has_undecided_side(W):
 
 @formula
 def allowed_depth(W, i):
-    """How far below zero a guard that has to stay above may be by rounding."""
+    """Depth below zero that rounding allows for a guard that must stay above zero."""
     size = max(abs(W.g[LOWEST_VALUES, i]), abs(W.g[HIGHEST_VALUES, i]))
     return max(
         W.g[ZERO_BANDS, i],
@@ -421,37 +418,35 @@ def allowed_depth(W, i):
 
 @formula
 def allowed_depth_factor(W, i):
-    """How many times as far below zero as it begins a guard may be by rounding: no farther where it is firm.
+    """Factor on the initial depth below zero that rounding allows: 1 if the guard may get no deeper.
 
-    What bounces beneath a stop would sink by that factor from bounce to bounce.
+    With a larger factor, a body that bounces below a stop would sink from bounce to bounce.
     """
     return 1.0 if W.no_deeper[i] == 1 else ROUNDING_FACTOR
 
 
 GOLDEN_SECTION = 0.381966011250105
-MAX_EVALUATIONS = 60  # evaluations in which a bracket is closed, or an extremum found
-BRACKET_TOLERANCE = 1e-13  # part of the step that a bracket is closed to
-EXTREMUM_TOLERANCE = 1e-8  # part of the step to which the place of an extremum is found
-MAX_RETAKES = 80  # times that a step is taken again
-JUMP_SLOPE_RATIO = (
-    1.5  # times the slope seen before: a guard that falls so past zero may jump there, and tells no place
-)
-END_VALUE_FACTOR = 1e3  # times that by which a guard may be beside zero where a step ends on it
-WIDTH_TOLERANCE = 1e-14  # part of a step's width to which it ends on an event: solutions of equations are no better
+MAX_EVALUATIONS = 60  # evaluations to close a bracket, or to find an extremum
+BRACKET_TOLERANCE = 1e-13  # width of a closed bracket, as a part of the step
+EXTREMUM_TOLERANCE = 1e-8  # accuracy of the place of an extremum, as a part of the step
+MAX_RETAKES = 80  # times that a step is repeated
+JUMP_SLOPE_RATIO = 1.5  # steeper than this factor times the known slope, a guard may jump: the secant is not used
+END_VALUE_FACTOR = 1e3  # factor on (time tolerance * slope): a guard below that is zero at the end
+WIDTH_TOLERANCE = 1e-14  # relative accuracy of the width of a step that ends on an event
 
 
 @formula
 def locate_crossing(callbacks, S, W, R, c, h, i, a, b, s):
-    """Where in the step guard i fires, on side s at a, expected by b: (status, place or -1 if it does not).
+    """Find where guard i leaves side s, predicted between a and b: (status, place or -1 if it does not).
 
-    Where it only fires as it comes back to that side, it has to be on the other one in between. W.real[BEYOND] is a
-    place where it has not fired yet, which the start need not be.
+    If only the return to that side is an event, the guard must be on the other side in between. W.real.beyond is a
+    place where it has not triggered yet, which is not always the start.
     """
     W.real.beyond = 0.0
     first, last = a, b
     status, fa = exact_guard(callbacks, S, W, R, c, h, a, i)
-    wide = max(b - a, BRACKET_TOLERANCE)  # a place may be told twice
-    while status == 0 and not s * fa > 0.0 and a > 0.0:  # earlier than expected
+    wide = max(b - a, BRACKET_TOLERANCE)  # the interval may have zero width
+    while status == 0 and not s * fa > 0.0 and a > 0.0:  # crossing earlier than predicted
         b = a
         a = max(0.0, a - wide)
         wide *= 4.0
@@ -459,11 +454,11 @@ def locate_crossing(callbacks, S, W, R, c, h, i, a, b, s):
     if status != 0:
         return status, -1.0
     if a <= 0.0 and W.kept[i] == 0 and abs(fa) <= W.g[ZERO_BANDS, i]:
-        fa = 0.0  # on no side: it is rounding
+        fa = 0.0  # rounding: on no side
     elif a <= 0.0 and s * W.side[i] == 1.0 and s * fa <= 0.0 and -s * fa < crossing_floor(W, i, 0.0):
-        status, fb = exact_guard(callbacks, S, W, R, c, h, last, i)  # the step before ended beside it
+        status, fb = exact_guard(callbacks, S, W, R, c, h, last, i)  # the previous step ended next to it
         return status, (BRACKET_TOLERANCE if s * fb < -crossing_floor(W, i, last) else -1.0)
-    if not s * fa > 0.0:  # it is on that side nowhere before: only for a while, perhaps, or not at all
+    if not s * fa > 0.0:  # it is not on that side at the start: perhaps for a while within, or never
         b = last
         status, a, fa = find_minimum(callbacks, S, W, R, c, h, i, max(0.0, first - (last - first)), last, -s)
         if status != 0 or not s * fa > 0.0:
@@ -471,7 +466,7 @@ def locate_crossing(callbacks, S, W, R, c, h, i, a, b, s):
     status, fb = exact_guard(callbacks, S, W, R, c, h, b, i)
     if status != 0:
         return status, -1.0
-    if s * fb > 0.0:  # it may come back in between
+    if s * fb > 0.0:  # it may return in between
         status, m, fm = find_minimum(callbacks, S, W, R, c, h, i, a, b, s)
         if status != 0 or s * fm > (0.0 if W.kept[i] == 1 else -crossing_floor(W, i, m)):
             return status, -1.0
@@ -480,18 +475,18 @@ def locate_crossing(callbacks, S, W, R, c, h, i, a, b, s):
         else:
             a, fa = m, fm
     elif W.kept[i] == 0 and s * fb >= -crossing_floor(W, i, b) and not (fb == 0.0 and s * fa > crossing_floor(W, i, a)):
-        return 0, -1.0  # it gets to zero, and no farther
+        return 0, -1.0  # it reaches zero without passing it
     begun = W.kept[i] == 0 and abs(W.g[START_VALUES, i]) <= W.g[ZERO_BANDS, i]  # about zero, on no side
     if a > 0.0 and (begun or W.g[START_VALUES, i] * fa < 0.0):
         W.real.beyond = a
     W.real.bracket = b - a
     status, x = refine_root(callbacks, S, W, R, c, h, i, (a, fa, b, fb))
-    return status, max(x, BRACKET_TOLERANCE)  # one within rounding of the step's start is an event too
+    return status, max(x, BRACKET_TOLERANCE)  # an event within rounding of the start counts too
 
 
 @formula
 def find_minimum(callbacks, S, W, R, c, h, i, a, b, s):
-    """The least of s times guard i between a and b, or a place where it is not above zero: (status, place, value).
+    """Minimise s times guard i between a and b, or find a place where it is not positive: (status, place, value).
 
     Golden section with parabolas (Brent 1973, chapter 5).
     """
@@ -544,8 +539,8 @@ def find_minimum(callbacks, S, W, R, c, h, i, a, b, s):
 
 @formula
 def refine_root(callbacks, S, W, R, c, h, i, bracket):
-    """Where in a bracket (a, f, b, f) guard i passes zero: (status, place). Chandrupatla (1997)."""
-    x2, f2, x1, f1 = bracket  # the newest is 1; 1 and 2 are on two sides
+    """Find where guard i passes zero in a bracket (a, f, b, f): (status, place). Chandrupatla (1997)."""
+    x2, f2, x1, f1 = bracket  # point 1 is the newest; 1 and 2 have different signs
     x3, f3 = x2, f2
     t = 0.5
     for n in range(MAX_EVALUATIONS):
@@ -576,7 +571,7 @@ def refine_root(callbacks, S, W, R, c, h, i, bracket):
 
 @formula
 def retake_step(callbacks, S, W, R, c, h):
-    """Take the step again with width h, and note its end. Returns a status."""
+    """Repeat the step with width h, and store the guards at its end. Returns a status."""
     ask, own, note = callbacks[0], callbacks[1], callbacks[6]
     W.count.again += 1
     c.real.tried = h
@@ -588,17 +583,17 @@ def retake_step(callbacks, S, W, R, c, h):
 
 @formula
 def end_step_on_event(callbacks, S, W, R, c, h, slope, i, s, between):
-    """Take the step again until it ends where guard i leaves side s, near width h: (status, whether it does).
+    """Repeat the step until it ends where guard i leaves side s, starting from width h: (status, whether it does).
 
-    The secant on the width; by halves where a guard jumps. ``slope``: of the guard by time, before it leaves;
-    ``between``: a width at which it has not left, and the width of the step as it was. It does not end there where
-    the guard was on that side nowhere, or has not left it at the end: the dense output told of what did not happen.
+    Secant method on the width; bisection where a guard jumps. ``slope``: time derivative of the guard before the event;
+    ``between``: a width at which it has not left, and the original width of the step. The search fails if the guard is
+    never on that side, or has not left it at the end; the dense output was misleading then.
     """
     least, most = between
     ulp = ULP * max(abs(c.real.t) + h, 1e-3 * c.real.largest)
     near = 2.0 * ulp + WIDTH_TOLERANCE * h
     low, high = least, most
-    bound = False  # whether a step that does not reach the event is known
+    bound = False  # whether a step that ends before the event is known
     rough = stride = BRACKET_TOLERANCE * most + 4.0 * ulp
     last, before, gone = 0.0, 0.0, 1e300
     status, done = 0, False
@@ -638,7 +633,7 @@ def end_step_on_event(callbacks, S, W, R, c, h, slope, i, s, between):
 
 @formula
 def bisected_width(h, low, high, stride, lower, upper, forward):
-    """A width between those known to fall short of the event and to reach it; ``lower``, ``upper``: which are known."""
+    """Choose a width between one before the event and one after; ``lower``, ``upper``: which of them are known."""
     if lower and upper:
         return 0.5 * (low + high)
     if forward:

@@ -131,7 +131,7 @@ DOP853_A: tuple[dict[int, float], ...] = (
         14: -9.15095847217987,
     },
 )
-"""Stage i from those before; the 13th is the step itself, the last three are for dense output only."""
+"""Coefficients of stage i; the 13th is the step itself, the last three are for dense output only."""
 DOP853_E5 = {
     0: 0.01312004499419488,
     5: -1.2251564463762044,
@@ -153,7 +153,7 @@ DOP853_E3 = {
     10: 0.20136540080403034,
     11: 0.02265179219836082,
 }
-"""Error estimate of order 3, which damps the other."""
+"""Error estimate of order 3, which damps that of order 5."""
 DOP853_D: tuple[dict[int, float], ...] = (
     {
         0: -8.428938276109013,
@@ -212,23 +212,23 @@ DOP853_D: tuple[dict[int, float], ...] = (
         15: -149.72683625798564,
     },
 )
-"""Dense output, beyond what values and slopes at both ends give."""
+"""Coefficients of dense output, in addition to values and slopes at both ends."""
 
 
 INTERPOLANT_ERROR_SCALE, INTERPOLANT_ERROR_DAMPING = 1.6e-3, 0.2
-"""The coefficients c7, c6 of dop853's dense output tell by how much it is off within a step at most: see `astray`.
+"""Scale and damping that turn the coefficients c7, c6 of dop853's dense output into a bound of its error.
 
-For y' = lambda y that is 1.2e-3 c7, to a fifth, wherever h |lambda| is 1 to 6.5, whatever the argument of lambda; and
-c7 is c6/3 from 2 on. Where the step is narrow for what the solution does c7/c6 is small, and it is about c8/256, c8
-being c7^2/c6. The error estimate of the step does not see this: on the real axis, as h lambda goes to -6, the dense
-output is off by 80 times that, where rk45's never is by 2.5 times.
+See `explicit_runge_kutta.dense_output_error`. For y' = lambda y the error is 1.2e-3 c7, within a fifth, for h |lambda|
+from 1 to 6.5 and any argument of lambda; and c7 is c6/3 from 2 on. For narrow steps c7/c6 is small, and the error is
+about c8/256, with c8 = c7^2/c6. The error estimate of the step does not show this: on the real axis, as h lambda goes
+to -6, the error of the dense output is 80 times the estimate, where rk45's never exceeds 2.5 times.
 """
 
 
 class Tableau(NamedTuple):
-    """One explicit pair with dense output, all as arrays, so that one compiled loop serves every method.
+    """An explicit pair with dense output, stored as arrays so that one compiled loop serves every method.
 
-    Stage i is f(t + c[i] h, y + h sum A[i, j] K[j]); the first ``order_i[1]`` stages make the step, the next is the
+    Stage i is f(t + c[i] h, y + h sum A[i, j] K[j]). The first ``order_i[1]`` stages define the step, the next is the
     derivative at its end, the rest are only for dense output. The interpolant is
     y(t + x h) = y + h sum_j K[j] sum_p P[j, p] x^(p + 1).
     """
@@ -237,8 +237,8 @@ class Tableau(NamedTuple):
     c: Float1  # (all stages,)
     E: Float2  # (2, all stages): two error estimates; the second damps the first (zero: not used)
     P: Float2  # (all stages, degree)
-    D: Float2  # (2, all stages): error of the interpolant, and what damps it; zero where that of the step bounds it
-    order_i: Int1  # order that the step control assumes, stages of a step, all stages
+    D: Float2  # (2, all stages): error of the interpolant, and its damping; zero if the error of the step bounds it
+    order_i: Int1  # order for step control, stages of a step, all stages
 
 
 def _rk45() -> Tableau:
@@ -271,7 +271,7 @@ def _rk45() -> Tableau:
 
 
 def _dop853() -> Tableau:
-    """Order 8(5,3), 12 stages, dense output of order 7; its source is named in `dop853`."""
+    """Dormand and Prince, order 8(5,3), 12 stages, dense output of order 7; for sources see the module docstring."""
     s = len(DOP853_C)
     A = np.array([_dense_row(row, s) for row in DOP853_A])
     E = np.array([_dense_row(DOP853_E5, s), _dense_row(DOP853_E3, s)])
@@ -299,7 +299,7 @@ TABLEAUX = {"dop853": _dop853, "rk45": _rk45}
 
 @cache
 def tableau(name: str) -> Tableau:
-    """The method of that name.
+    """Return the method of that name.
 
     Raises
     ------
@@ -323,7 +323,7 @@ ORDER_CONDITIONS: dict[int, list[tuple[str, float, Callable[[np.ndarray, np.ndar
     ],
 }
 """Order conditions: Hairer, Norsett and Wanner, *Solving Ordinary Differential Equations I* (1993), table II.2.1."""
-COEFFICIENT_TOLERANCE = 1e-10  # of coefficients that are given as decimals
+COEFFICIENT_TOLERANCE = 1e-10  # for coefficients that are given as decimals
 
 
 def runge_kutta(
@@ -335,30 +335,29 @@ def runge_kutta(
     embedded: Sequence[float] | None = None,
     dense: Sequence[Sequence[float]] | None = None,
 ) -> None:
-    """Define an explicit Runge-Kutta method: ``simulate(method=name)`` then uses it.
+    """Define an explicit Runge-Kutta method, to be used as ``simulate(method=name)``.
 
     Parameters
     ----------
     name : str
     A : s rows
         Row i holds the coefficients of the stages before stage i; a row may be shorter than s. The sums of the rows are
-        the parts c_i of the step at which the stages are.
+        the nodes c_i, the places of the stages in the step.
     b : s numbers
         Weights of the stages.
     order : int
         Order of accuracy. The order conditions up to 4 are checked.
     embedded : s or s + 1 numbers, optional
-        Weights of a second solution of one order less, whose difference is the error that the width of steps is
-        controlled by; the number s + 1 is of the derivative at the end of the step. Without it, ``simulate`` needs
-        ``step=``.
+        Weights of a second solution of one order less. The difference of both is the error for step control. The number
+        s + 1 belongs to the derivative at the end of the step. Without embedded weights, ``simulate`` needs ``step=``.
     dense : s + 1 rows, optional
         For the state at a part x of a step: coefficients of x, x^2, ... of each stage, and of the derivative at the
-        end. Not given: cubic Hermite interpolation, for an order of 4 at most.
+        end. Default: cubic Hermite interpolation, for an order of at most 4.
 
     Raises
     ------
     ModelError
-        If the name is taken, or the numbers are no such method.
+        If the name is taken, or the coefficients do not define a method of this order.
     """
     who = f"Runge-Kutta method {name!r}"
     s = len(b)
@@ -396,7 +395,7 @@ RESERVED_NAMES = (*TABLEAUX, "auto", "radau", "generalised-alpha", "variational"
 
 
 def _check_order(who: str, A: np.ndarray, b: np.ndarray, order: int, most: int) -> None:
-    """Refuse weights that do not have an order of ``order``."""
+    """Raise an error if the weights do not satisfy the order conditions up to ``order``."""
     if not isinstance(most, int) or most < 1:
         raise ModelError(f"{who}: order must be a whole number from 1 on, got {most!r}")
     c = A.sum(axis=1)
@@ -406,7 +405,7 @@ def _check_order(who: str, A: np.ndarray, b: np.ndarray, order: int, most: int) 
 
 
 def _cubic_hermite(who: str, b: np.ndarray, order: int) -> np.ndarray:
-    """Cubic interpolation through the states and derivatives at both ends of a step."""
+    """Cubic Hermite interpolation through the states and derivatives at both ends of a step."""
     if order > 4:
         raise ModelError(f"{who}: of an order above 4 give dense=..., as cubic interpolation would be less accurate")
     P = np.outer(np.append(b, 0.0), [0.0, 3.0, -2.0])

@@ -1,13 +1,13 @@
 """Explicit Runge-Kutta pairs as a method of the `time_loop`: adaptive steps, dense output, rejected steps.
 
 One step, its error and its dense output; step control after Hairer, Norsett and Wanner, *Solving Ordinary
-Differential Equations I* (1993), section II.4. It is given ``derivative(t, y, dy, S, W)``, ``arrive(t, y, dy,
-S, W)``, which also projects y, ``tangent(y, e, S, W)``, which projects an error, and ``inspect(t, h, span, k,
-seen, S, W)``, which reports where in a step laws change in a way that its stages have not seen.
+Differential Equations I* (1993), section II.4. Callbacks: ``derivative(t, y, dy, S, W)``; ``arrive(t, y, dy, S,
+W)``, which also projects y; ``tangent(y, e, S, W)``, which projects an error; ``inspect(t, h, span, k, seen, S,
+W)``, which reports where in a step laws change without being seen at its stages.
 
-A rejected step is followed by a shorter one, unless its error is rounding: near a singular position of a
-mechanism rounding grows without bound, and shorter steps lead into it. There the previous step is undone and
-ended elsewhere, or the position is passed by a wide step.
+A rejected step is followed by a shorter one, unless its error is rounding. Near a singular position of a
+mechanism rounding errors grow without bound, and shorter steps approach that position. Then the previous step is
+undone and ended elsewhere, or the position is passed by a wide step.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ from .time_loop import (
     step_end_time,
 )
 
-DISTANT_SIZE_WEIGHT = 1e-3  # of a coordinate beyond the mechanism's size, what its tolerance still grows with
-UNKNOWN_ERROR = 1e300  # the error of a step that was not tried, or is no number
-MIN_FIRST_STEP = 1e-7  # part of the largest step: the least that is tried first
+DISTANT_SIZE_WEIGHT = 1e-3  # weight in the tolerance of the part of a coordinate beyond the size of the mechanism
+UNKNOWN_ERROR = 1e300  # error of a step that was not tried, or is nan
+MIN_FIRST_STEP = 1e-7  # smallest first step, as a part of the largest step
 
 
 @formula
 def stage_state(y, K, weights, stages, h, out):
-    """Out = y + h sum_j weights[j] K[j]."""
+    """Compute ``out`` = y + h sum_j weights[j] K[j]."""
     n = y.shape[0]
     for i in range(n):
         out[i] = 0.0
@@ -64,10 +64,10 @@ def stage_state(y, K, weights, stages, h, out):
 
 @formula
 def component_tolerance(c, i, size):
-    """Tolerance of component i of that size.
+    """Tolerance of component i for a value of that size.
 
-    Of the first c.count.positions what is beyond the size of what moves counts little: that a wheel has turned a
-    hundred times, or that the world's origin is far away, is no reason to be less accurate.
+    For the first c.count.positions components, the part beyond the size of the mechanism counts little: accuracy
+    must not decrease because a wheel has turned a hundred times, or because the origin is far away.
     """
     if i < c.count.positions:
         size = max(min(size, max(1.0, c.real.scale)), DISTANT_SIZE_WEIGHT * size)
@@ -86,9 +86,9 @@ def scaled_norm(c, a, y, n):
 
 @formula
 def first_step_width(derivative, S, W, R, c):
-    """A first step width from the sizes of y, y' and y'' (Hairer, Norsett and Wanner, section II.4).
+    """Estimate a first step width from the sizes of y, y' and y'' (Hairer, Norsett and Wanner, section II.4).
 
-    A state that begins at rest near zero is small without changing fast: hence the least.
+    The width has a lower bound, because a state that begins at rest near zero is small without changing fast.
     """
     n = c.count.controlled
     y = c.y[CURRENT]
@@ -110,7 +110,7 @@ def first_step_width(derivative, S, W, R, c):
 
 @formula
 def attempt_explicit_step(derivative, arrive, tangent, S, W, R, c, h):
-    """One step of width h into c.y[NEW]. Returns (status, error in units of the tolerance; 0 if it is fixed)."""
+    """Try one step of width h to c.y[PROPOSED]. Returns (status, error in units of the tolerance; 0 if it is fixed)."""
     y = c.y[CURRENT]
     new = c.y[PROPOSED]
     stages = R.order_i[1]
@@ -129,13 +129,13 @@ def attempt_explicit_step(derivative, arrive, tangent, S, W, R, c, h):
     error = step_error(tangent, S, W, R, c, h, False)
     if error > 1.0 and c.real.accepted_error > 0.0:
         error = step_error(tangent, S, W, R, c, h, True)
-    error = moved if error <= moved else error  # an error that is no number stays one, and is refused
+    error = moved if error <= moved else error  # a nan error remains, and the step is rejected
     return 0, 0.0 if c.real.step > 0.0 and error < UNKNOWN_ERROR else error
 
 
 @formula
 def step_error(tangent, S, W, R, c, h, projected):
-    """Error of the step in units of the tolerance; ``projected``: of what is left of it once the state is projected."""
+    """Error of the step in units of the tolerance; ``projected``: after projection on the constraints."""
     e5 = error_square_sum(tangent, S, W, R, c, 0, projected)
     e3 = error_square_sum(tangent, S, W, R, c, 1, projected)
     return 0.0 if e5 == 0.0 and e3 == 0.0 else h * e5 / sqrt((e5 + 0.01 * e3) * max(c.count.controlled, 1))
@@ -163,7 +163,7 @@ def error_square_sum(tangent, S, W, R, c, k, projected):
 
 @formula
 def integral_tolerance(c):
-    """Tolerance of the accounts: relative to all that stands in them and to c.real.ledger."""
+    """Tolerance of the integrals (works): relative to the sum of their sizes and c.real.energy_size."""
     size = c.real.energy_size
     for k in range(c.integrals.shape[0]):
         size += abs(c.y[PROPOSED, c.integrals[k]])
@@ -172,9 +172,9 @@ def integral_tolerance(c):
 
 @formula
 def integral_error(R, c, h):
-    """Error of the accounts in units of their tolerance.
+    """Error of the integrals in units of their tolerance.
 
-    Where coordinates follow a driver their errors say nothing of forces that change abruptly; works do.
+    If a driver prescribes the coordinates, their errors do not show abrupt changes of forces; the works do.
     """
     n = c.integrals.shape[0]
     s = integral_tolerance(c)
@@ -214,9 +214,9 @@ def dense_output(R, c, x, h, out):
 
 @formula
 def dense_output_error(R, c, h):
-    """By how much the dense output is off within the step, in units of the tolerance; 0 where steps bound that.
+    """Error of the dense output within the step, in units of the tolerance; 0 if the error of the step bounds it.
 
-    From its stages alone, which `evaluate_dense_stages` has made: no evaluation.
+    Uses only the stages computed by `evaluate_dense_stages`, without further evaluations.
     """
     n, m = c.count.controlled, c.integrals.shape[0]
     s = integral_tolerance(c)
@@ -235,9 +235,9 @@ def dense_output_error(R, c, h):
 
 @formula
 def stiffness_estimate(R, c, h):
-    """About the step's width times the largest eigenvalue, as its last two stages tell, which are both at its end.
+    """Estimate the step width times the largest eigenvalue from the last two stages, which are both at its end.
 
-    The first look of Hairer and Wanner's dop853.f at whether a problem is stiff. Exact for y' = lambda y.
+    First stiffness criterion of Hairer and Wanner's dop853.f. Exact for y' = lambda y.
     """
     last = R.order_i[1]
     a = b = 0.0
@@ -253,7 +253,7 @@ def stiffness_estimate(R, c, h):
 
 @formula
 def dense_output_residual(R, c, k, i):
-    """One of the two sums over stages that tell what the dense output of component i is off by, per second."""
+    """One of the two weighted sums over stages for the error of the dense output of component i, per second."""
     e = 0.0
     for j in range(R.order_i[2]):
         e += R.D[k, j] * c.K[j, i]
@@ -262,7 +262,7 @@ def dense_output_residual(R, c, k, i):
 
 @formula
 def evaluate_dense_stages(derivative, S, W, R, c, h):
-    """The stages that only dense output needs. Returns a status."""
+    """Evaluate the stages that only dense output needs. Returns a status."""
     for k in range(R.order_i[1] + 1, R.order_i[2]):
         stage_state(c.y[CURRENT], c.K, R.A[k], k, h, c.y[INTERPOLATED])
         status = derivative(c.real.t + R.c[k] * h, c.y[INTERPOLATED], c.K[k], S, W)
@@ -273,9 +273,9 @@ def evaluate_dense_stages(derivative, S, W, R, c, h):
 
 @formula
 def equation_defect(derivative, S, W, R, c, h, x):
-    """By how much the dense output at t + x h misses the equations, times h, in units of the tolerance.
+    """Residual of the equations for the dense output at t + x h, times h, in units of the tolerance.
 
-    Not finite if they cannot be evaluated there.
+    Huge if the equations cannot be evaluated there.
     """
     n = c.count.controlled
     at = c.y[INTERPOLATED]
@@ -297,26 +297,26 @@ def equation_defect(derivative, S, W, R, c, h, x):
 
 
 STEP_SAFETY = 0.85
-STATE_ROUNDING = 1e-14  # part of a state that its last digits are, once rounding has built up
+STATE_ROUNDING = 1e-14  # relative size of accumulated rounding in a state
 ROUNDING_ERROR_CHANGE = (
-    0.1  # an error that changes by more than this part of it with the state's last digits is rounding
+    0.1  # relative change of an error, when the last digits of the state change, above which it is rounding
 )
-MAX_ROUNDING_ERROR = 1e-7  # a relative error of a step above which rounding is no excuse
-WIDE_STEP_DECAY = 0.8  # what the width of wide steps falls by with each that is not
-WIDTH_LIMIT_GROWTH = 0.005  # what the width that steps are not wider than of late grows by, times the steps since
-ACCEPTED_ROUNDING_ERROR = 10.0  # an error from rounding that is accepted before a step is taken back
+MAX_ROUNDING_ERROR = 1e-7  # relative error of a step above which it is not accepted as rounding
+WIDE_STEP_DECAY = 0.8  # decay of the reference width of wide steps, per narrower step
+WIDTH_LIMIT_GROWTH = 0.005  # relative growth of the temporary width limit, times the steps since it was set
+ACCEPTED_ROUNDING_ERROR = 10.0  # error from rounding that is accepted before a step is undone
 
 
 @formula
 def reset_rejections(c):
-    """No step was refused since the last accepted one."""
+    """Reset the record of rejected steps after an accepted one."""
     c.real.last = c.real.best = UNKNOWN_ERROR
     c.real.accepted_error = 0.0
 
 
 @formula
 def accept_explicit_step(R, c, t, h, error):
-    """Make the state in the making the present one, and choose the width of the next step."""
+    """Make the proposed state the current one, and choose the width of the next step."""
     for i in range(c.y.shape[1]):
         c.y[PREVIOUS, i] = c.y[CURRENT, i]
         c.y[PREVIOUS_RATE, i] = c.K[0, i]
@@ -348,7 +348,7 @@ def accept_explicit_step(R, c, t, h, error):
 
 @formula
 def reject_explicit_step(derivative, arrive, tangent, S, W, R, c, h, status, error):
-    """Choose what to try after a step with that status and error; fixed steps that fail are the end."""
+    """Choose the next try after a step with that status and error; a failed fixed step ends the integration."""
     if c.real.step > 0.0:
         set_rejected_width(c, 0.0)
         return
@@ -380,7 +380,7 @@ def reject_explicit_step(derivative, arrive, tangent, S, W, R, c, h, status, err
 
 @formula
 def undo_last_step(c):
-    """Go back to where the last accepted step began, to end it elsewhere."""
+    """Return to the start of the last accepted step, in order to end it elsewhere."""
     c.count.accepted -= 1
     c.real.h = 0.5 * (c.real.t - c.real.before)
     c.real.t = c.real.back = c.real.before
@@ -392,7 +392,7 @@ def undo_last_step(c):
 
 @formula
 def error_is_rounding(derivative, arrive, tangent, S, W, R, c, h, error):
-    """Whether the error of a step is mostly rounding: another one from a state that differs in its last digits."""
+    """Whether the error of a step is mostly rounding: it changes when the last digits of the state are perturbed."""
     y, kept = c.y[CURRENT], c.y[SAVED]
     for i in range(y.shape[0]):
         kept[i] = y[i]
@@ -410,22 +410,20 @@ def error_is_rounding(derivative, arrive, tangent, S, W, R, c, h, error):
 
 
 STABILITY_LIMITED_FACTOR = (
-    4.0  # times the error of a step, if that is more than the tolerance, that the dense output may be off by
+    4.0  # allowed error of the dense output, relative to that of the step (at least 1), where stability limits the step
 )
-ACCURACY_LIMITED_FACTOR = (
-    8.0  # the same where accuracy limits steps, and of the tolerance: so it is there, now and then
-)
-STABILITY_BOUND = 3.5  # h |lambda| of steps that stability may limit
-REPEATED_WITHIN = 20  # steps from one that is so refused to the next, by which the width of those to come is bounded
+ACCURACY_LIMITED_FACTOR = 8.0  # the same where accuracy limits the step; reached occasionally
+STABILITY_BOUND = 3.5  # h |lambda| above which stability may limit steps
+REPEATED_WITHIN = 20  # steps between two failures of interpolation within which later widths are limited
 DENSE_STAGES_KNOWN, DENSE_OUTPUT_GOOD = (
     1,
     2,
-)  # what c.count.extended says: the stages of dense output are there; it is good
+)  # values of c.count.extended: stages of dense output are evaluated; it is accurate
 
 
 @formula
 def begin_explicit(derivative, inspect, S, W, R, c):
-    """First derivative and first step width. Returns a status."""
+    """Compute the first derivative and the first step width. Returns a status."""
     if derivative(c.real.t, c.y[CURRENT], c.K[0], S, W) != 0:
         return STEP_FAILED
     inspect(c.real.t, 0.0, c.real.span, AT_START, c.seen, S, W)
@@ -444,7 +442,7 @@ def begin_explicit(derivative, inspect, S, W, R, c):
 
 @formula
 def interpolate_explicit(derivative, S, W, R, c):
-    """Dense output at a part of the step. Returns a status."""
+    """Evaluate the dense output at a part of the step. Returns a status."""
     if c.count.extended == 0 and evaluate_dense_stages(derivative, S, W, R, c, c.real.tried) != 0:
         return 1
     if c.count.extended != DENSE_OUTPUT_GOOD:
@@ -458,11 +456,12 @@ def interpolate_explicit(derivative, S, W, R, c):
 
 @formula
 def dense_output_is_accurate(R, c):
-    """Whether the dense output is as good as steps are. If not, c.real.clearer is a width at which it may be.
+    """Whether the dense output is as accurate as steps are. If not, c.real.interpolation_width is a width to try.
 
-    Where stability limits steps, not accuracy, their ends are good and the dense output may be far off. A step that is
-    read within has to be narrower there, and where that comes again so have the next ones (c.real.calm). Elsewhere
-    it is off by a few tolerances, and steps are as they would be. Steps of fixed width are not judged.
+    Where stability limits steps, not accuracy, their ends are accurate but the dense output may not be. A step with
+    output inside must then be narrower; if this repeats, the next ones too (c.real.interpolation_limit). Elsewhere the
+    dense output is wrong by a few tolerances at most, and step widths are unaffected. Steps of fixed width are not
+    checked.
     """
     if c.real.step > 0.0:
         return True
@@ -489,11 +488,11 @@ def dense_output_is_accurate(R, c):
 
 @formula
 def missed_change(derivative, inspect, S, W, R, c):
-    """Whether laws do something within the step that its stages have not seen, and that matters.
+    """Whether laws change significantly within the step without being seen at its stages.
 
-    ``inspect`` names places where a law is not as its values elsewhere in the step let expect; what this comes to is
-    what the dense output misses of the equations there, over the part of the step for which it lasts. What lasts for
-    more than a step is another branch of a formula: no width is right. Steps of fixed width look for that only.
+    ``inspect`` names places where a law differs from the values expected from elsewhere in the step. Its effect is the
+    residual of the dense output there, times the part of the step for which the deviation lasts. If it lasts for more
+    than a step, the formula has switched to another branch and every width fails. Steps of fixed width only check that.
     """
     h = c.real.tried
     inspect(c.real.t, h, c.real.span, AT_END, c.seen, S, W)
@@ -513,7 +512,7 @@ def missed_change(derivative, inspect, S, W, R, c):
 
 @formula
 def run_explicit_task(functions, S, W, R, c, task):
-    """What the `loop` asks of a method; ``functions`` are derivative, arrive, tangent, inspect."""
+    """Perform a task of the `time_loop`; ``functions`` are derivative, arrive, tangent, inspect."""
     derivative, arrive, tangent, inspect = functions
     if task == TRY_STEP:
         c.count.extended = 0

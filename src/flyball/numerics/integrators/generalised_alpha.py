@@ -7,12 +7,12 @@ constrained systems":
     q1 = q0 exp(h (v0 + (1/2 - beta) h a0 + beta h a1 + D G^T mu)),  v1 = v0 + (1 - gamma) h a0 + gamma h a1,
     (1 - am) a1 + am a0 = (1 - af) v1' + af v0',  r(t1, q1, v1, v1', lam1) = 0,  G v1 = nu,  g = 0
 
-States of the first order, x' = f, are treated as velocities are (Bruels and Golinval 2006, "The
-generalized-alpha method in mechatronic applications"); they are the last columns of ``past``.
+States of first order, x' = f, are treated like velocities (Bruels and Golinval 2006, "The generalized-alpha
+method in mechatronic applications"); they are the last columns of ``past``.
 
-a is the acceleration at t + (am - af) h. The spectral radius at infinite frequency, rho, sets am, af, beta and
-gamma. It is given (residual, linearise, compose, arrive, inspect) as `radau` is, and ``straight(d, out, S)``,
-which makes increments those of constant velocity, and an ``arrive`` for states that are not the end of a step.
+a is the acceleration at t + (am - af) h. The spectral radius at infinite frequency, rho, determines am, af, beta
+and gamma. Callbacks: residual, linearise, compose, arrive, inspect as for `radau`; ``straight(d, out, S)``,
+which converts increments to those of constant velocity; and an ``arrive`` for states within a step.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from .radau_stages import confirm_convergence, solve_refined, update_jacobian
 from .radau_stages import set_step_start as tolerances
 from .time_loop import CURRENT, PROPOSED, SAVED, SAVED_RATE
 
-# rows of past: a and v' where the step begins; a at its end; v'' at a start
+# rows of past: a and v' at the start of the step; a at its end; v'' at the start of a segment
 ALGORITHMIC_ACCELERATION, TRUE_ACCELERATION, NEXT_ALGORITHMIC, ACCELERATION_RATE = range(4)
-RATE_STEP_FRACTION = 1e-3  # part of a step over which the rate of accelerations is found at a start
-MAX_ITERATIONS, MAX_FULL_ITERATIONS = 10, 25  # iterations: with one Jacobian, and with that of each
-MAX_CONTRACTION = 0.5  # what corrections fall by at least, or each iteration has its own Jacobian
-JACOBIAN_REUSE_RATE = 0.02  # a rate of the iteration below which the Jacobian serves on
+RATE_STEP_FRACTION = 1e-3  # part of a step over which the rate of accelerations is computed at the start of a segment
+MAX_ITERATIONS, MAX_FULL_ITERATIONS = 10, 25  # iterations: with one Jacobian, and with a new one in each
+MAX_CONTRACTION = 0.5  # contraction ratio above which each iteration evaluates its own Jacobian
+JACOBIAN_REUSE_RATE = 0.02  # contraction ratio below which the Jacobian is reused
 DIVERGED = 1
 
 
 @formula
 def alpha_coefficients(rho):
-    """Of a spectral radius at infinity: (alpha_m, alpha_f, beta, gamma) (Chung and Hulbert 1993)."""
+    """Coefficients (alpha_m, alpha_f, beta, gamma) for a spectral radius at infinity (Chung and Hulbert 1993)."""
     am = (2.0 * rho - 1.0) / (rho + 1.0)
     af = rho / (rho + 1.0)
     gamma = 0.5 - am + af
@@ -47,7 +47,7 @@ def alpha_coefficients(rho):
 
 @formula
 def begin_alpha(callbacks, S, K, c):
-    """What the method remembers of steps, where it begins anew: accelerations, and their rate."""
+    """Initialise the stored accelerations and their rate at the start of a segment."""
     compose, arrive = callbacks[2], callbacks[6]
     nv = K.v.shape[1]
     at = c.y.shape[1] - K.z.shape[1] - nv
@@ -59,14 +59,14 @@ def begin_alpha(callbacks, S, K, c):
         K.z[STEP_START, i] = c.y[CURRENT, at + nv + i] + (ahead * c.K[0, at + nv + i] if i < K.tol_x.shape[0] else 0.0)
     compose(c.y[CURRENT], K.d[STEP_START], K.v[STEP_START], K.z[STEP_START], c.y[SAVED], S)
     status, _ = arrive(c.real.t + ahead, c.y[SAVED], c.y[SAVED_RATE], S, K)
-    for i in range(nv + K.tol_x.shape[0]):  # x stands behind the velocities
+    for i in range(nv + K.tol_x.shape[0]):  # x follows the velocities
         K.past[TRUE_ACCELERATION, i] = c.K[0, at + i]
         K.past[ACCELERATION_RATE, i] = (c.y[SAVED_RATE, at + i] - c.K[0, at + i]) / ahead if status == 0 else 0.0
 
 
 @formula
 def scale_start_accelerations(K, h):
-    """Accelerations a where the step begins, for its width, into K.a[START]; they keep their rate if h changes."""
+    """Write the accelerations a at the start of a step of width h to K.a[STEP_START]; their rate does not change."""
     am, af, _, _ = alpha_coefficients(K.rho[0])
     nv = K.v.shape[1]
     for i in range(nv + K.tol_x.shape[0]):
@@ -83,7 +83,7 @@ def scale_start_accelerations(K, h):
 
 @formula
 def end_rates(callbacks, S, K, h):
-    """Rates at the end of the step, by the values there."""
+    """Compute the rates at the end of the step from the values there."""
     am, af, beta, gamma = alpha_coefficients(K.rho[0])
     straight = callbacks[5]
     straight(K.d[END_ROW], K.dd[END_ROW], S)
@@ -105,7 +105,7 @@ def end_rates(callbacks, S, K, h):
 
 @formula
 def predict_end(K, h):
-    """Start values of the end: accelerations and multipliers stay."""
+    """Predict the end of the step with constant accelerations and multipliers."""
     for i in range(K.v.shape[1]):
         K.v[END_ROW, i] = K.v[STEP_START, i] + h * K.a[STEP_START, i]
         K.d[END_ROW, i] = h * (K.v[STEP_START, i] + 0.5 * h * K.a[STEP_START, i])
@@ -120,7 +120,7 @@ def predict_end(K, h):
 
 @formula
 def factor_alpha_matrix(K, h):
-    """Factor F + F', times what increments and velocities change their rates by in a step. Returns 0, or not."""
+    """Factor F + F' scaled by the changes of rates per increment and velocity. Returns 0 on success."""
     am, af, beta, gamma = alpha_coefficients(K.rho[0])
     scale = (1.0 - am) / ((1.0 - af) * gamma * h)
     A, J = K.real_A, K.J[STEP_START]
@@ -143,7 +143,7 @@ def factor_alpha_matrix(K, h):
 
 @formula
 def correct_end(K, h):
-    """One correction for what the equations miss in K.out. Returns its size in units of the tolerance."""
+    """Correct the end once for the residuals in K.out. Returns the correction's size in units of the tolerance."""
     am, af, _, gamma = alpha_coefficients(K.rho[0])
     nv, nr, perm = K.v.shape[1], K.lam.shape[1], K.P.perm
     for i in range(perm.shape[0]):
@@ -171,14 +171,14 @@ def correct_end(K, h):
 
 @formula
 def end_residual(callbacks, S, K, c, h):
-    """The residual at the end of the step, into its row. Returns a status."""
+    """Evaluate the residual at the end of the step into its row. Returns a status."""
     end_rates(callbacks, S, K, h)
     return callbacks[0](c.real.t + h, END_ROW, S, K, c)
 
 
 @formula
 def correct_with_new_jacobian(callbacks, S, K, c, h):
-    """One correction with the Jacobian of the end of the step. Returns a status, and its size."""
+    """Correct once with the Jacobian of the end of the step. Returns a status, and the size of the correction."""
     if end_residual(callbacks, S, K, c, h) != 0:
         return DIVERGED, 0.0
     if update_jacobian(callbacks[1], c.real.t + h, END_ROW, S, K, c) != 0 or factor_alpha_matrix(K, h) != 0:
@@ -188,7 +188,7 @@ def correct_with_new_jacobian(callbacks, S, K, c, h):
 
 @formula
 def solve_step_end(callbacks, S, K, c, h, whole):
-    """Find the end of the step, with one Jacobian or that of every iteration. Returns a status."""
+    """Solve for the end of the step; ``whole``: with a new Jacobian in every iteration. Returns a status."""
     last = rate = 1.0
     predict_end(K, h)
     for n in range(MAX_FULL_ITERATIONS if whole else MAX_ITERATIONS):
@@ -220,7 +220,10 @@ def solve_step_end(callbacks, S, K, c, h, whole):
 
 @formula
 def attempt_alpha_step(callbacks, S, K, c, h):
-    """One step of width h into c.y[NEW], derivatives there into c.K[1]. Returns (status, 0, 1), as `radau.attempt_radau_step`."""
+    """Try one step of width h to c.y[PROPOSED], with derivatives there in c.K[1].
+
+    Returns (status, 0, 1), as `radau.attempt_radau_step`.
+    """
     _, _, compose, arrive = callbacks[:4]
     if K.count.before == 0:
         begin_alpha(callbacks, S, K, c)
@@ -243,9 +246,7 @@ def attempt_alpha_step(callbacks, S, K, c, h):
         status = solve_step_end(callbacks, S, K, c, h, True)
     if status == 0 and K.count.infinite_slopes == 1:
         status = confirm_convergence(correct_with_new_jacobian, callbacks, S, K, c, h)
-        if (
-            status == 0
-        ):  # the Jacobian is that of the end now: `accept_alpha_step` has it serve on, another try does not
+        if status == 0:  # the Jacobian is now that of the end: `accept_alpha_step` reuses it, another try does not
             K.count.fresh = -1
     if status != 0:
         return status, 0.0, 1.0
@@ -259,7 +260,7 @@ def attempt_alpha_step(callbacks, S, K, c, h):
 
 @formula
 def store_end_accelerations(K):
-    """What is asked for within the step, found."""
+    """Store the accelerations at both ends for interpolation."""
     for i in range(K.v.shape[1]):
         K.ends[START_ACCELERATION, i] = K.past[TRUE_ACCELERATION, i]
         K.ends[END_ACCELERATION, i] = K.a[END_ROW, i]
@@ -267,7 +268,7 @@ def store_end_accelerations(K):
 
 @formula
 def accept_alpha_step(K, c, t, h, error, iterations):
-    """Make the end of the step the present state, and remember what the next one needs."""
+    """Make the end of the step the current state, and store what the next step needs."""
     for i in range(K.v.shape[1]):
         K.past[ALGORITHMIC_ACCELERATION, i] = K.past[NEXT_ALGORITHMIC, i]
         K.past[TRUE_ACCELERATION, i] = K.ends[END_ACCELERATION, i]

@@ -1,18 +1,18 @@
-"""Implicit methods of equations of motion as the `time_loop` calls them, and what the fixed-step ones share.
+"""Tasks of the `time_loop` for implicit methods of the equations of motion, and parts shared by fixed-step methods.
 
-A method is ``attempt(callbacks, S, K, c, h)`` (the step to c.y[PROPOSED] and c.K[1]: status, error, what it
-asks for), ``between(K, x, h, d, v, z)`` (increments, velocities, integrals within it), ``enter(K, c, t, h,
-error, asked)`` and ``refuse(K, c)`` (what to try next). It is given ``residual`` (see `radau_stages`);
-``linearise(t, k, S, K, c)``, which fills row k of the numbers of the Jacobian at stage k, or where the step
-begins; ``compose(y, d, v, z, out, S)``, which makes a state of increments; ``arrive`` (which leaves the
-multipliers in ``K.found``) and ``inspect``.
+A method is ``attempt(callbacks, S, K, c, h)`` (the step to c.y[PROPOSED] and c.K[1]: status, error, suggested
+change), ``between(K, x, h, d, v, z)`` (increments, velocities, integrals within it), ``enter(K, c, t, h, error,
+asked)`` (accepts it) and ``refuse(K, c)`` (chooses the next try). Its callbacks are ``residual`` (see
+`radau_stages`); ``linearise(t, k, S, K, c)``, which fills row k of the Jacobian entries at stage k, or at the start
+of the step; ``compose(y, d, v, z, out, S)``, which forms a state from increments; ``arrive`` (which writes the
+multipliers to ``K.found``) and ``inspect``.
 
 Methods of order 2 interpolate within a step by cubics through the values and rates at its ends. Rows STEP_START
 and END_ROW of ``v``, ``z``, ``rate`` hold the values, ``d`` the increments at the end, ``ends`` the
-accelerations at both ends, ``turns`` the first of three components of each increment that is a rotation. Such
-increments are Cayley's steps, axis times 2 tan(angle / 2), which no polynomial follows far: a rotation is
-interpolated by one at the mean of the angular velocities of its ends, followed by a cubic for the small rest.
-Steady rotations are exact, whole turns too.
+accelerations at both ends, ``turns`` the first of three components of each increment that is a rotation. These
+increments are Cayley vectors, axis times 2 tan(angle / 2), which polynomials approximate badly for large angles. A
+rotation is therefore interpolated by a rotation at the mean of the angular velocities of its ends, followed by a cubic
+for the small remainder. Steady rotations are exact, including full revolutions.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ from .time_loop import (
     step_end_time,
 )
 
-MIN_STEP_FRACTION = 1e-3  # part of the step below which none is tried
-NOT_REJECTED = 6.0  # what tells that the last step was not refused
+MIN_STEP_FRACTION = 1e-3  # part of the fixed step below which no width is tried
+NOT_REJECTED = 6.0  # value of max_growth that marks that the last step was not rejected
 
 
 @formula
 def integrate_by_trapezoids(c, h):
-    """Integrals of the motion at the end of the step, by their rates at its ends."""
+    """Compute integrals over the motion at the end of the step by the trapezoidal rule."""
     for n in range(c.integrals.shape[0]):
         i = c.integrals[n]
         c.y[PROPOSED, i] = c.y[CURRENT, i] + 0.5 * h * (c.K[0, i] + c.K[1, i])
@@ -59,7 +59,7 @@ def integrate_by_trapezoids(c, h):
 
 @formula
 def accept_fixed_step(c, t):
-    """Make the end of the step the present state."""
+    """Make the end of the step the current state."""
     for i in range(c.y.shape[1]):
         c.y[CURRENT, i] = c.y[PROPOSED, i]
         c.K[0, i] = c.K[1, i]
@@ -71,7 +71,7 @@ def accept_fixed_step(c, t):
 
 @formula
 def halve_fixed_step(K, c):
-    """Try half the width where slopes of laws may be infinite. Returns 0, or that there is nothing to try."""
+    """Halve the width if slopes of laws may be infinite. Returns 0, or 1 if there is no width to try."""
     h = 0.5 * c.real.tried
     if K.count.infinite_slopes == 0 or h < MIN_STEP_FRACTION * c.real.step:
         return 1
@@ -82,14 +82,14 @@ def halve_fixed_step(K, c):
 
 END_ROW = 2  # row of the end of a step
 START_ACCELERATION, END_ACCELERATION = range(2)  # rows of ends
-SMALL_HALF_ANGLE = 1e-4  # half a turn [rad] below which its sine is its series
+SMALL_HALF_ANGLE = 1e-4  # half rotation angle [rad] below which the sine is replaced by its series
 
 
 @formula
 def interpolate_hermite(K, x, h, d, v, z):
-    """Increments, velocities and integrals at t + x h.
+    """Interpolate increments, velocities and integrals at t + x h.
 
-    What does not change stays as it is, to the last digit: of a place on an outline that tells the edge.
+    A constant quantity is returned exactly, to the last digit; the position on an outline decides on the edge.
     """
     y = 1.0 - x
     out, end, back = h * x * y * y, x * x * (3.0 - 2.0 * x), -h * x * x * y
@@ -108,10 +108,11 @@ def interpolate_hermite(K, x, h, d, v, z):
 
 @formula
 def interpolate_rotation(K, x, h, d, i):
-    """The turn whose components begin at i, at t + x h.
+    """Interpolate the rotation whose components begin at i, at t + x h.
 
-    It is exp(x h w) cay(c): w is the mean angular velocity, and c goes from nothing at the begin to what the end asks
-    for, its rate being what the angular velocities there leave: w0 - w, and those of w1 - R(c)^T w.
+    It is exp(x h w) cay(c): w is the mean angular velocity, and c goes from zero at the start to the remainder at the
+    end. The rates of c follow from the differences of the angular velocities: w0 - w at the start, w1 - R(c)^T w at the
+    end.
     """
     first = (K.v[STEP_START, i], K.v[STEP_START, i + 1], K.v[STEP_START, i + 2])
     last = (K.v[END_ROW, i], K.v[END_ROW, i + 1], K.v[END_ROW, i + 2])
@@ -133,26 +134,24 @@ def interpolate_rotation(K, x, h, d, i):
 
 @formula
 def rotation_quaternion(w, time):
-    """The quaternion of a turn at an angular velocity, for a time."""
+    """Quaternion of a rotation at a constant angular velocity for a time."""
     half = 0.5 * time * sqrt(dot(w, w))
     by = sin(half) / half if abs(half) > SMALL_HALF_ANGLE else 1.0 - half * half / 6.0
     e = scale(0.5 * time * by, w)
     return (cos(half), e[0], e[1], e[2])
 
 
-REUSE_RATE = 1e-3  # a rate of the iteration below which the Jacobian serves on
-MAX_WIDTH_GROWTH = 8.0  # what the width changes by at most
-FIRST_STEP_FRACTION = 1e-4  # part of the time span that is tried first
-MAX_START_CORRECTION = (
-    1e-5  # part of size and speed by which a state that is off its constraints has not moved by itself
-)
+REUSE_RATE = 1e-3  # contraction ratio below which the Jacobian is reused
+MAX_WIDTH_GROWTH = 8.0  # largest factor by which the width changes
+FIRST_STEP_FRACTION = 1e-4  # first step, as a part of the time span
+MAX_START_CORRECTION = 1e-5  # relative correction of the initial state by its projection above which the start fails
 
 
 @formula
 def begin_implicit(arrive, inspect, S, K, c):
-    """The state as a stretch of time begins, put on its constraints, and its derivative. Returns a status.
+    """Project the state at the start of a segment on its constraints, and evaluate its derivative. Returns a status.
 
-    Where nothing but what pushes has jumped (JUMPED), Jacobian and factors serve on, as from step to step.
+    If only forces have jumped (`FORCES_JUMPED`), the Jacobian and its factors are reused, as between steps.
     """
     y = c.y[PROPOSED]
     for i in range(y.shape[0]):
@@ -175,7 +174,7 @@ def begin_implicit(arrive, inspect, S, K, c):
         K.real.width = 0.0
         K.real.rate, K.real.theta = 1.0, REUSE_RATE
         c.real.largest_error = 1.0
-        c.real.wide = 0.0  # steps of before tell nothing of what is narrow now
+        c.real.wide = 0.0  # previous steps do not show which width is narrow now
     c.real.before = c.real.t
     c.real.rounding_found_at = c.real.back = c.real.t - c.real.span
     if c.real.h <= 0.0:
@@ -186,7 +185,7 @@ def begin_implicit(arrive, inspect, S, K, c):
 
 @formula
 def missed_implicit_change(residual, inspect, S, K, c):
-    """Whether laws do something within the step that its stages have not seen, and that matters; see `explicit`."""
+    """Whether laws change within the step without being seen at its stages; as `explicit_runge_kutta.missed_change`."""
     h = c.real.tried
     inspect(c.real.t, h, c.real.span, AT_END, c.seen, S, K)
     k, x, share = inspect(c.real.t, h, c.real.span, 0, c.seen, S, K)
@@ -201,7 +200,7 @@ def missed_implicit_change(residual, inspect, S, K, c):
 
 @formula
 def restore_start_rates(K, c):
-    """Rates of integrals where the step begins: what else is looked at may have overwritten them."""
+    """Restore the rates of integrals at the start of the step, which other evaluations may have overwritten."""
     at = c.y.shape[1] - K.z.shape[1]
     for i in range(K.z.shape[1]):
         K.rate[STEP_START, i] = c.K[0, at + i]
@@ -209,7 +208,7 @@ def restore_start_rates(K, c):
 
 @formula
 def interpolate_implicit(between, compose, S, K, c):
-    """The state at a part of the step."""
+    """Interpolate the state at a part of the step."""
     z = c.y[SAVED, : K.z.shape[1]]
     restore_start_rates(K, c)
     between(K, c.real.part, c.real.tried, K.d[STEP_START], K.a[STEP_START], z)
@@ -220,7 +219,7 @@ def interpolate_implicit(between, compose, S, K, c):
 
 @formula
 def run_implicit_task(method, callbacks, S, K, c, task):
-    """What the `loop` asks of a method."""
+    """Perform a task of the `time_loop`."""
     attempt, between, enter, refuse = method
     residual, compose, arrive, inspect = callbacks[0], callbacks[2], callbacks[3], callbacks[4]
     if task == TRY_STEP:

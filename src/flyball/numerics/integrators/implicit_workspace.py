@@ -1,10 +1,10 @@
 """Workspaces of the implicit integrators: named arrays, counts and tolerances.
 
-The equations are those of the second order on a manifold, with constraints (Gear, Gupta and Leimkuhler 1985):
+The equations of motion are of second order on a manifold, with constraints (Gear, Gupta and Leimkuhler 1985):
 
     d' = T(d) (v + D G^T mu),  r(t, q0 (+) d, v, v', lam, x) = 0,  G v = nu,  g = 0,  x' = f(t, q0 (+) d, v, x)
 
-d is the increment from the state at which a step begins; x, states of the first order, are the first of the
+d is the increment from the state at which a step begins; x, states of first order, are the first of the
 integrals. Unknowns are ordered d, v, lam, mu, x, equations as written.
 """
 
@@ -15,85 +15,85 @@ from typing import NamedTuple
 from ...compiler.struct_layout import Complex1, Complex2, Float1, Float2, Int1, Int2, Record
 from ..sparse_factorisation import LUPattern
 
-STEP_START = 3  # row of the state at which a step begins, and of the error estimate
+STEP_START = 3  # row of the state at which a step begins, also used by the error estimate
 
 
 class ImplicitCounts(Record, kind="Int"):
-    """What an implicit method has done, and how it goes about it."""
+    """Counters and choices of an implicit method."""
 
     iterations: int
     jacobians: int
     factors: int
-    fresh: int  # whether the Jacobian is that of the present state (1), serves (0) or not (-1)
-    before: int  # whether there is a polynomial of the step before
+    fresh: int  # whether the Jacobian is that of the present state (1), reusable (0) or outdated (-1)
+    before: int  # whether the polynomial of the previous step exists
     refine: int  # refinements of each linear solve
-    least: int  # iterations of a step at least
+    least: int  # minimum number of iterations of a step
     whole: int  # iterations of all stages together
-    index_3: int  # whether velocities are not held to the constraints
-    shared: int  # where the sizes of rows begin in the Jacobian, if forces depend on multipliers
+    index_3: int  # whether velocities are not projected on the constraints (index 3)
+    shared: int  # first position of the row scales in the Jacobian if forces depend on multipliers, else 0
     infinite_slopes: int  # whether slopes of laws may be infinite (`radau_stages.confirm_convergence`)
 
 
 class ImplicitReals(Record, kind="Float"):
     """Tolerances and rates of an implicit method."""
 
-    rtol: float  # as the error estimate needs it
+    rtol: float  # relative tolerance as used by the error estimate
     atol: float
-    newton: float  # bound of the iteration
-    theta: float  # its last ratio
+    newton: float  # tolerance of the Newton iteration
+    theta: float  # its last contraction ratio
     rate: float
-    width: float  # of the step that is factored for
-    last_h: float  # width and error of the step before
+    width: float  # width for which the matrices are factored
+    last_h: float  # width and error of the previous step
     last_error: float
-    asked: float  # what the last step asks for: iterations it took, or the factor of its width
-    soft: float  # regularization
-    rounding_size: float  # size of corrections that are taken for rounding where they do not fall any more
-    reuse_rate: float  # rate of the iteration up to which a Jacobian serves on
-    stays: float  # what a step could be wider by and is not, since its factors serve on
-    correction: float  # size of the last correction of the iteration
+    asked: float  # result of the last step: number of iterations, or factor for its width
+    soft: float  # regularisation
+    rounding_size: float  # size of corrections that count as rounding once they stop decreasing
+    reuse_rate: float  # contraction ratio up to which a Jacobian is reused
+    stays: float  # growth factor of the width up to which the width and the factors are kept
+    correction: float  # size of the last Newton correction
 
 
 class RadauStepWorkspace(NamedTuple):
-    """Scratch and tables of one run."""
+    """Workspace and tables of one run of Radau IIA."""
 
     count: ImplicitCounts  # type: ignore[assignment]
     real: ImplicitReals  # type: ignore[assignment]
-    d: Float2  # (4, nv): increments at the stages; last: of the estimate
+    d: Float2  # (4, nv): increments at the stages; last: for the error estimate
     v: Float2  # (4, nv)
-    dd: Float2  # (4, nv): rates of both
+    dd: Float2  # (4, nv): rates of d
     a: Float2  # (4, nv)
-    lam: Float2  # (4, nr): multipliers; last: at the begin of the step
-    found: Float1  # (nr,): multipliers at the state last arrived at
-    proximal_point: Float2  # (3, nr): multipliers that rows, where they are soft, give way beyond (`share`)
-    mu: Float2  # (4, nr): of the stabilisation
-    z: Float2  # (4, nz): x and integrals of the motion at the stages; last: at the begin of the step
-    rate: Float2  # (4, nz): their rates, as the equations say
-    xd: Float2  # (4, nx): rates of x as stage values say
-    out: Float2  # (4, n): what the equations miss
-    previous_v: Float2  # (4, nv): of the step before: stages, and where it began
+    lam: Float2  # (4, nr): multipliers; last: at the start of the step
+    found: Float1  # (nr,): multipliers at the state projected last
+    proximal_point: Float2  # (3, nr): reference multipliers of regularised rows (`radau_stages.shift_proximal_point`)
+    mu: Float2  # (4, nr): multipliers of the stabilisation
+    z: Float2  # (4, nz): x and integrals over the motion at the stages; last: at the start of the step
+    rate: Float2  # (4, nz): their rates from the equations
+    xd: Float2  # (4, nx): rates of x from the stage values
+    out: Float2  # (4, n): residuals of the equations
+    previous_v: Float2  # (4, nv): of the previous step: stages, and its start
     previous_lam: Float2  # (3, nr)
     previous_x: Float2  # (4, nx)
     tol: Float2  # (2, nv): tolerances of d and v in this step
     tol_x: Float1  # (nx,): and of x
-    place: Int1  # (nv,): component of the state that a velocity is the rate of, or -1: a turn
+    place: Int1  # (nv,): component of the state whose rate is the velocity, or -1: a rotation
     x: Float2  # (3, n): solution, right-hand side, product
     w: Complex2  # (3, n), complex
-    J: Float2  # (4, n): numbers of the Jacobian at the stages and where the step begins; the first is 1
-    spring: Int2  # (entries, 5): equation and velocity; numbers of the Jacobian by increment, rate, velocity
-    put: Int2  # (entries, 2): place in the matrix, number of the Jacobian: times 1, h-scale, its inverse
-    part: Int1  # (2,): ends of the first two groups of these
+    J: Float2  # (4, n): entries of the Jacobian at the stages and at the start of the step; the first is 1
+    spring: Int2  # (entries, 5): equation and velocity; entries of the Jacobian by increment, rate, velocity
+    put: Int2  # (entries, 2): place in the matrix, entry of the Jacobian: with factor 1, h-scale, its inverse
+    part: Int1  # (2,): ends of the first two groups of `put`
     real_A: Float1  # the real matrix and its factors
     real_L: Float1
     real_U: Float1
     real_D: Float1
     real_Y: Float1
-    pair_A: Complex1  # the complex one
+    pair_A: Complex1  # the complex matrix and its factors
     pair_L: Complex1
     pair_U: Complex1
     pair_D: Complex1
     pair_Y: Complex1
     P: LUPattern
-    whole_put: Int2  # (entries, 4): place in the matrix of all stages, row of J, number, what it is multiplied by
+    whole_put: Int2  # (entries, 4): place in the matrix of all stages, row of J, entry, multiplier
     whole_x: Float2  # (3, 3 n)
     whole_A: Float1
     whole_L: Float1
@@ -104,7 +104,7 @@ class RadauStepWorkspace(NamedTuple):
 
 
 class AlphaStepWorkspace(NamedTuple):
-    """Scratch and tables of one run; of the generalised-alpha method; what has the same name in `RadauStepWorkspace` is the same."""
+    """Workspace and tables of one run of generalised-alpha; fields shared with `RadauStepWorkspace` mean the same."""
 
     count: ImplicitCounts  # type: ignore[assignment]
     real: ImplicitReals  # type: ignore[assignment]
@@ -134,13 +134,13 @@ class AlphaStepWorkspace(NamedTuple):
     real_D: Float1
     real_Y: Float1
     P: LUPattern
-    past: Float2  # (4, nv + nx): accelerations that the method remembers, and rates of x
+    past: Float2  # (4, nv + nx): stored accelerations of the method, and rates of x
     ends: Float2  # (2, nv): accelerations at the ends of the step
     turns: Int1  # first angular velocity of each quaternion
 
 
 class VariationalStepWorkspace(NamedTuple):
-    """Scratch of one run of the variational method; what has the same name in `RadauStepWorkspace` is the same."""
+    """Workspace of one run of the variational method; fields shared with `RadauStepWorkspace` mean the same."""
 
     count: ImplicitCounts  # type: ignore[assignment]
     real: ImplicitReals  # type: ignore[assignment]
@@ -153,9 +153,9 @@ class VariationalStepWorkspace(NamedTuple):
     rate: Float2
     ends: Float2  # (2, nv): accelerations at the ends of the step
     turns: Int1  # first angular velocity of each quaternion
-    p: Float2  # (4, nv): momenta of the free way, on arrival, at the begin of the step and at its end
-    f: Float2  # (3, nv): forces at its begin, at its end, and as they were thought to be there
+    p: Float2  # (4, nv): momenta of the free motion, on arrival, at the start of the step and at its end
+    f: Float2  # (3, nv): forces at its start, at its end, and assumed at its end
     g: Float1  # (nr,): violations
-    rows: Float2  # (2, nG): G at the begin and at the end
-    steps: Float2  # (KEPT, nr): of the iteration for positions
-    pushes: Float2  # (KEPT, nv): and of that for forces
+    rows: Float2  # (2, nG): G at the start and at the end
+    steps: Float2  # (rows, nr): of the position iteration
+    pushes: Float2  # (rows, nv): of the force iteration

@@ -3,10 +3,10 @@
 Step control after Hairer and Wanner, *Solving Ordinary Differential Equations II* (1996), section IV.8, with
 Gustafsson's predictive control.
 
-Where one Jacobian does not serve for a step, Newton's method solves all three stages at once with the Jacobian
-of each. A mechanism that passes a singular position within a step has rows whose smallest singular value
-changes sign from one stage to the next; with the Jacobian of the step's start the iteration then leads away
-from the solution.
+If one Jacobian is not enough for a step, Newton's method solves all three stages at once with the Jacobian
+of each. When a mechanism passes a singular position within a step, the smallest singular value of its constraint rows
+changes sign from one stage to the next; with the Jacobian of the step's start the iteration then diverges from the
+solution.
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ from .time_loop import (
 )
 
 MAX_COUPLED_ITERATIONS = 12
-COUPLED_REFINEMENTS = 6  # times that each solve is refined
-MAX_COUPLED_GROWTH = 10.0  # what corrections may grow by
-UNSCALED, REGULARISATION = -1, -2  # what a number is multiplied by, if not by an entry of A^-1 / h
+COUPLED_REFINEMENTS = 6  # refinements of each solve
+MAX_COUPLED_GROWTH = 10.0  # largest ratio of successive corrections
+UNSCALED, REGULARISATION = -1, -2  # multiplier codes in `whole_put`, besides columns of A^-1 / h
 
 
 @formula
 def fill_coupled_matrix(K, h):
-    """The matrix of all stages."""
+    """Assemble the matrix of all stages."""
     A = K.whole_A
     for i in range(A.shape[0]):
         A[i] = 0.0
@@ -73,7 +73,7 @@ def fill_coupled_matrix(K, h):
 
 @formula
 def solve_coupled(K, h):
-    """Solve for what stands in K.whole_x[0], refined against the matrix without its regularisation."""
+    """Solve for the right-hand side in K.whole_x[0], refined against the matrix without its regularisation."""
     x = K.whole_x
     n = x.shape[1]
     for i in range(n):
@@ -94,7 +94,7 @@ def solve_coupled(K, h):
 
 @formula
 def correct_coupled_stages(K, h):
-    """One correction of all stage values. Returns its size in units of the tolerance."""
+    """Correct all stage values once. Returns the size of the correction in units of the tolerance."""
     nv, nr, nx = K.d.shape[1], K.lam.shape[1], K.tol_x.shape[0]
     n = 2 * nv + 2 * nr + nx
     perm = K.whole_P.perm
@@ -124,7 +124,7 @@ def correct_coupled_stages(K, h):
 
 @formula
 def iterate_coupled_newton(callbacks, S, K, c, h):
-    """Newton's iteration. Returns a status, and the size of the first correction."""
+    """Run Newton's iteration for all stages together. Returns a status, and the size of the first correction."""
     residual, linearise = callbacks
     last, moved = 1e300, 0.0
     for n in range(MAX_COUPLED_ITERATIONS):
@@ -164,22 +164,22 @@ def solve_coupled_stages(callbacks, S, K, c, h):
 
 
 RADAU_SAFETY = 0.9
-MIN_WIDTH_RATIO = 0.2  # what the width becomes at least
-SINGULAR_WIDTH_RATIO = 1e-3  # part of the widest step of late below which narrower ones lead into a singular position
+MIN_WIDTH_RATIO = 0.2  # smallest ratio of successive widths
+SINGULAR_WIDTH_RATIO = 1e-3  # part of the widest recent step below which steps approach a singularity
 EXPECTED_ERROR_FALL, MUCH_NARROWER = (
     0.5,
     0.1,
-)  # what an error falls by at least in a step that is so much narrower, if it is no rounding
-ACCEPTED_ROUNDING = 10.0  # an error from rounding that is accepted where no step of another width is found
-MAX_ROUNDING = 1e-5  # a relative error of a step above which rounding is no excuse
-RETRY_WIDTH_FACTOR = 1.24  # what half a step taken back is taken wider by: two of them end beyond where it did
-RETRY_REFINEMENTS = 1  # times that solves are refined after a step that could not be taken
+)  # a true error falls at least by the first factor in a step narrower by the second
+ACCEPTED_ROUNDING = 10.0  # error from rounding that is accepted if no other width succeeds
+MAX_ROUNDING = 1e-5  # relative error of a step above which it is not accepted as rounding
+RETRY_WIDTH_FACTOR = 1.24  # factor on half the width of an undone step: two such steps end beyond the original end
+RETRY_REFINEMENTS = 1  # refinements of solves after a failed step
 STEP_SINGULAR = 3
 
 
 @formula
 def start_as_stage(K, c):
-    """Where the step begins, as a stage."""
+    """Initialise row STEP_START as a stage: zero increment, current acceleration."""
     nv = K.v.shape[1]
     nq = c.y.shape[1] - nv - K.z.shape[1]
     for i in range(nv):
@@ -189,7 +189,7 @@ def start_as_stage(K, c):
 
 @formula
 def correct_with_end_jacobian(callbacks, S, K, c, h):
-    """One correction of the stages with the Jacobian of the last one. Returns a status, and its size."""
+    """Correct the stages once with the Jacobian of the last one. Returns a status, and the size of the correction."""
     residual, linearise = callbacks
     if update_jacobian(linearise, c.real.t + h, STAGES - 1, S, K, c) != 0 or factor_matrices(K, h) != 0:
         return STEP_SINGULAR, 0.0
@@ -203,7 +203,7 @@ def correct_with_end_jacobian(callbacks, S, K, c, h):
 
 @formula
 def attempt_radau_step(callbacks, S, K, c, h):
-    """One step of width h into c.y[NEW]. Returns (status, error, factor that a failed iteration asks for)."""
+    """Try one step of width h to c.y[PROPOSED]. Returns (status, error, iterations or factor of the width)."""
     residual, linearise, compose, arrive = callbacks[:4]
     set_step_start(c, K)
     start_as_stage(K, c)
@@ -229,9 +229,7 @@ def attempt_radau_step(callbacks, S, K, c, h):
     if status == 0 and K.count.infinite_slopes == 1:
         status = confirm_convergence(correct_with_end_jacobian, (residual, linearise), S, K, c, h)
         asked = 0.5 if status != 0 else asked
-        if (
-            status == 0
-        ):  # the Jacobian is that of the end now: `accept_radau_step` has it serve on, another try does not
+        if status == 0:  # the Jacobian is now that of the end: `accept_radau_step` reuses it, another try does not
             K.count.fresh = -1
             status = update_integrals(residual, S, K, c, h)
     if status != 0:
@@ -250,14 +248,14 @@ def attempt_radau_step(callbacks, S, K, c, h):
 
 @formula
 def width_for_error(h, error, iterations):
-    """Width that an error asks for, less where the iteration took long."""
+    """Width suggested by an error, smaller after many iterations; returns it and the safety factor."""
     safe = min(RADAU_SAFETY, RADAU_SAFETY * (1.0 + 2.0 * MAX_ITERATIONS) / (iterations + 2.0 * MAX_ITERATIONS))
     return h / max(1.0 / MAX_WIDTH_GROWTH, min(1.0 / MIN_WIDTH_RATIO, error**0.25 / safe)), safe
 
 
 @formula
 def reject_radau_step(K, c):
-    """Try a narrower step, and with the Jacobian of where it begins. Returns 0, or that there is nothing to try."""
+    """Choose a narrower step, with a new Jacobian at its start. Returns 0, or 1 if there is none to try."""
     h, error, asked = c.real.tried, c.real.error, K.real.asked
     if K.count.shared == 0 and (c.count.step_status != 0 or c.real.max_growth <= 1.0):
         K.count.refine = RETRY_REFINEMENTS
@@ -272,7 +270,7 @@ def reject_radau_step(K, c):
         return 0
     goes_on = K.count.before == 1 or c.real.back == c.real.t
     set_rejected_width(c, width_for_error(h, error, asked)[0] if goes_on else 0.1 * h)
-    if goes_on:  # what a jump excites is not followed by steps as wide as those before it
+    if goes_on:  # after a jump, faster motion makes steps as wide as before unlikely
         accept_rounding_error(K, c, h, error)
         if c.real.accepted_error > 0.0:
             escape_singular_position(K, c)
@@ -281,10 +279,10 @@ def reject_radau_step(K, c):
 
 @formula
 def accept_rounding_error(K, c, h, error):
-    """Where ever narrower steps miss the tolerance by as much, rounding decides: the widest of them is taken.
+    """Accept an error as rounding if much narrower steps do not reduce it; the widest of them is then taken.
 
-    So it is near a singular position, where it grows as steps get narrower. What is accepted so is told
-    (c.real.excess).
+    This happens near a singular position, where rounding grows as steps get narrower. The largest accepted error is
+    reported (c.real.largest_error).
     """
     if error < EXPECTED_ERROR_FALL * c.real.best:
         c.real.best = error
@@ -299,10 +297,10 @@ def accept_rounding_error(K, c, h, error):
 
 @formula
 def escape_singular_position(K, c):
-    """Where ever narrower steps lead nowhere: too close to a singular position the last one may have ended.
+    """Leave the neighbourhood of a singular position, if ever narrower steps fail because the last one ended too close.
 
-    It is taken back and ends elsewhere. If that does not help, a wide step is tried, which ends beyond the place, then
-    others, each somewhat narrower, with more pardoned.
+    The last step is undone and ended elsewhere. If that does not help, a wide step is tried, which ends beyond the
+    position, then others, each somewhat narrower and with a larger accepted error.
     """
     if not (c.real.h < SINGULAR_WIDTH_RATIO * c.real.wide and c.real.accepted_error * K.real.rtol < MAX_ROUNDING):
         return
@@ -322,7 +320,7 @@ def escape_singular_position(K, c):
 
 @formula
 def accept_radau_step(K, c, t, h, error, iterations):
-    """Make the end of the step the present state, and choose the width of the next one."""
+    """Make the end of the step the current state, and choose the width of the next one."""
     for i in range(c.y.shape[1]):
         c.y[PREVIOUS, i], c.y[PREVIOUS_RATE, i] = c.y[CURRENT, i], c.K[0, i]
         c.y[CURRENT, i] = c.y[PROPOSED, i]

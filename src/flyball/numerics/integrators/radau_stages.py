@@ -2,13 +2,13 @@
 
 After Hairer and Wanner, *Solving Ordinary Differential Equations II* (1996), sections IV.5 and IV.8. Stage
 values Z satisfy Z' = A^-1 Z / h at the places `RADAU_C`. A^-1 has one real eigenvalue GAMMA and a pair ALPHA +-
-i BETA; T^-1 A^-1 T is in real blocks. It is given ``residual(t, h, k, S, K, c)``, which fills row k of the
-residuals and of the rates of integrals.
+i BETA; T^-1 A^-1 T is in real blocks. The callback ``residual(t, h, k, S, K, c)`` fills row k of the residuals and
+of the rates of integrals.
 
 Newton's method works in the transformed form: (A^-1 / h x F' + I x F) dZ = -R becomes one real system with
-GAMMA / h and one complex system with (ALPHA + i BETA) / h, F' and F being the Jacobians by rates and by states
-where a step began. Diagonals of the constraints are regularised; the Newton iteration removes the
-regularisation, with or without refinement of each solve.
+GAMMA / h and one complex system with (ALPHA + i BETA) / h, with F' and F the Jacobians by rates and by states
+at the start of a step. The diagonals of the constraints are regularised; the Newton iteration removes the effect of
+the regularisation, with or without refinement of each solve.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def _as_rows(M: np.ndarray) -> tuple[tuple[float, ...], ...]:
 
 
 def _eigenvalue_blocks() -> tuple[float, complex, np.ndarray]:
-    """Real eigenvalue of A^-1, the complex one, and T: columns u, Re w, Im w of the eigenvectors."""
+    """Compute the real eigenvalue of A^-1, the complex one, and T: columns u, Re w, Im w of the eigenvectors."""
     values, vectors = np.linalg.eig(np.linalg.inv(_RADAU_A))
     k = int(np.argmin(np.abs(values.imag)))
     m = int(np.argmax(values.imag))
@@ -52,34 +52,34 @@ RADAU_A_INVERSE = _as_rows(np.linalg.inv(_RADAU_A))
 TRANSFORM = _as_rows(_TRANSFORM)
 TRANSFORM_INVERSE = _as_rows(np.linalg.inv(_TRANSFORM))
 ERROR_WEIGHTS = (-(13.0 + 7.0 * _ROOT) / 3.0, (-13.0 + 7.0 * _ROOT) / 3.0, -1.0 / 3.0)
-"""Of the error estimate: (GAMMA M - h J) err = h f(t0, y0) + M (ERROR . Z)."""
+"""Weights of the error estimate: (GAMMA M - h J) err = h f(t0, y0) + M (ERROR_WEIGHTS . Z)."""
 POLYNOMIAL_THROUGH_START = _as_rows(np.linalg.inv(np.array([[c, c**2, c**3] for c in RADAU_C])))
 """Coefficients of x, x^2, x^3 of the polynomial through 0 at x = 0 and stage values Z: rows times Z."""
 POLYNOMIAL_THROUGH_STAGES = _as_rows(np.linalg.inv(np.array([[1.0, c, c**2] for c in RADAU_C])))
 """Coefficients of 1, x, x^2 of the polynomial through values at the stages: rows times these."""
 _NODES = np.array([0.0, *RADAU_C])
 THIRD_DIFFERENCE = tuple(float(1.0 / np.prod([a - b for b in _NODES if b != a])) for a in _NODES)
-"""Weights of the third divided difference of values at the begin of a step and its stages: the cubic through all four
-is the parabola through the stages and this times (x - c1) (x - c2) (x - 1)."""
+"""Weights of the third divided difference of values at the start of a step and its stages. The cubic through all
+four is the parabola through the stages plus this times (x - c1) (x - c2) (x - 1)."""
 CUBIC_INTEGRAL = tuple(np.polynomial.Polynomial.fromroots(RADAU_C).integ().coef[1:].tolist())
 """Integral of (x - c1) (x - c2) (x - 1) from 0 to x, over x: coefficients of 1, x, x^2, x^3. It is 0 at 1 (Radau)."""
 CUBIC_INTEGRAL_MAX = float(
     np.abs(np.polynomial.Polynomial.fromroots(RADAU_C).integ()(np.linspace(0.0, 1.0, 1001))).max()
 )
-"""The most that it is within the step."""
+"""Largest absolute value of that integral within the step."""
 
 
 TI0, TI1, TI2 = TRANSFORM_INVERSE
 T0, T1, T2 = TRANSFORM
 
-MAX_CORRECTION_GROWTH = 2.0  # what a correction may be larger by than the one before, if Newton's method has converged
-MAX_CONFIRMATIONS = 60  # corrections of `confirm_convergence`: from x = 0 sqrt(x) takes 8, abs(x)**0.2 takes 30
+MAX_CORRECTION_GROWTH = 2.0  # largest ratio of two successive corrections of a converged Newton iteration
+MAX_CONFIRMATIONS = 60  # maximum corrections in `confirm_convergence`: from x = 0 sqrt(x) takes 8, abs(x)**0.2 takes 30
 NEWTON_DIVERGED = 1
 
 
 @formula
 def fill_matrix(K, A, scale):
-    """The matrix F + scale F' from the numbers of the Jacobian where the step begins."""
+    """Assemble the matrix F + scale F' from the Jacobian entries at the start of the step."""
     J = K.J[STEP_START]
     for i in range(A.shape[0]):
         A[i] = 0.0
@@ -94,7 +94,7 @@ def fill_matrix(K, A, scale):
 
 @formula
 def factor_matrices(K, h):
-    """Factor both matrices for steps of width h. Returns 0, or not."""
+    """Factor both matrices for steps of width h. Returns 0 on success."""
     fill_matrix(K, K.real_A, GAMMA / h)
     fill_matrix(K, K.pair_A, complex(ALPHA / h, BETA / h))
     K.count.factors += 1
@@ -118,7 +118,7 @@ def solve_refined(K, x, A, L, U, D, scale):
     J = K.J[STEP_START]
     for _ in range(K.count.refine):
         sparse_product(K.P, A, x[0], x[2])
-        for e in range(K.part[1], K.put.shape[0]):  # these stand on the diagonal alone
+        for e in range(K.part[1], K.put.shape[0]):  # regularisation is on the diagonal only
             i = K.P.Aj[K.put[e, 0]]
             x[2, i] -= back * J[K.put[e, 1]] * x[0, i]
         for i in range(n):
@@ -130,7 +130,7 @@ def solve_refined(K, x, A, L, U, D, scale):
 
 @formula
 def solve_real(K, h):
-    """Solve with the real matrix for what stands in K.x[0]."""
+    """Solve with the real matrix for the right-hand side in K.x[0]."""
     solve_refined(K, K.x, K.real_A, K.real_L, K.real_U, K.real_D, GAMMA / h)
 
 
@@ -147,7 +147,7 @@ def add_transformed(K, i, j, base):
 
 @formula
 def correct_stages(K, h):
-    """One correction of all stage values for what the equations miss in K.out. Returns its size."""
+    """Correct all stage values once for the residuals in K.out. Returns the size of the correction."""
     nv = K.d.shape[1]
     nr = K.lam.shape[1]
     perm = K.P.perm
@@ -184,7 +184,7 @@ def correct_stages(K, h):
 
 @formula
 def update_jacobian(linearise, t, k, S, K, c):
-    """Put the Jacobian at stage k, or where the step begins, into row START. Returns a status."""
+    """Evaluate the Jacobian at stage k, or at the start of the step, into row STEP_START. Returns a status."""
     if linearise(t, k, S, K, c) != 0:
         return NEWTON_DIVERGED
     for e in range(K.J.shape[1] if k != STEP_START else 0):
@@ -196,11 +196,12 @@ def update_jacobian(linearise, t, k, S, K, c):
 
 @formula
 def confirm_convergence(correct_at_end, callbacks, S, K, c, h):
-    """Go on by corrections with the Jacobian at the end of the step. Returns a status.
+    """Continue with corrections that use the Jacobian at the end of the step. Returns a status.
 
-    Where the slope of a law may be infinite (sqrt(x) at 0) corrections by it, and the error estimated with it, are next
-    to nothing whatever the equations miss. Newton's method has converged once a correction that is small has not grown
-    over the one before: from too steep a slope they grow, each with the slope of where the last one has led.
+    If the slope of a law is infinite (sqrt(x) at 0), corrections with it, and the error estimated with it, are nearly
+    zero whatever the residual. Newton's method has converged once a small correction is not larger than the previous
+    one. After a correction with a slope that is too steep they grow, each with the slope at the point the last one
+    reached.
     """
     last = K.real.correction
     for _ in range(MAX_CONFIRMATIONS):
@@ -217,17 +218,17 @@ def confirm_convergence(correct_at_end, callbacks, S, K, c, h):
     return NEWTON_DIVERGED
 
 
-MAX_ITERATIONS = 7  # iterations
-PROXIMAL_PASSES = 4  # of these, each beyond the multipliers of the last (`shift_proximal_point`)
+MAX_ITERATIONS = 7  # Newton iterations
+PROXIMAL_PASSES = 4  # maximum passes that shift the reference multipliers (`shift_proximal_point`)
 STAGES = 3
-MAX_CONTRACTION = 0.99  # what corrections fall by at least
-MAX_FIRST_GROWTH = 1e3  # what the second one may be larger by than the first
+MAX_CONTRACTION = 0.99  # contraction ratio above which the iteration has diverged
+MAX_FIRST_GROWTH = 1e3  # largest ratio of the second correction to the first
 ITERATION_DIVERGED, ITERATION_SLOW = 1, 2
 
 
 @formula
 def set_step_start(c, K):
-    """Tolerances of the step from the state at which it begins, and that state's velocities."""
+    """Store the velocities at the start of the step, and compute the tolerances of the step from that state."""
     y = c.y[CURRENT]
     nv = K.v.shape[1]
     nq = y.shape[0] - nv - K.z.shape[1]
@@ -249,7 +250,7 @@ def set_step_start(c, K):
 
 @formula
 def predict_stages(K, h):
-    """Start values of the stages: all goes on as in the step before; where a stretch begins velocities and x stay."""
+    """Predict the stages from the previous step; at the start of a segment velocities and x are constant."""
     nv = K.v.shape[1]
     for i in range(nv):
         for k in range(STAGES):
@@ -284,7 +285,7 @@ def predict_stages(K, h):
 
 @formula
 def polynomial_through_start(stages, i, start):
-    """Of x, x^2, x^3 of the polynomial through a start value and values at the stages, less the start."""
+    """Coefficients of x, x^2, x^3 of the polynomial through a start value and the stages, minus the start value."""
     a, b, c = stages[0, i] - start, stages[1, i] - start, stages[2, i] - start
     p, q, r = POLYNOMIAL_THROUGH_START
     return p[0] * a + p[1] * b + p[2] * c, q[0] * a + q[1] * b + q[2] * c, r[0] * a + r[1] * b + r[2] * c
@@ -292,7 +293,7 @@ def polynomial_through_start(stages, i, start):
 
 @formula
 def polynomial_through_stages(stages, i, x):
-    """The polynomial through values at the stages, at x."""
+    """Evaluate at x the polynomial through the values at the stages."""
     a, b, c = stages[0, i], stages[1, i], stages[2, i]
     p, q, r = POLYNOMIAL_THROUGH_STAGES
     return (
@@ -303,7 +304,7 @@ def polynomial_through_stages(stages, i, x):
 
 @formula
 def stage_rates(K, h):
-    """Rates of increments, velocities and x at the stages, and integrals there, by the stage values."""
+    """Compute rates of increments, velocities and x at the stages, and integrals there, from the stage values."""
     for k in range(STAGES):
         a, b, c = RADAU_A_INVERSE[k]
         for i in range(K.v.shape[1]):
@@ -318,7 +319,7 @@ def stage_rates(K, h):
 
 @formula
 def stage_integrals(K, h):
-    """Integrals of the motion at the stages by their rates there."""
+    """Compute integrals over the motion at the stages from their rates there."""
     for k in range(STAGES):
         p, q, r = RADAU_A[k]
         for i in range(K.tol_x.shape[0], K.z.shape[1]):
@@ -327,9 +328,10 @@ def stage_integrals(K, h):
 
 @formula
 def soften_redundant_rows(K, h):
-    """Ask for least multipliers where redundant rows leave some open and forces depend on them.
+    """Add the regularisation of the velocity rows, which selects minimum-norm multipliers of redundant rows.
 
-    Rows are as soft as their regularisation: G v - nu + delta D h A (lam - led) = 0, which leaves no multiplier open.
+    It is used if forces depend on multipliers. The rows become
+    G v - nu + delta D h A (lam - K.proximal_point) = 0, which determines all multipliers.
     """
     first = K.count.shared
     if first > 0:
@@ -348,12 +350,12 @@ def soften_redundant_rows(K, h):
 
 @formula
 def shift_proximal_point(K, pass_):
-    """What rows give way beyond in `soften_redundant_rows`: nothing at first, then what they carried. Returns whether there is more.
+    """Set the reference multipliers of `soften_redundant_rows`: zero in pass 0, then the current ones.
 
-    Of all that redundant rows may carry the least is taken by the first pass. It is soft, though: what friction makes
-    of the rows' giving way is no rounding (a wedge on a wedge multiplies it by 1e3). Each pass beyond what the last one
-    found (proximal point: Rockafellar 1976; iterated regularisation: Hanke and Groetsch 1998) leaves of this its next
-    power, and self-stress as it was.
+    Returns whether another pass may follow. The first pass takes the minimum-norm multipliers of redundant rows. Its
+    regularisation has an effect, however: friction that depends on the multipliers can amplify it (a wedge on a wedge
+    by 1e3). Each further pass from the multipliers of the previous one (proximal point: Rockafellar 1976; iterated
+    regularisation: Hanke and Groetsch 1998) reduces this effect by another power and leaves the self-stress unchanged.
     """
     for r in range(K.lam.shape[1] if K.count.shared > 0 else 0):
         for k in range(STAGES):
@@ -363,7 +365,7 @@ def shift_proximal_point(K, pass_):
 
 @formula
 def solve_stages(residual, S, K, c, h):
-    """Find the stage values. Returns (status, factor by which the next width should change)."""
+    """Find the stage values. Returns (status, iterations, or the suggested factor of the width)."""
     more = shift_proximal_point(K, 0)
     status, asked, moved = iterate_newton(residual, S, K, c, h)
     pass_ = 0
@@ -373,16 +375,16 @@ def solve_stages(residual, S, K, c, h):
         status, again, moved = iterate_newton(residual, S, K, c, h)
         if status != 0 and not moved <= K.real.rounding_size:
             return status, again
-        if status != 0:  # what rounding makes of multipliers that redundant rows leave open
+        if status != 0:  # rounding in multipliers that redundant rows leave undetermined
             status, more = 0, False
     return update_integrals(residual, S, K, c, h) if status == 0 else status, asked
 
 
 @formula
 def iterate_newton(residual, S, K, c, h):
-    """Newton's iteration. Returns (0, how often it was corrected) or (status, factor of the next width); what it moved.
+    """Run Newton's iteration. Returns (0, iterations) or (status, factor of the next width), and the first correction.
 
-    The last is the size of the first correction in units of the tolerance.
+    The size of the first correction is in units of the tolerance.
     """
     found = 0
     rate = max(K.real.rate, 1e-16) ** 0.8
@@ -406,7 +408,7 @@ def iterate_newton(residual, S, K, c, h):
             before = ratio
             if (
                 n == 1 and MAX_CONTRACTION <= theta < MAX_FIRST_GROWTH
-            ):  # the first one corrected multipliers, that are not looked at
+            ):  # the first one corrected multipliers, which are not measured
                 last = size
                 continue
             if not theta < MAX_CONTRACTION:
@@ -431,7 +433,7 @@ def iterate_newton(residual, S, K, c, h):
 
 @formula
 def update_integrals(residual, S, K, c, h):
-    """Integrals of the motion by their rates at the stage values found. Returns a status."""
+    """Compute integrals over the motion from their rates at the stage values found. Returns a status."""
     if K.z.shape[1] == K.tol_x.shape[0]:
         return 0
     stage_rates(K, h)
@@ -444,13 +446,13 @@ def update_integrals(residual, S, K, c, h):
 
 @formula
 def radau_error(residual, S, K, c, h):
-    """Error of the step in units of the tolerance. Returns (status, error).
+    """Estimate the error of the step in units of the tolerance. Returns (status, error).
 
-    Filtered once, at the start of a motion too: twice (Hairer and Wanner, IV.8.20) would let a step pass over what is
-    fast, whether it is damped or not.
+    The estimate is filtered once, also at the start of a motion. Filtering twice (Hairer and Wanner, IV.8.20) would let
+    a step miss fast components, damped or not.
     """
     nv = K.v.shape[1]
-    accounts = radau_integral_error(K, c, h)  # rates at the begin are other ones below
+    accounts = radau_integral_error(K, c, h)  # computed first: the rates at the start are overwritten below
     e, f, g = ERROR_WEIGHTS
     for i in range(nv):
         v0 = K.v[STEP_START, i]
@@ -468,10 +470,10 @@ def radau_error(residual, S, K, c, h):
 
 @formula
 def elastic_error(K, h):
-    """Error of the velocities that what is estimated of the increments springs back with, in units of the tolerance.
+    """Error of velocities that the elastic energy of the increments' error can produce, in units of the tolerance.
 
-    A swing that is too fast for the step is all but filtered out of the velocities, while it lasts where nothing damps
-    it: v follows from e K e = v M v. Where there is damping it counts as inertia does, h C / GAMMA.
+    The filter removes oscillations that are too fast for the step from the velocities, but they persist if nothing
+    damps them: v follows from e K e = v M v. Damping counts as additional inertia, h C / GAMMA.
     """
     nv = K.v.shape[1]
     perm = K.P.perm
@@ -492,7 +494,7 @@ def elastic_error(K, h):
 
 @formula
 def filtered_error(residual, S, K, c, t, h):
-    """What the equations miss in row START, solved with the real matrix, in units of the tolerance."""
+    """Solve with the real matrix for the residual in row STEP_START. Returns (status, size in tolerances)."""
     if residual(t, STEP_START, S, K, c) != 0:
         return 1, 0.0
     perm = K.P.perm
@@ -512,7 +514,7 @@ def filtered_error(residual, S, K, c, t, h):
 
 @formula
 def restore_step_start(K, c):
-    """Velocities and x of the begin of the step into their place again."""
+    """Restore velocities and x at the start of the step in row STEP_START."""
     nv, nz = K.v.shape[1], K.z.shape[1]
     for i in range(nv):
         K.v[STEP_START, i] = c.y[CURRENT, c.y.shape[1] - nz - nv + i]
@@ -522,10 +524,10 @@ def restore_step_start(K, c):
 
 @formula
 def radau_integral_error(K, c, h):
-    """Error of the integrals in units of the tolerance: relative to all that stands in them and to c.real.ledger.
+    """Error of the integrals in units of the tolerance, relative to the sum of their sizes and c.real.energy_size.
 
-    Within the step: at its end they are of a higher order, of the state too, but what lies between is told as well; and
-    a fast beginning that the state forgets is not forgotten by its integrals.
+    The error within the step is used. At its end integrals are of higher order, like the state, but values within the
+    step are also output; and a fast initial transient that the state forgets stays in its integrals.
     """
     size = c.real.energy_size
     for n in range(c.integrals.shape[0]):
@@ -540,17 +542,18 @@ def radau_integral_error(K, c, h):
 
 @formula
 def third_difference_of_rate(K, i):
-    """Third divided difference of the rate of integral i, by its begin and the stages, over the step."""
+    """Third divided difference over the step of the rate of integral i, from its start and the stages."""
     return (
-        THIRD_DIFFERENCE[0] * K.rate[STEP_START, i] + THIRD_DIFFERENCE[1] * K.rate[0, i] + THIRD_DIFFERENCE[2] * K.rate[1, i] + THIRD_DIFFERENCE[3] * K.rate[2, i]
+        THIRD_DIFFERENCE[0] * K.rate[STEP_START, i] + THIRD_DIFFERENCE[1] * K.rate[0, i]
+        + THIRD_DIFFERENCE[2] * K.rate[1, i] + THIRD_DIFFERENCE[3] * K.rate[2, i]
     )  # fmt: skip
 
 
 @formula
 def radau_defect(residual, S, K, c, h, x):
-    """Error that what the polynomial misses of the equations at t + x h would make if it lasted for the step.
+    """Error that the residual of the polynomial at t + x h would cause if it lasted for the whole step.
 
-    In units of the tolerance; huge if they cannot be evaluated there.
+    In units of the tolerance; huge if the equations cannot be evaluated there.
     """
     nv = K.v.shape[1]
     for i in range(nv):
@@ -574,9 +577,9 @@ def radau_defect(residual, S, K, c, h, x):
 
 @formula
 def interpolate_radau(K, x, h, d, v, z):
-    """Increments, velocities and integrals at t + x h, by the polynomial through the stages.
+    """Interpolate increments, velocities and integrals at t + x h by the polynomial through the stages.
 
-    That of the rates of integrals goes through the begin of the step too: K.rate[START].
+    Rates of integrals are interpolated through the start of the step too, K.rate[STEP_START].
     """
     for i in range(d.shape[0]):
         b1, b2, b3 = polynomial_through_start(K.d, i, 0.0)

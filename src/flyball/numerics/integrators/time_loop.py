@@ -1,13 +1,13 @@
-"""The time loop of all integrators, and the step state: all that an interrupted integration needs to continue.
+"""The time loop of all integrators, and the step state, from which an interrupted integration can continue.
 
-A step method is ``ask(own, S, W, R, c, task)``, with the tasks named here; its data ``own`` are its own
-business. ``c`` is the `StepState`, which holds the width of a step (``tried``), its error (``error``) and the
-requested part of it (``part``). ``report(t, y, out, S, W)`` writes a row of output. What else is done at the
-start of a segment and at the end of a step is given by two more callbacks: `no_segment_start` and
-`finish_step`, or those of `event_location.event_steps`, whose steps end on events.
+A step method is a function ``ask(own, S, W, R, c, task)`` that performs the tasks listed here; only the method uses
+its data ``own``. ``c`` is the `StepState`, which holds the width of a step (``tried``), its error (``error``) and
+the requested part of it (``part``). ``report(t, y, out, S, W)`` writes a row of output. Two more callbacks complete
+the start of a segment and the end of a step: `no_segment_start` and `finish_step`, or those of
+`event_location.event_steps`, whose steps end on events.
 
-The loop returns when its output buffer is full, its share of steps is done, the end is reached, or it cannot
-continue; the caller calls again with the same state. Progress display, interruption and restart rest on this.
+The loop returns when its output buffer is full, its quota of steps is used, the end is reached, or it cannot
+continue; the caller calls again with the same state. Progress display, interruption and restart rely on this.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ import numpy as np
 from ...compiler.formulas import formula
 from ...compiler.struct_layout import Float1, Float2, Int1, Record
 
-# ClockCounts.started, where no segment has begun, but only what pushes has jumped where it begins
+# StepCounts.started if no segment has begun, but only forces have jumped at its start
 FORCES_JUMPED = 2
-# rows of Clock.y: the state, the one in the making, the interpolated one; what a trial puts aside; the step before
+# rows of StepState.y: the state, the proposed one, the interpolated one; saved by trials; the previous step
 CURRENT, PROPOSED, INTERPOLATED, SAVED, SAVED_RATE, PREVIOUS, PREVIOUS_RATE, STATE_ROWS = range(8)
-# rows of Clock.seen that the integrator looks at: what is kept of the begin of a step, and of its end
+# rows of StepState.seen that the integrator uses: data of inspected laws at the start and the end of a step
 INSPECTED_START, INSPECTED_START_RATE, INSPECTED_END, INSPECTED_END_RATE = range(1, 5)
-AT_START, AT_END = -2, -1  # what ``inspect`` takes note of, in place of looking at law k
-INTEGRAL_TOLERANCE_FACTOR = 10.0  # accounts are held to this many times the relative tolerance
+AT_START, AT_END = -2, -1  # tasks of ``inspect``: store data of the start or end, instead of checking law k
+INTEGRAL_TOLERANCE_FACTOR = 10.0  # the tolerance of integrals is this many times the relative tolerance
 RUNNING, DONE, STEP_FAILED, NOT_FINITE, OUTPUT_FAILED, TOO_MANY_STEPS = 0, 1, 2, 3, 4, 5
-ULP = 2.3e-16  # a unit in the last place, as a part
+ULP = 2.3e-16  # relative unit in the last place
 NO_INSPECTION = np.zeros((6, 0))
 
 
@@ -41,28 +41,28 @@ class StepReals(Record, kind="Float"):
     rtol: float
     atol: float
     h_max: float
-    max_growth: float  # factor by which the step may grow
-    largest: float  # time that widths of steps are compared with
-    scale: float  # size of positions
-    energy_size: float  # size of energies
-    span: float  # of the whole motion
-    last: float  # of the steps refused since the last accepted one: the last error,
-    best: float  # the least error,
+    max_growth: float  # largest factor by which the step may grow
+    largest: float  # time relative to which widths of steps are judged
+    scale: float  # length scale of positions
+    energy_size: float  # scale of energies
+    span: float  # duration of the whole motion
+    last: float  # of the steps rejected since the last accepted one: the last error,
+    best: float  # the smallest error,
     best_h: float  # and its width
-    accepted_error: float  # an error that is good enough
-    wide: float  # widest step of late
-    before: float  # begin of the step before
-    back: float  # begin of the last step that was taken back
+    accepted_error: float  # error above the tolerance that is accepted as rounding
+    wide: float  # widest recent step
+    before: float  # start time of the previous step
+    back: float  # start time of the last step that was undone
     largest_error: float  # largest error accepted
     largest_error_at: float  # its time
     rounding_found_at: float  # when an error was last found to be rounding
     step: float  # fixed width of steps; 0: adaptive
-    tried: float  # width of the step in the making
+    tried: float  # width of the current trial step
     error: float  # its error in units of the tolerance
-    part: float  # part of it that is asked for
-    interpolation_width: float  # width at which the state within may be known, where it is not; 0: that is not known
-    interpolation_limit: float  # the widest that is tried as that was so of late; 0: any
-    interpolation_limit_since: float  # at which step it last was, from 1 on
+    part: float  # requested part of it
+    interpolation_width: float  # width at which interpolation may succeed, if it fails; 0: not known
+    interpolation_limit: float  # largest width allowed because interpolation failed recently; 0: any
+    interpolation_limit_since: float  # number of the step at which it last failed, from 1
 
 
 class StepCounts(Record, kind="Int"):
@@ -70,45 +70,46 @@ class StepCounts(Record, kind="Int"):
 
     accepted: int
     rejected: int
-    next: int  # output time
+    next: int  # index of the next output time
     quota: int  # steps until the loop returns
     status: int
-    started: int  # whether a segment has begun; `FORCES_JUMPED`
+    started: int  # whether a segment has begun, or `FORCES_JUMPED`
     controlled: int  # components of the state whose error is controlled
-    limit: int  # most steps
+    limit: int  # maximum number of steps
     positions: int  # components that are positions
-    step_status: int  # how the last step tried ended
-    extended: int  # whether the state within it was asked for: 1 there is one, 2 it is good
+    step_status: int  # status of the last trial step
+    extended: int  # dense output of the current step: 0 not used, 1 available, 2 accurate
 
 
 class StepState(NamedTuple):
-    """Everything an interrupted integration needs to go on."""
+    """State of an integration, complete for interruption and restart."""
 
     real: StepReals  # type: ignore[assignment]
     count: StepCounts  # type: ignore[assignment]
     times: Float1  # output times, ascending
-    y: Float2  # (STATES, ny)
+    y: Float2  # (STATE_ROWS, ny)
     K: Float2  # (stages + 1, ny): derivatives of the stages, and one within the step
-    integrals: Int1  # components that are integrals of the motion: works
-    seen: Float2 = NO_INSPECTION  # what the inspection of laws within a step keeps; no columns: nothing is inspected
+    integrals: Int1  # components that are integrals over the motion, such as work
+    seen: Float2 = NO_INSPECTION  # data of inspected laws within a step; no columns: no inspection
 
 
-# what a method is asked: to begin at the state (a status of the clock); a step of the width TRIED to c.y[NEW] (0 or
-# not), after which ERROR is known; the state at a part of it to c.y[BETWEEN] (0 or not); what to try after a step that
-# is not good (0, or that there is nothing); whether laws do something in it that was not seen; to take note of its end;
-# to make its end the present state, and the width of the next
+# tasks of a method: start at the current state (returns a status of the loop); try a step of width c.real.tried to
+# c.y[PROPOSED] (0 if it succeeds) and set c.real.error; interpolate at c.real.part to c.y[INTERPOLATED] (0 if it
+# succeeds); choose the next try after a rejected step (0, or 1 if there is none); check whether laws change within the
+# step without being seen at its stages; store inspection data of its end; make its end the current state and choose the
+# next width
 BEGIN_SEGMENT, TRY_STEP, INTERPOLATE, REJECT_STEP, CHECK_MISSED_CHANGE, INSPECT_END, ACCEPT_STEP = range(7)
 
 
 @formula
 def no_segment_start(callbacks, S, W, c, back):
-    """Nothing is done as a stretch begins. Returns a status."""
+    """Do nothing at the start of a segment. Returns a status."""
     return 0
 
 
 @formula
 def start_integration(callbacks, S, W, R, c, out):
-    """Have the method begin, and write the output at the very start. Returns (status, rows written)."""
+    """Initialise the method, and write the output at the start. Returns (status, rows written)."""
     ask, own, report, begun, _ = callbacks[:5]
     used = 0
     status = ask(own, S, W, R, c, BEGIN_SEGMENT)
@@ -127,14 +128,14 @@ def start_integration(callbacks, S, W, R, c, out):
 
 @formula
 def step_end_time(c):
-    """Time at which the step in the making ends: T_END itself where it reaches that, as T + h may be less."""
+    """Time at which the current step ends: exactly t_end for the last step, although t + h may round below it."""
     h = c.real.tried
     return c.real.t_end if h == c.real.t_end - c.real.t else c.real.t + h
 
 
 @formula
 def write_output(callbacks, S, W, R, c, out, used):
-    """Report every output time within the step, as far as the buffer reaches. Returns (status, used)."""
+    """Write all output times within the step for which the buffer has rows. Returns (status, used)."""
     ask, own, report = callbacks[:3]
     t, h, end = c.real.t, c.real.tried, step_end_time(c)
     while c.count.next < c.times.shape[0] and used < out.shape[0]:
@@ -157,9 +158,9 @@ def write_output(callbacks, S, W, R, c, out, used):
 
 @formula
 def next_step_width(c):
-    """Width of the next step: none is left over at the end that is very short; 0 if it would be too short.
+    """Width of the next step, chosen to avoid a very short last step; 0 if it would be too short.
 
-    Fixed steps are never wider, and narrower only where they end: at events, and at the end of the time.
+    Fixed steps never get wider; they are shortened only before events and at the final time.
     """
     left = c.real.t_end - c.real.t
     h = min(c.real.h, c.real.h_max)
@@ -172,7 +173,7 @@ def next_step_width(c):
 
 @formula
 def set_rejected_width(c, h):
-    """Try a step of that width next, as the last was refused."""
+    """Set the width to try after a rejected step."""
     c.count.rejected += 1
     c.real.max_growth = 1.0
     c.real.h = h
@@ -180,32 +181,32 @@ def set_rejected_width(c, h):
 
 @formula
 def shorten_step(c, h):
-    """The same after a step within which something cannot be: for steps of fixed width there is nothing to try."""
+    """Set the width to try after a step whose interior cannot be evaluated; fixed steps have none to try."""
     set_rejected_width(c, h if c.real.step == 0.0 else 0.0)
 
 
 @formula
 def shorten_for_interpolation(c, h):
-    """Try a step next within which the state may be told, after one of width h in which it cannot be."""
+    """Set a width at which interpolation may succeed, after it failed in a step of width h."""
     shorten_step(c, c.real.interpolation_width if c.real.interpolation_width > 0.0 else 0.25 * h)
 
 
 @formula
 def output_buffer_full(c):
-    """Whether the buffer was full inside the step: it is taken again by the next call."""
+    """Whether the buffer became full within the step; the next call repeats the step."""
     return c.count.next < c.times.shape[0] and c.times[c.count.next] <= step_end_time(c)
 
 
 @formula
 def finish_step(callbacks, S, W, R, c, out, used):
-    """Go on to the end of a step that is good. Returns (rows written, whether the loop returns)."""
+    """Complete an accepted step. Returns (rows written, whether the loop returns)."""
     ask, own = callbacks[:2]
     h = c.real.tried
     if c.seen.shape[1] > 0 and ask(own, S, W, R, c, CHECK_MISSED_CHANGE) != 0:
         shorten_step(c, 0.5 * h)
         return used, False
     status, used = write_output(callbacks, S, W, R, c, out, used)
-    if status != 0:  # what lies inside the step cannot be reported: take a shorter one
+    if status != 0:  # the step cannot be interpolated: take a shorter one
         shorten_for_interpolation(c, h)
         return used, False
     if output_buffer_full(c):
@@ -216,9 +217,10 @@ def finish_step(callbacks, S, W, R, c, out, used):
 
 @formula
 def advance(callbacks, S, W, R, c, out):
-    """Go on until done, stuck, the buffer ``out`` is full or the quota of steps is used. Returns rows written.
+    """Integrate until the end, a failure, a full buffer ``out`` or the end of the quota. Returns the rows written.
 
-    Callbacks: ask, own, report, begun, onward, and what these two need.
+    Callbacks: ask, own, report, begun, onward (``begun`` at the start of a segment, ``onward`` at the end of a step),
+    and those that these two use.
     """
     ask, own, _, begun, onward = callbacks[:5]
     used = 0
@@ -246,7 +248,7 @@ def advance(callbacks, S, W, R, c, out):
             if ask(own, S, W, R, c, REJECT_STEP) != 0:
                 c.count.status = STEP_FAILED
                 return used
-            if c.real.t < t:  # the step before is taken back
+            if c.real.t < t:  # the previous step has been undone
                 begun(callbacks, S, W, c, True)
             continue
         used, over = onward(callbacks, S, W, R, c, out, used)

@@ -7,17 +7,17 @@ Marsden 2011), and velocities on the constraints at the ends of steps, as in RAT
     p0 + h/2 (f0 + G0^T lam) = T(d)^-T M d / h,  p1- = T(-d)^-T M d / h,  g(t1, q1) = 0
     M v1 = p1- + h/2 (f1 + G1^T lam'),  G1 v1 = nu1
 
-It is for very long motions: symplectic, it keeps momenta that symmetries keep, and its energy error stays
-bounded. Forces that depend on velocities are iterated. It is given compose, arrive, inspect, as
-`implicit_method` is, and
+It is for very long motions: it is symplectic, it conserves the momenta that belong to symmetries, and its energy
+error stays bounded. Forces that depend on velocities are iterated. Callbacks: compose, arrive, inspect as for
+`implicit_method`, and
 
-    weigh(v, p, S), speed(p, v, S)  momenta of velocities, and back
+    weigh(v, p, S), speed(p, v, S)  momenta from velocities, and velocities from momenta
     fly(p, h, d, p1, S) -> status   free motion with momenta p, and the momenta on arrival
     push(t, y, lam, f, S)           forces
     place(t, y, g, S) -> worst      position residuals, and the largest of them
     relax(g, lam, S)                multipliers of an impulse along the rows that removes g in a unit of time
     pull(rows, lam, by, p, S)       adds by G^T lam to momenta
-    rows_to(rows, S)                keeps G as last evaluated
+    rows_to(rows, S)                stores G as last evaluated
 """
 
 from __future__ import annotations
@@ -49,17 +49,17 @@ from .time_loop import (
 )
 
 FREE_MOMENTA, ARRIVAL_MOMENTA, START_MOMENTA, END_MOMENTA = range(4)  # rows of p
-AT_STEP_START, AT_STEP_END, TRIAL_FORCES = range(3)  # rows of f, and of rows: at the begin of the step, at its end
-MAX_ITERATIONS = 30  # iterations
-CONVERGED_CHANGE = 4e-15  # part of the momenta below which a change of forces is none
-ROUNDING_CHANGE = 1e-9  # and below which it is rounding, if it does not fall
-STALL_RATIO = 0.7  # what is left of a violation by an iteration that rounding stops
+AT_STEP_START, AT_STEP_END, TRIAL_FORCES = range(3)  # rows of f, and of rows
+MAX_ITERATIONS = 30  # of each iteration
+CONVERGED_CHANGE = 4e-15  # change of forces, relative to the momenta, below which the iteration has converged
+ROUNDING_CHANGE = 1e-9  # the same, below which a change that stops decreasing is rounding
+STALL_RATIO = 0.7  # ratio of successive violations above which the iteration is stopped by rounding
 POSITIONS_FAILED, FORCES_FAILED = 1, 2
 
 
 @formula
 def prepare_start(callbacks, S, K, c):
-    """Forces and rows where the method begins anew."""
+    """Evaluate forces and constraint rows at the start of a segment."""
     weigh, push, rows_to = callbacks[3], callbacks[6], callbacks[10]
     weigh(K.v[STEP_START], K.p[START_MOMENTA], S)
     push(c.real.t, c.y[CURRENT], K.lam[STEP_START], K.f[AT_STEP_START], S)
@@ -68,7 +68,7 @@ def prepare_start(callbacks, S, K, c):
 
 @formula
 def attempt_variational_step(callbacks, S, K, c, h):
-    """One step of width h into c.y[NEW], derivatives there into c.K[1]. Returns a status."""
+    """Try one step of width h to c.y[PROPOSED], with derivatives there in c.K[1]. Returns a status."""
     nv, nz = K.v.shape[1], K.z.shape[1]
     at = c.y.shape[1] - nz - nv
     for i in range(nv):
@@ -92,7 +92,7 @@ def attempt_variational_step(callbacks, S, K, c, h):
 
 @formula
 def store_end_rates(K, c, end):
-    """What is asked for within the step, by the velocities in c.y[NEW] and the rates in row ``end`` of c.K."""
+    """Store rates for interpolation: velocities in c.y[PROPOSED], rates in rows 0 and ``end`` of c.K."""
     nv, nz = K.v.shape[1], K.z.shape[1]
     at = c.y.shape[1] - nz - nv
     for i in range(nv):
@@ -104,7 +104,7 @@ def store_end_rates(K, c, end):
 
 @formula
 def solve_positions(callbacks, S, K, c, h):
-    """To the positions at the end of the step, on the constraints, and the momenta on arrival. Returns a status."""
+    """Find positions at the end of the step that satisfy the constraints, and the momenta there. Returns a status."""
     compose, fly = callbacks[0], callbacks[5]
     place, relax, pull = callbacks[7], callbacks[8], callbacks[9]
     nr = K.lam.shape[1]
@@ -135,10 +135,10 @@ def solve_positions(callbacks, S, K, c, h):
 
 @formula
 def broyden_step(steps, n):
-    """Make the next step of a simple iteration, row n, Broyden's, by those before (Kelley 1995, algorithm brsol).
+    """Turn the step of a simple iteration in row n into Broyden's, using those before (Kelley 1995, algorithm brsol).
 
-    What the rows of the begin answer to is turned until the end of the step, the more so where a body spins.
-    Returns whether there is one.
+    The simple iteration uses the constraint rows of the step's start, which rotate until its end, most of all when a
+    body spins. Returns whether the step exists.
     """
     z = steps[n]
     nr = z.shape[0]
@@ -162,7 +162,7 @@ def broyden_step(steps, n):
 
 @formula
 def solve_velocities(callbacks, S, K, c, h):
-    """Velocities at the end of the step, with forces that may depend on them. Returns a status."""
+    """Find the velocities at the end of the step, with forces that may depend on them. Returns a status."""
     arrive, weigh, speed, push, rows_to = callbacks[1], callbacks[3], callbacks[4], callbacks[6], callbacks[10]
     nv = K.v.shape[1]
     at = c.y.shape[1] - K.z.shape[1] - nv
@@ -187,7 +187,7 @@ def solve_velocities(callbacks, S, K, c, h):
                 change = x
         if change <= CONVERGED_CHANGE * size or (change > STALL_RATIO * last and change <= ROUNDING_CHANGE * size):
             rows_to(K.rows[AT_STEP_END], S)
-            for i in range(nv):  # momenta are carried on, less rounding: what constraints did is all that is weighed
+            for i in range(nv):  # momenta are carried on; only the constraints' change is converted, to limit rounding
                 K.p[ARRIVAL_MOMENTA, i] = c.y[PROPOSED, at + i] - K.v[END_ROW, i]
             weigh(K.p[ARRIVAL_MOMENTA], K.p[END_MOMENTA], S)
             for i in range(nv):
@@ -208,7 +208,7 @@ def solve_velocities(callbacks, S, K, c, h):
 
 @formula
 def accept_variational_step(K, c):
-    """Make the end of the step the present state, and remember what the next one needs."""
+    """Make the end of the step the current state, and store what the next step needs."""
     for i in range(K.v.shape[1]):
         K.f[AT_STEP_START, i] = K.f[AT_STEP_END, i]
         K.p[START_MOMENTA, i] = K.p[END_MOMENTA, i]
@@ -223,7 +223,7 @@ def accept_variational_step(K, c):
 
 @formula
 def run_variational_task(callbacks, S, K, c, task):
-    """What the `loop` asks of the method: as `implicit_method.run_implicit_task`."""
+    """Perform a task of the `time_loop`, as `implicit_method.run_implicit_task`."""
     compose, arrive, inspect = callbacks[0], callbacks[1], callbacks[2]
     if task == TRY_STEP:
         c.count.extended, c.real.error = 0, 0.0

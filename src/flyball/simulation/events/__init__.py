@@ -1,5 +1,6 @@
-"""Event-driven simulation: from event to event, with jumps of velocities and selection of modes at each instant.
+"""Event-driven simulation: integration from event to event, with velocity jumps and mode selection at each event.
 
-`event_loop` integrates to the next event; `resolution` makes an instant consistent (actions, impacts, modes);
-`mode_selection` decides which stops, ropes, locks and friction rows hold; `nonsmooth_laws` treats corners of laws.
+`event_loop` integrates to the next event; `resolution` resolves an instant (actions, impacts, modes);
+`mode_selection` decides which stops, ropes, locks and friction rows are active; `nonsmooth_laws` treats corners of
+laws.
 """

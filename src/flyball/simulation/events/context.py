@@ -1,6 +1,6 @@
 """Event context: the motion at an instant, the bounds of its switches, and locking and releasing.
 
-`EventContext` is what everything that happens at an instant reads and writes.
+All code that resolves an event reads and writes the `EventContext`.
 """
 
 from __future__ import annotations
@@ -30,69 +30,70 @@ from ..initial_state import InitialState
 
 @dataclass
 class EventContext:
-    """A motion where it stands.
+    """The state of a motion at an instant.
 
-    Modes are in ``c.work.modes``, the sides of switches behind what is sensed (see `equations.guards`).
+    Modes are in ``c.work.modes``. The states of switches (side, direction of sliding) follow the measured quantities in
+    ``c.work.sensed`` (see `engine.guards`).
 
     Attributes
     ----------
-    start : Start
-        Where and in which coordinates it began.
-    clock : Clock
-        Of the integration: its time and state are those of the instant.
-    records : list of Happening
-        What happened so far, in order.
+    start : InitialState
+        Start of the motion, with its coordinates.
+    clock : StepState
+        State of the integrator: its time and state are those of the instant.
+    records : list of EventRecord
+        Events so far, in order.
     lost : float
-        Mechanical energy [J] that impacts and sudden changes took so far.
+        Mechanical energy [J] that impacts and sudden changes dissipated so far.
     given : float
-        Mechanical energy [J] that kicks and changed parameters gave so far.
+        Mechanical energy [J] that applied impulses and changed parameters supplied so far.
     stopped : str
-        Why the motion ends here, in words; empty: it goes on.
-    kick : ndarray, optional
-        Generalised impulse (nv,) that is given at this instant: taken up by the next jump.
-    blows : list
-        What it is made of; see `results.struck.Struck`.
+        Why the motion ends here; empty: it continues.
+    external_impulse : ndarray, optional
+        Generalised impulse (nv,) applied at this instant, used by the next jump.
+    external_impulses : list
+        The applied impulses that it consists of; see `results.reactions.AppliedImpulse`.
     doubts : list of str
-        What rigid bodies left open, in words, for the health.
+        Health remarks on what rigid-body equations left undetermined.
     bounces : dict
-        Switch -> `impacts.BounceSeries`: how often it closed lately.
-    swings : dict
-        Switch -> when the last ways through its corner were (`swings`).
+        Switch -> `impacts.BounceSeries`: its recent impacts.
+    corner_passages : dict
+        Switch -> times of the last passages through its corner.
     counts : dict
         Event -> how often it happened so far.
     true : list of str
-        Events whose comparisons were true as the motion began.
-    acted : dict
-        What was settled by events at the instant ``acted_at``, and by which action of which.
+        Events whose comparisons were true at the start of the motion.
+    settled_keys : dict
+        What actions settled at the instant ``settled_at`` -> event and action.
     nothing : mapping
-        Guard -> what is zero of it at the instant, where that is known.
+        Guard -> the rounding of its value at the instant, where that is known.
     zero : dict
-        Event -> what its guard was, in size, where it last fired: zero to rounding.
+        Event -> size of its guard where it last triggered: zero to rounding.
     sides : dict
-        Event -> the side that its guard was last on, where the motion ends within rounding of zero.
+        Event -> the last sign of its guard, where the guard is zero to rounding at the end of the motion.
     fresh : bool
-        Whether forces or velocities jump at the instant: the next step is then no wider than those of late.
-    decider : Instant, optional
-        What decides at its instants (`events.instant`).
+        Whether forces or velocities jump at the instant: the next step is then no wider than recent ones.
+    instant_problem : InstantProblem, optional
+        Workspace for resolving instants (`events.instant_problem`).
     failed : Exception
-        Why the motion cannot go on here.
+        Why the motion cannot continue.
     watched : str
-        How closely it was looked for events, in words.
+        Description of how closely events were detected.
     method : str
-        By what it was computed from when on, in words, where that was not one method.
+        Description of the methods used, where there were several.
     astray : frozenset of int
-        Switches found where they should not be (`events.astray`): stops left the wrong way with no speed, which close
-        without a bounce, and corners whose laws were on the wrong side.
-    sharing : Sharing, optional
-        What holds together and shares its forces (`equations.sharing`).
+        Switches whose crossing was missed (`event_loop.missed_crossings`): stops left in the wrong direction at
+        negligible speed, which close without a bounce, and corners whose laws were on the wrong side.
+    sharing : ForceDistribution, optional
+        Rows that hold together with indeterminate forces (`engine.guards`).
     tied : frozenset of tuple
-        Guards (kind, switch) of what is at its end and is kept there by others (`events.idle`).
+        Guards (kind, switch) of quantities at a bound that other active rows keep there.
     least : dict
-        Switch -> force that is rounding, of what takes part in the modes decided last.
+        Switch -> force that is rounding, for the rows of the last mode decision.
     still : tuple of int
-        Measured quantities whose rates what holds keeps at zero (`events.still`).
-    seen : Segments, optional
-        What held at the rows of output so far (`events.segments`).
+        Measured quantities whose rates active rows keep at zero (`mode_selection.held_rates`).
+    seen : PhaseRecorder, optional
+        Modes at the output rows so far (`event_loop.PhaseRecorder`).
     """
 
     start: InitialState
@@ -127,12 +128,12 @@ class EventContext:
 
     @property
     def c(self) -> CompiledMechanism:
-        """Tables and scratch that the motion is computed with."""
+        """Tables and workspace of the mechanism."""
         return self.start.assembly.compiled
 
     @property
     def structure(self) -> Structure:
-        """Its integers."""
+        """Structure of the mechanism."""
         return self.c.structure
 
     @property
@@ -142,32 +143,32 @@ class EventContext:
 
     @property
     def y(self) -> np.ndarray:
-        """The state there (q, v, z), to be written to in place, (ny,)."""
+        """The state (q, v, z) at the instant, writable in place, (ny,)."""
         return self.clock.y[CURRENT]
 
     @property
     def group(self) -> ForceDistribution:
-        """What holds together and shares its forces: `empty_distribution`, made when it is first asked for."""
+        """The rows that share indeterminate forces; `empty_distribution` when first accessed."""
         if self.sharing is None:
             self.sharing = empty_distribution(len(self.c.system.switches.row), len(self.c.system.rows.law))
         return self.sharing
 
     @property
     def q(self) -> np.ndarray:
-        """Its positions, in place, (nq,)."""
+        """Positions, writable in place, (nq,)."""
         return self.y[: self.structure.nq]
 
     @property
     def v(self) -> np.ndarray:
-        """Its velocities, in place, (nv,)."""
+        """Velocities, writable in place, (nv,)."""
         return self.y[self.structure.nq : self.structure.nq + self.structure.nv]
 
     def evaluate(self) -> None:
-        """Have kinematics, rows, forces and what is measured at the state of the instant in the scratch."""
+        """Evaluate kinematics, rows, forces and measured quantities at the state of the instant."""
         evaluate_state(*self.c.buffers, self.t, self.y.copy(), MOTION)
 
     def names(self) -> dict[str, float]:
-        """Values of all that expressions of events may name, at the state last evaluated."""
+        """Return the values of all names in event expressions, at the state last evaluated."""
         c, sensed = self.c, self.c.work.sensed
         return {"t": self.t, **c.values.env, **{k: float(sensed[VALUE, m]) for k, m in self.structure.slots.items()}}
 
@@ -176,43 +177,45 @@ PRINTED_ZERO = 1e-12  # m or rad: printed as 0
 
 
 def switch_units(s: Structure) -> list[str]:
-    """Of every switch the unit of its quantity: m or rad."""
+    """Return the unit of every switch's quantity: m or rad."""
     rows = len(s.rows)
     measures = {t.row - rows: t.formula.measure for t in s.terms if t.measured}
     return ["m" if measures.get(x.measured) == "m" else "rad" for x in s.switches]
 
 
 def switch_scales(s: Structure, length: float) -> np.ndarray:
-    """Of every switch what its quantity is compared with: the mechanism's length, or a radian, (ns,)."""
+    """Return the reference length of every switch's quantity: the mechanism's length, or a radian, (ns,)."""
     return np.array([length if unit == "m" else 1.0 for unit in switch_units(s)])
 
 
 def bounded_quantity(spec: SwitchSpec) -> str:
-    """Name of the quantity of a switch, for messages."""
+    """Return the name of a switch's quantity, for messages."""
     if spec.switch.path:
         return "its gap" if isinstance(spec.element, Touch) else "its length"
     return repr(spec.switch.along[0]) if len(spec.switch.along) == 1 else f"the play of {', '.join(spec.switch.along)}"
 
 
 def value_in_words(x: float, unit: str) -> str:
-    """A value with its unit; an angle in degrees too."""
+    """Return a value with its unit; an angle in degrees too."""
     if abs(x) < PRINTED_ZERO:
         return f"0 {unit}"
     return f"{x:.6g} m" if unit == "m" else f"{x:.6g} rad ({math.degrees(x):.4g} deg)"
 
 
 def violated_rule(spec: SwitchSpec, x: float, bounds: tuple[float, float], unit: str) -> str:
-    """What a quantity is, and what it must be."""
+    """Describe a quantity and the bound that it violates."""
     lower, upper = bounds
     must = f"at least {value_in_words(lower, unit)}" if x < lower else f"at most {value_in_words(upper, unit)}"
     return f"{bounded_quantity(spec)} is {value_in_words(x, unit)} and must be {must}"
 
 
 def violated_bounds(here: EventContext, near: np.ndarray) -> dict[int, float]:
-    """Switches that are beyond their bounds by more than ``near``, or off the tooth that holds them, and how far.
+    """Return the switches beyond their bounds, or off the tooth that holds them, by more than ``near``, and the
+    distance.
 
-    A stop that holds and is not at its bound any more, on its free side, lets go. Quantities of the state are in the
-    scratch.
+    A closed stop whose quantity is no longer at its bound but on its free side is opened. Quantities at the state are
+    in
+    the workspace.
     """
     S, W, out = here.c.system, here.c.work, dict[int, float]()
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] :]
@@ -236,12 +239,12 @@ def violated_bounds(here: EventContext, near: np.ndarray) -> dict[int, float]:
     return out
 
 
-CLOSED_TOLERANCE = 1e-6  # of the mechanism's length, or a radian: a joint that is let go holds again where it is closed
-RELEASED = 1.0  # in `Modes.released`: an element that was released; whatever it does, it does not
+CLOSED_TOLERANCE = 1e-6  # largest gap of a released joint that can be locked, relative to the mechanism's length
+RELEASED = 1.0  # in `Modes.released`: the element was released and is inactive
 
 
 def lock(here: EventContext, e: Event, a: Lock) -> str:
-    """Hold coordinates where they are, a joint where it is closed, or have a limit or rope in force again.
+    """Lock coordinates at their values, lock a closed joint, or reactivate a limit or rope.
 
     Raises
     ------
@@ -270,7 +273,7 @@ def lock(here: EventContext, e: Event, a: Lock) -> str:
 
 
 def release(here: EventContext, e: Event, a: Release) -> str:
-    """Let coordinates, a joint, a limit or a rope go."""
+    """Release coordinates, a joint, a limit or a rope."""
     W = here.c.work
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.modes.mode.shape[0] :]
     held, kinds = lock_target(here.structure.model, e, a), here.c.system.switches.kind
@@ -287,7 +290,7 @@ def release(here: EventContext, e: Event, a: Release) -> str:
 
 
 def elastic_energy(here: EventContext, k: int) -> float:
-    """Energy [J] in an elastic switch at the state last evaluated; it goes when that is released."""
+    """Return the energy [J] of an elastic switch at the state last evaluated; releasing it removes that energy."""
     S, W = here.c.system, here.c.work
     if S.switches.kind[k] != ELASTIC:
         return 0.0
@@ -297,7 +300,7 @@ def elastic_energy(here: EventContext, k: int) -> float:
 
 
 def switch_numbers_of(here: EventContext, coordinates: tuple[str, ...], joint: str, element: str) -> list[int]:
-    """Numbers of the rows that hold these coordinates, or are those of a joint or element."""
+    """Return the switches that lock these coordinates, or belong to a joint or element."""
     kinds = here.c.system.switches.kind
     out = []
     for k, spec in enumerate(here.structure.switches):
@@ -310,7 +313,7 @@ def switch_numbers_of(here: EventContext, coordinates: tuple[str, ...], joint: s
 
 
 def restore_locks(here: EventContext, before: Result) -> None:
-    """Lock and release as an earlier motion ended."""
+    """Restore locks and releases as at the end of an earlier motion."""
     phases = getattr(before, "phases", None)
     if phases is None or not phases.all:
         return

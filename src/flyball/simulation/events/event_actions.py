@@ -1,4 +1,4 @@
-"""Actions of the model's events: set, lock, release, impulse, note, stop; data carried over to the next run."""
+"""Actions of the model's events (set, lock, release, impulse, note, stop), and data carried over to the next run."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ from .impacts import BounceSeries
 
 
 def continuation_data(here: EventContext) -> dict[str, Any]:
-    """How often events happened, what they were as they last did, bounces and swings of late; plain data, by names."""
+    """Return the data of events for the next run as plain data by names: counts, last values, recent bounces and
+    passages.
+    """
     names = _switch_names(here) if here.bounces or here.corner_passages else []
     bounces = [[*names[s], b.count, b.last, b.before] for s, b in here.bounces.items()]
     swings = [[*names[s], *past] for s, past in here.corner_passages.items()]
@@ -51,7 +53,7 @@ def continuation_data(here: EventContext) -> dict[str, Any]:
 
 
 def restore_continuation_data(here: EventContext, before: Mapping[str, Any]) -> None:
-    """Go on with it. What the mechanism does not have any more is left out."""
+    """Restore the event data of an earlier run; names that the mechanism no longer has are left out."""
     names = {e.name for e in here.structure.model.events}
     known = {name: s for s, name in enumerate(_switch_names(here))}
     here.counts = {k: int(n) for k, n in before.get("counts", {}).items() if k in names}
@@ -67,7 +69,7 @@ def restore_continuation_data(here: EventContext, before: Mapping[str, Any]) -> 
 
 
 def _switch_names(here: EventContext) -> list[tuple[str, str, int]]:
-    """What switches are called, in files too: element, label, which of these."""
+    """Return the names of switches, used in files too: element, label, number among equal ones."""
     seen: Counter[tuple[str, str]] = Counter()
     out = []
     for spec in here.structure.switches:
@@ -77,24 +79,24 @@ def _switch_names(here: EventContext) -> list[tuple[str, str, int]]:
     return out
 
 
-PLACE_TOLERANCE = 1e-9  # of the mechanism's length, or of a radian: what may be elsewhere by rounding
+PLACE_TOLERANCE = 1e-9  # displacement that counts as rounding, relative to the mechanism's length or a radian
 
 
 def set_parameters(here: EventContext, new: Mapping[str, float], who: str) -> None:
-    """Go on with other values of parameters.
+    """Change parameter values during the motion.
 
     Parameters
     ----------
-    here : Here
+    here : EventContext
     new : mapping
         Parameter -> value in SI units.
     who : str
-        What asks for it, for messages.
+        The actions that set them, for messages.
 
     Raises
     ------
     SimulationError
-        If a number makes no sense with them, or something would be elsewhere in no time.
+        If a value is invalid, or something would move instantaneously.
     """
     c = here.c
     told = {**c.parameters, **new}
@@ -122,14 +124,14 @@ def set_parameters(here: EventContext, new: Mapping[str, float], who: str) -> No
 
 
 def _use_values(here: EventContext, x: Values, parameters: Mapping[str, float]) -> None:
-    """Go on by these numbers."""
+    """Use these values from now on."""
     c = here.c
     c.values, c.system, c.parameters = x, x.system, dict(parameters)
     store_ground_frames(c.system, c.work)
 
 
 def _move_bounds(here: EventContext, old: Values) -> None:
-    """Bounds of stops, and teeth, as the numbers now say."""
+    """Set the bounds of stops, and the teeth, to their new values."""
     S, W = here.c.system, here.c.work
     now, then = S.switch_numbers, old.system.switch_numbers
     moved = (now.lower != then.lower) | (now.upper != then.upper)
@@ -139,7 +141,7 @@ def _move_bounds(here: EventContext, old: Values) -> None:
 
 
 def _refuse_moved_contacts(here: EventContext, new: Values, who: str) -> None:
-    """Refuse that shapes that may touch are others: their places are laid out when a motion begins."""
+    """Refuse changes of contact shapes: contact points are set up when a motion starts."""
     model, had = here.structure.model, [e for e in here.structure.model.forces if isinstance(e, Touch)]
     if not had:
         return
@@ -164,13 +166,13 @@ def _refuse_moved_contacts(here: EventContext, new: Values, who: str) -> None:
 
 
 def _contact_distance(a: Touch, b: Touch) -> float:
-    """How far the numbers of two places are apart."""
+    """Return the largest difference between the numbers of two contact points."""
     pairs = [(a.gap, b.gap), *zip(a.slips, b.slips, strict=False), *zip(a.frames, b.frames, strict=True)]
     return max((abs(x - y) for one, other in pairs for x, y in zip(one, other, strict=True)), default=0.0)
 
 
 def _refuse_violated_bounds(here: EventContext, who: str) -> None:
-    """Refuse that a stop, a rope or a tooth is where its quantity may not be."""
+    """Refuse values with which a stop, a rope or a tooth would be violated."""
     s, W = here.structure, here.c.work
     past = violated_bounds(here, PLACE_TOLERANCE * switch_scales(s, here.c.values.length))
     if past:
@@ -195,7 +197,9 @@ def _changed_parameters(old: Mapping[str, float], new: Mapping[str, float]) -> s
 
 
 class BodyPlaces(NamedTuple):
-    """Where every body's reference frame is at the state of the motion and how it moves; what rows and drivers say."""
+    """Poses and velocities of every body's reference frame at the present state; values and rates of rows and
+    drivers.
+    """
 
     at: dict[str, np.ndarray]
     moving: dict[str, np.ndarray]
@@ -204,7 +208,7 @@ class BodyPlaces(NamedTuple):
 
 
 def _body_places(here: EventContext, x: Values) -> BodyPlaces:
-    """At the state of the motion, by these numbers."""
+    """Evaluate the body poses at the present state with these values."""
     c, s = here.c, here.structure
     here.evaluate()
     K, out, moving = c.work.BK, {}, {}
@@ -217,7 +221,7 @@ def _body_places(here: EventContext, x: Values) -> BodyPlaces:
 
 
 def _refuse_moved_bodies(here: EventContext, who: str, before: BodyPlaces, after: BodyPlaces) -> None:
-    """Refuse that a body, or what a row holds, is elsewhere all at once, or that drivers ask for other speeds."""
+    """Refuse an instantaneous displacement of a body or row, or a jump of prescribed velocities."""
     size = here.c.values.length
     titles = [f"{r.element.title} ({r.label})" for r in here.structure.rows]
     fast = {f"body {k!r}": np.abs(p - before.moving[k]).max() for k, p in after.moving.items()}
@@ -241,25 +245,25 @@ def _refuse_moved_bodies(here: EventContext, who: str, before: BodyPlaces, after
         )
 
 
-SIMULTANEOUS_ULPS = 64  # units of the last place of a time: the gap that a jump of laws leaves, and more
-SIMULTANEOUS_SHARE = 1e-11  # part of a motion within which events happen at once
-MOST_EXPRESSIONS = 1000  # expressions of events that are kept as they were read
-CLEAR_PASSAGE = 1e-9  # of what an expression was at most: beyond it, it has passed zero by a jump
+SIMULTANEOUS_ULPS = 64  # units in the last place of a time within which events are simultaneous
+SIMULTANEOUS_SHARE = 1e-11  # part of a motion's duration within which events are simultaneous
+MOST_EXPRESSIONS = 1000  # parsed event expressions in the cache
+CLEAR_PASSAGE = 1e-9  # part of an expression's largest value beyond which it has crossed zero by a jump
 
 
 @dataclass
 class EventActions:
-    """What events do at one instant.
+    """The actions of events at one instant.
 
     Attributes
     ----------
-    here : Here
+    here : EventContext
     events : tuple of Event
-        Those that happen.
+        The events that happen.
     words : dict
         Event -> what was done.
     values : dict
-        Guard -> value of its event's expression before anything was done.
+        Guard -> value of its event's expression before any action.
     """
 
     here: EventContext
@@ -271,9 +275,10 @@ class EventActions:
     tables: Values | None = None  # before
 
     def told(self, labels: Sequence[str] = ()) -> None:
-        """Record the events, each with what was done; what only it did (locking, a blow) is told with it.
+        """Record the events with what was done; jumps that only the events caused (locks, impulses) are included in the
+        record.
 
-        ``labels``: names under which jumps that events ask for are recorded.
+        ``labels``: names under which jumps caused by events are recorded.
         """
         here = self.here
         if not self.events:
@@ -298,12 +303,12 @@ class EventActions:
         here.records += [h for h in since if not any(h is x for x in mine)]
 
     def passed(self) -> np.ndarray:
-        """Guards of events whose expressions went through zero by the jump itself, (n,)."""
+        """Return the guards of events whose expressions crossed zero by the jump itself, (n,)."""
         return passed_by_jump(self.here, self.values)
 
 
 def _guards_of_forces(here: EventContext) -> frozenset[int]:
-    """Guards of events that name forces: whatever happens, these may jump past zero."""
+    """Return the guards of events that name forces: these may jump across zero at any event."""
     s = here.structure
     found: frozenset[int] = s.kept.get("events of forces", 0, 1, lambda: _find_guards_of_forces(s))
     return found
@@ -316,21 +321,22 @@ def _find_guards_of_forces(s: Structure) -> frozenset[int]:
 
 
 def _lockable_names(here: EventContext) -> set[str]:
-    """Names of all that events lock and let go."""
+    """Return the names of all that events lock and release."""
     every = here.structure.switches
     return {x.switch.label for x in every if isinstance(x.element, Event)} | {x.element.name for x in every if x.held}
 
 
 def perform_actions(here: EventContext, fired: Sequence[int]) -> EventActions:
-    """Do what the events of these guards say: parameters, what is released and locked, blows, an end.
+    """Perform the actions of the triggered events: parameters, releases and locks, impulses, end of the motion.
 
-    Velocities do not change here: `EventContext.external_impulse` says what struck, the modes what is held.
+    Velocities do not change here. `EventContext.external_impulse` holds the applied impulse, and the modes hold what is
+    locked.
 
     Parameters
     ----------
-    here : Here
+    here : EventContext
     fired : sequence of int
-        Rows of `System.guard_i`, those of events among them.
+        Triggered guards: rows of `System.guards`, those of events among them.
 
     Raises
     ------
@@ -343,9 +349,9 @@ def perform_actions(here: EventContext, fired: Sequence[int]) -> EventActions:
 
 
 def perform_initial_actions(here: EventContext) -> EventActions:
-    """Do what events say at the start; joints that may let go hold.
+    """Perform the actions of events at the start; lock joints that may be released.
 
-    Where a motion goes on nothing starts: what was locked or released stays so.
+    A continued motion performs none; what was locked or released stays so.
     """
     for k, spec in enumerate(here.structure.switches):
         if spec.held:
@@ -354,12 +360,12 @@ def perform_initial_actions(here: EventContext) -> EventActions:
         restore_locks(here, here.start.before)
         restore_continuation_data(here, here.start.before.carried)
         return EventActions(here, (), before=here.y.copy(), tables=here.c.values)
-    # what parts carry is known only once it is decided what holds: nothing has jumped from what it is before that
+    # loads are known only after the modes are decided: their earlier values are no reference for a jump
     return _perform(here, tuple(e for e in here.structure.model.events if e.at_start), _guards_of_forces(here))
 
 
 def _perform(here: EventContext, events: tuple[Event, ...], unknown: frozenset[int] = frozenset()) -> EventActions:
-    """``unknown``: guards of events whose expressions say nothing yet."""
+    """Perform the actions of events; ``unknown``: guards whose expressions are not known yet."""
     acts = EventActions(here, events, before=here.y.copy(), first=len(here.records), tables=here.c.values)
     for e in events:
         here.counts[e.name] = here.counts.get(e.name, 0) + 1
@@ -381,7 +387,7 @@ def _perform(here: EventContext, events: tuple[Event, ...], unknown: frozenset[i
 
 
 def event_expression(here: EventContext, g: int) -> float:
-    """Value of the expression of an event, by its guard, at the state last evaluated."""
+    """Return the value of an event's expression, by its guard, at the state last evaluated."""
     model, e = here.structure.model, here.structure.events[g]
     law = here.structure.kept.get(
         "law of event", g, MOST_EXPRESSIONS, lambda: model.law(e.law, e.of, f"when of {e.title}")
@@ -390,16 +396,17 @@ def event_expression(here: EventContext, g: int) -> float:
 
 
 def event_expressions(here: EventContext) -> dict[int, float]:
-    """Values of the expressions of all events, by their guards, at the state of the instant."""
+    """Return the values of all event expressions, by guard, at the state of the instant."""
     if here.structure.events:
         here.evaluate()
     return {g: event_expression(here, g) for g in here.structure.events}
 
 
 def initially_true(here: EventContext) -> list[str]:
-    """Names of events whose comparisons are true now: they become true only after they were false.
+    """Return the names of events whose comparisons are true now: they trigger only after they were false.
 
-    Where a motion goes on, those of its begin: what is true now may have become true in what went before.
+    For a continued motion the list of its original start is kept: a comparison that is true now may have become true in
+    the earlier motion.
     """
     if here.start.before is not None:
         return here.true
@@ -412,7 +419,7 @@ def initially_true(here: EventContext) -> list[str]:
 
 
 def events_at_start(here: EventContext) -> set[str]:
-    """Names of events that happened at the very end of the motion that this one goes on from."""
+    """Return the names of events that happened at the very end of the motion that this one continues."""
     before = here.start.before
     if before is None or not len(before.t):
         return set()
@@ -424,7 +431,7 @@ def events_at_start(here: EventContext) -> set[str]:
 
 
 def report_missed_events(here: EventContext) -> None:
-    """Say which events, true as the motion began, did not happen in it."""
+    """Add remarks on events that were true at the start and never triggered."""
     for e in here.structure.model.events:
         if e.name in here.true and not here.counts.get(e.name):
             here.doubts.append(
@@ -433,9 +440,10 @@ def report_missed_events(here: EventContext) -> None:
 
 
 def passed_by_jump(here: EventContext, before: Mapping[int, float]) -> np.ndarray:
-    """Guards of events whose expressions went through zero without being followed there, (n,).
+    """Return the guards of events whose expressions crossed zero by a jump, (n,).
 
-    What was zero to rounding, as of what has just fired, has not: velocities that are solved for anew differ by that.
+    An expression that was zero to rounding, such as that of an event just triggered, does not count, since recomputed
+    velocities differ by rounding.
     """
     out = []
     if before:
@@ -450,14 +458,14 @@ def passed_by_jump(here: EventContext, before: Mapping[int, float]) -> np.ndarra
 
 
 def passed_at_jump_time(here: EventContext, before: Mapping[int, float]) -> list[int]:
-    """Guards of events whose expressions passed zero at a time at which laws jump; not of what has just happened."""
+    """Return the guards of events that crossed zero at a time at which laws jump, except events just triggered."""
     since = here.t - SIMULTANEOUS_ULPS * float(np.spacing(abs(here.t)))
     told = {h.name for h in takewhile(lambda h: h.t >= since, reversed(here.records))}
     return [int(g) for g in passed_by_jump(here, before) if here.structure.events[int(g)].name not in told]
 
 
 def _evaluated_argument(here: EventContext, e: Event, a: Action, what: str, law: Any) -> float:
-    """Value of an expression of an action at the instant, as everything is before it."""
+    """Return the value of an action's expression at the instant, before any action."""
     model = here.structure.model
     of = LawOf(_unit_of_argument(here, e, a, what), curves=True)
     tables = {x.name: x for x in model.tables}
@@ -470,7 +478,7 @@ def _evaluated_argument(here: EventContext, e: Event, a: Action, what: str, law:
 
 
 def _unit_of_argument(here: EventContext, e: Event, a: Action, what: str) -> str | None:
-    """Unit of a number of an action, where there is one that it must have."""
+    """Return the unit of an action's argument; None if it is not prescribed."""
     if not isinstance(a, Impulse):
         return None
     model = here.structure.model
@@ -480,7 +488,7 @@ def _unit_of_argument(here: EventContext, e: Event, a: Action, what: str) -> str
 
 
 def refuse_contradictions(here: EventContext, every: Sequence[tuple[Event, Action]]) -> None:
-    """Refuse that events of one instant lock and release the same, or set a parameter twice."""
+    """Refuse events of one instant that lock and release the same element, or set a parameter twice."""
     if here.settled_at != here.t:
         here.settled_at, here.settled_keys = here.t, {}
     for e, a in every:
@@ -495,7 +503,7 @@ def refuse_contradictions(here: EventContext, every: Sequence[tuple[Event, Actio
 
 
 def settled_by(here: EventContext, e: Event, a: Action) -> tuple[str, ...]:
-    """What an action settles, for this instant."""
+    """Return the keys of what an action settles at this instant."""
     if isinstance(a, (Lock, Release)):
         return lock_target(here.structure.model, e, a).keys()
     return (f"parameter {a.parameter}",) if isinstance(a, Set) else ()
@@ -565,10 +573,10 @@ ACTION_FUNCTIONS: Mapping[type[Action], Callable[[EventContext, EventActionList]
     Note: _do_note,
     Stop: _do_stop,
 }
-"""How each kind of action is done, in this order: another kind needs a function here."""
+"""The function of each kind of action, in the order of execution; a new kind needs a function here."""
 
 
-# Blows as generalised impulses: what an impulse at a point of a body, or along a coordinate, does to each velocity.
+# Applied impulses (at a point of a body, or along a coordinate) as generalised impulses.
 
 
 Vector3 = np.ndarray
@@ -577,14 +585,14 @@ Vector3 = np.ndarray
 def generalised_impulse(
     here: EventContext, e: Event, a: Impulse, force: Sequence[float], torque: Sequence[float]
 ) -> tuple[np.ndarray, AppliedImpulse]:
-    """Its power at each unit velocity, (nv,), and what it is made of; kinematics of the state are in the scratch.
+    """Return the generalised impulse, (nv,), and its record; kinematics of the state are in the workspace.
 
     Parameters
     ----------
-    here : Here
+    here : EventContext
     e, a : Event, Impulse
     force, torque : sequence of float
-        Its components [N s], [N m s], as many as were written: none is no force; one number along a coordinate.
+        Its components [N s], [N m s], as many as were given: empty for no force, one number along a coordinate.
     """
     model = here.structure.model
     if not isinstance(model.find(a.on), (Body, Frame)):
@@ -607,7 +615,7 @@ def generalised_impulse(
 
 
 def _coordinate_gradient(here: EventContext, text: str) -> np.ndarray:
-    """Gradient of a measured coordinate, (nv,)."""
+    """Return the gradient of a measured coordinate, (nv,)."""
     s, S = here.structure, here.c.system
     out = np.zeros(s.nv)
     row = len(S.rows.law) + s.measured[text]
@@ -617,7 +625,7 @@ def _coordinate_gradient(here: EventContext, text: str) -> np.ndarray:
 
 
 def _point_of_impulse(here: EventContext, a: Impulse) -> tuple[int, Vector3, np.ndarray]:
-    """Row of the body, where it is struck, and the axes of the part that is named, in world axes now."""
+    """Return the row of the body, the point of the impulse and the axes of the named body or frame, in world axes."""
     x, model = here.c.values, here.structure.model
     part = model[a.on]
     name = part.body if isinstance(part, Frame) else a.on
@@ -637,7 +645,7 @@ def _point_of_impulse(here: EventContext, a: Impulse) -> tuple[int, Vector3, np.
 def _impulse_along_velocities(
     here: EventContext, b: int, point: Vector3, force: Vector3, torque: Vector3
 ) -> np.ndarray:
-    """What a wrench on body b, force at ``point``, does along the velocities of it and of all that carry it."""
+    """Return the generalised force of a wrench on body b, with the force at ``point``."""
     S, W = here.c.system, here.c.work
     out = np.zeros(here.structure.nv)
     while b >= 0:

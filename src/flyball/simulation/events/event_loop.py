@@ -1,7 +1,7 @@
-"""The event loop: integrate to the next event, have it resolved, go on; accumulation of events, recorded phases.
+"""The event loop: integrates to the next event, resolves it and continues; records phases, detects accumulating events.
 
-Where nothing is watched, steps end only on times known beforehand and the engine's own loop runs between them.
-Events that accumulate (t = T - c n^-a) are told from frequent ones by the times of the 1st, 2nd, 4th, 8th, ...
+Without guards, steps end only at times known beforehand and the engine's own loop runs between them. Events that
+accumulate (t = T - c n^-a) are distinguished from frequent ones by the times of the 1st, 2nd, 4th, 8th, ...
 occurrence.
 """
 
@@ -80,16 +80,16 @@ from .instant_problem import instant_problem
 from .mode_selection import write_rounding_levels
 from .resolution import resolve_event, resolve_start
 
-LEAST_OCCURRENCES = 8192  # times that one has happened, at least
-RATIO_COUNT = 4  # of these that are the same
-STEADY_RATIO = 1.25  # largest of them by the least
-RATIO_LIMIT = 0.95  # a ratio of a series with an end
-MOST_EMPTY_EVENTS = 500  # events in a row of which nothing comes
-EMPTY_SPAN_SHARE = 1e-3  # of the time span, within which they are without end
+LEAST_OCCURRENCES = 8192  # least number of occurrences of an accumulating event
+RATIO_COUNT = 4  # number of ratios of intervals that must agree
+STEADY_RATIO = 1.25  # largest quotient of the largest and the smallest ratio
+RATIO_LIMIT = 0.95  # largest ratio of a converging series
+MOST_EMPTY_EVENTS = 500  # events in a row without effect from which on they are endless
+EMPTY_SPAN_SHARE = 1e-3  # part of the time span within which they are endless
 
 
 class OccurrenceTimes:
-    """When each guard had fired 1, 2, 4, 8, ... times."""
+    """Times at which each guard had triggered 1, 2, 4, 8, ... times."""
 
     def __init__(self) -> None:
         self.times: dict[int, tuple[int, list[float]]] = {}
@@ -98,7 +98,7 @@ class OccurrenceTimes:
         self._before: tuple[np.ndarray, int] | None = None
 
     def add(self, fired: Iterable[int], t: float) -> None:
-        """Count guards that fire at t [s]."""
+        """Count guards that trigger at t [s]."""
         for g in fired:
             n, past = self.times.get(g, (0, []))
             n += 1
@@ -107,9 +107,10 @@ class OccurrenceTimes:
             self.times[g] = n, past
 
     def nothing(self, here: EventContext) -> tuple[int, float] | None:
-        """How many events nothing came of, one after the other, and within which time [s], where these have no end.
+        """Return the number of successive events without effect and their time span [s], if they are endless; else
+        None.
 
-        No mode, no way, nothing to tell.
+        An event without effect changes no mode, no switch state and adds no record.
         """
         W = here.c.work
         first = W.sensed.shape[1] - W.modes.mode.shape[0]
@@ -124,7 +125,9 @@ class OccurrenceTimes:
         return (self.empty, within) if endless else None
 
     def accumulate(self, fired: Iterable[int], until: float) -> tuple[int, int, float] | None:
-        """One of these that never gets to ``until`` [s]: its guard, how often it has fired, where it accumulates."""
+        """Return a guard that accumulates before ``until`` [s]: the guard, its count, and the accumulation time; or
+        None.
+        """
         for g in fired:
             n, past = self.times[g]
             if n >= LEAST_OCCURRENCES and n & (n - 1) == 0:
@@ -135,7 +138,7 @@ class OccurrenceTimes:
 
 
 def accumulation_point(past: list[float]) -> float:
-    """The limit of times whose distances shrink by a steady ratio, infinite where they do not."""
+    """Return the limit of times whose intervals shrink by a steady ratio; infinite if they do not."""
     between = [b - a for a, b in pairwise(past[-RATIO_COUNT - 2 :])]
     if len(between) <= RATIO_COUNT or min(between) <= 0.0:
         return math.inf
@@ -145,16 +148,16 @@ def accumulation_point(past: list[float]) -> float:
     return past[-1] + between[-1] * ratios[-1] / (1.0 - ratios[-1])
 
 
-CHECKS_PER_STEP = NODES - 1 + CHECK_NODES  # of a step at which guards are looked at, at least
-GAP_GUARDS = (G_LOWER, G_UPPER)  # guards of what is open
+CHECKS_PER_STEP = NODES - 1 + CHECK_NODES  # least number of points of a step at which guards are evaluated
+GAP_GUARDS = (G_LOWER, G_UPPER)  # guards of open stops and contacts
 
 
 def guard_check_remark(loop: GuardedLoop) -> str:
-    """How closely a motion was looked for events: what may have come and gone in between was not seen."""
+    """Return the health remark on the number of points at which guards were evaluated."""
     count = loop.desk.count
     guards, steps = len(loop.desk.way), max(int(count.steps), 1)
     what = "1 guard" if guards == 1 else f"{guards} guards"
-    most = max(count.looks / steps + 1, CHECKS_PER_STEP)  # its end, where they are known, stands for one place more
+    most = max(count.looks / steps + 1, CHECKS_PER_STEP)  # plus the end of the step
     return (
         f"{what} at {most:.0f} places a step on average, {CHECKS_PER_STEP} at least: what passes zero and comes "
         f"back between two of them is not seen"
@@ -162,19 +165,19 @@ def guard_check_remark(loop: GuardedLoop) -> str:
 
 
 def note_fired_zeros(here: EventContext, loop: GuardedLoop) -> None:
-    """Keep what is zero of events' expressions where a step ended on events, and what they were of those that fired."""
+    """Store the rounding of event expressions where a step ended on events, and the values of those that triggered."""
     events, desk = here.structure.events, loop.desk
     here.nothing = {g: float(desk.g[ZERO_BANDS, g]) for g in events}
     here.zero |= {events[g].name: float(desk.g[TRIGGER_VALUES, g]) for g in loop.fired if g in events}
 
 
 def note_rounding_zeros(here: EventContext, loop: GuardedLoop) -> None:
-    """Keep what is rounding of events' expressions where a step ended on a time at which forces jump."""
+    """Store the rounding of event expressions where a step ended at a time at which forces jump."""
     here.nothing = {g: float(loop.desk.real.drift * loop.desk.g[END_ROUNDING, g]) for g in here.structure.events}
 
 
 def save_final_signs(here: EventContext, loop: GuardedLoop) -> None:
-    """Keep the sides that events' expressions were on that are zero to rounding where the motion ends."""
+    """Store the last signs of event expressions that are zero to rounding at the end of the motion."""
     desk, here.sides = loop.desk, {}
     for g, e in here.structure.events.items():
         near = abs(desk.g[END_VALUES, g]) <= desk.real.drift * desk.g[END_ROUNDING, g]
@@ -183,10 +186,11 @@ def save_final_signs(here: EventContext, loop: GuardedLoop) -> None:
 
 
 def restore_signs(here: EventContext, loop: GuardedLoop) -> None:
-    """Sides of events where a motion goes on: what happened at the very end of the one before has just happened.
+    """Restore the signs of event expressions where a motion continues.
 
-    What did not is ahead, however near: on the side that it was on before it was rounding. What has been taken off
-    zero since is where it is, as within a motion.
+    An event at the very end of the earlier motion has just happened. Any other is still ahead, however near: it keeps
+    the
+    sign that it had before its value was rounding. A value that is clearly nonzero now gives the sign itself.
     """
     desk, told = loop.desk, events_at_start(here)
     values = instant_problem(here).guards()
@@ -195,16 +199,18 @@ def restore_signs(here: EventContext, loop: GuardedLoop) -> None:
         desk.g[END_VALUES, g], desk.g[TRIGGER_VALUES, g] = values[g], here.zero.get(e.name, 0.0)
 
 
-# Switches whose guards were found beyond zero, where a step's end was looked at and no passing had been seen.
+# Switches whose guards are beyond zero at the end of a step though no crossing was detected.
 
 
-SLOW_SHARE = 0.5  # of its rate at a stop, at the begin of the step: it began to move in between
+SLOW_SHARE = 0.5  # largest ratio of the rate at the start of the step to that at the stop for a missed crossing
 
 
 def missed_crossings(here: EventContext, loop: GuardedLoop) -> frozenset[int]:
-    """Switches that went where they should not be, unseen: stops crept past, corners on the other side.
+    """Return switches whose crossing was not detected: stops crept past, corners on the other side.
 
-    At the step's begin such a stop hardly moved; what did hits it. On which side a law is then, what decides says.
+    Such a stop hardly moved at the start of the step; one that moved closes with an impact. The side of a law is
+    decided
+    in `nonsmooth_laws`.
     """
     S, out = here.c.system, set()
     for g in loop.fired if loop.desk.count.leaves_kept_side else ():
@@ -220,12 +226,12 @@ def missed_crossings(here: EventContext, loop: GuardedLoop) -> frozenset[int]:
 
 @dataclass
 class PhaseRecorder:
-    """Rows of output between events, with the modes and parameters that held there."""
+    """Output rows between events, with the modes and parameters that were active."""
 
     all: list[Phase] = field(default_factory=list)
 
     def add(self, here: EventContext, rows: np.ndarray) -> None:
-        """Take note of rows that the compiled loop has just written, none of them too; modes are those of now."""
+        """Record rows that the compiled loop has just written (possibly none), with the present modes."""
         c, W = here.c, here.c.work
         n = len(here.structure.switches)
         ways = W.sensed[VALUE, W.sensed.shape[1] - n :].copy()
@@ -246,7 +252,7 @@ class PhaseRecorder:
         )
 
     def told(self, result: Result) -> None:
-        """Give a result what held, and what events did to its energy, if anything can switch."""
+        """Add the phases, and the energy exchanged by events, to a result, if anything can switch."""
         s = result.values.structure
         if not s.switches and not s.guards and not s.model.events:
             return
@@ -255,7 +261,7 @@ class PhaseRecorder:
 
 
 def _clear_held_rates(here: EventContext, rows: np.ndarray) -> None:
-    """Take the rounding from the rates of coordinates that are held by a row alone, at rows of output."""
+    """Set the rates of coordinates held by a single row to exactly zero at output rows."""
     S, W, s = here.c.system, here.c.work, here.structure
     first, ny = 1 + s.nq, 1 + len(here.y)
     for k in np.flatnonzero(W.modes.mode == HELD).tolist():
@@ -266,7 +272,7 @@ def _clear_held_rates(here: EventContext, rows: np.ndarray) -> None:
 
 
 def _switch_states(here: EventContext, rows: np.ndarray) -> np.ndarray:
-    """The ways of all switches at rows of output, (ns, n), where laws follow their switching surface."""
+    """Return the states of all switches at output rows, (ns, n), where laws slide along their switching surface."""
     s, c, n = here.structure, here.c, len(here.structure.switches)
     out = np.zeros((n, len(rows)))
     again = c.again()
@@ -279,11 +285,13 @@ def _switch_states(here: EventContext, rows: np.ndarray) -> np.ndarray:
     return out
 
 
-# Forces of what shares them in many ways, as they are told: within all bounds.
+# Indeterminate forces as reported: a distribution within all bounds.
 
 
 def distribute_forces(here: EventContext, rows: np.ndarray) -> None:
-    """Put shares that friction can hold in place of those of least squares, at rows of output of a group."""
+    """Replace least-squares forces by a distribution within the friction bounds, at output rows of indeterminate
+    contacts.
+    """
     group = getattr(here, "sharing", None)
     if group is None or group.Q.count[UNKNOWN_COUNT] == 0 or not len(rows):
         return
@@ -306,28 +314,28 @@ def distribute_forces(here: EventContext, rows: np.ndarray) -> None:
         row[lam] = W.rows.multiplier
 
 
-CALL_SECONDS = 0.05  # seconds that a call of the compiled loop should take
-ENDLESS = 2000  # events
-REPORTED_EVENTS = 20  # events of which it is told who they were
-CONTACT_TOLERANCE = 1e-10  # of the mechanism's length, or a radian: what is no farther from a stop is at it
-HELD_GUARDS = (G_PULL, G_HOLDS, G_CONE, G_SHARED, G_CORNER)  # guards of what holds, by the forces that it carries
-AT_ONCE = 1e-9  # part of the time span within which so many never end
+CALL_SECONDS = 0.05  # intended duration of one call of the compiled loop [s]
+ENDLESS = 2000  # number of events within `AT_ONCE` that counts as endless
+REPORTED_EVENTS = 20  # last events that the message names
+CONTACT_TOLERANCE = 1e-10  # distance at which a stop is reached, relative to the mechanism's length or a radian
+HELD_GUARDS = (G_PULL, G_HOLDS, G_CONE, G_SHARED, G_CORNER)  # guards of active rows, by the forces that they carry
+AT_ONCE = 1e-9  # part of the time span within which `ENDLESS` events are endless
 
 
 class EventDrivenMotion:
-    """One motion from event to event.
+    """A motion integrated from event to event.
 
     Parameters
     ----------
-    here : Here
+    here : EventContext
     o : Integration
-        Which integrator, and its choices.
+        The integrator and its options.
     width : int
-        Of a row of output.
-    tell : callable
-        Is told how far it is.
-    engine : Engine
-        Which loops compute it where nothing is watched.
+        Width of an output row.
+    report : callable
+        Called with the completed fraction.
+    engine : CodeSelection
+        Which code runs where there are no guards.
     """
 
     def __init__(
@@ -339,7 +347,7 @@ class EventDrivenMotion:
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
-        self.end = float(clock.real.t_end)  # of the motion; the clock's own goes from leg to leg
+        self.end = float(clock.real.t_end)  # of the motion; that in the integrator state is the end of the present interval
         self.first, self.span = here.t, self.end - here.t or 1.0
         self.part, self.quota = here.start.part, int(clock.count.quota)
         self.segment_end_finder = SegmentEnd(self.part, clock)
@@ -357,17 +365,19 @@ class EventDrivenMotion:
 
     @property
     def stops(self) -> SampledControllers | None:
-        """What the loop stops for at instants: where nothing is watched it samples itself."""
+        """Sampled controllers for which the loop has to stop; without guards the loop samples them itself."""
         return self.sampling if self.guarded else None
 
     def _until(self, end: float) -> float:
-        """Until when the loop is to run: the next instant at which it stops to sample, or where a part ends."""
+        """Return the time up to which the loop should run: the next sampling instant, or the end of a segment."""
         return self.segment_end_finder.until(
             min(end, math.inf if self.stops is None else self.stops.next(self.here.clock.times))
         )
 
     def sampled(self) -> bool:
-        """Sample what is due now, where the loop stops for it; forces may jump. Whether anything was."""
+        """Sample the controllers that are due, where the loop stops for them. Returns whether any was; forces may
+        jump.
+        """
         here = self.here
         if self.stops is None or not self.stops.due(here.t):
             return False
@@ -381,7 +391,7 @@ class EventDrivenMotion:
         return True
 
     def _loop(self) -> GuardedLoop | SmoothLoop | None:
-        """By steps behind a door; nothing where the engine's own loop does."""
+        """Create the loop for an implicit method or guards; None where the engine's own loop is used."""
         here, c = self.here, self.here.c
         if self.now not in IMPLICIT_METHODS and not self.guarded:
             return None
@@ -394,14 +404,14 @@ class EventDrivenMotion:
         return GuardedLoop(*way, here.group) if self.guarded or self.sampling is not None else SmoothLoop(*way)
 
     def go(self, known: Breakpoints) -> tuple[np.ndarray, bool]:
-        """Go to the end, or as far as it goes: (rows of output, whether the user interrupted)."""
+        """Compute the motion as far as possible. Returns (output rows, whether the user interrupted)."""
         here, engine = self.here, self.engine
         clear_faults(here.c.array("stack"))
         try:
             self.begin()
             engine.begin(here.clock)
             self.intervals = SmoothIntervals(here.clock, known, self._until)
-            if here.start.before is not None and self.sampled():  # that was not sampled: events may happen by it
+            if here.start.before is not None and self.sampled():  # sampling was still due at the end of the earlier motion: it may cause events
                 here.clock.count.status = ex.RUNNING
                 self.turned()
             while not here.stopped:
@@ -430,7 +440,7 @@ class EventDrivenMotion:
         return np.concatenate(self.rows), False
 
     def turn(self, to: str, why: str) -> None:
-        """Go on by another method from here on."""
+        """Continue by another method."""
         clock, before = self.here.clock, self.loop
         self.pace.turned(clock, to, why)
         self.now = to
@@ -443,7 +453,7 @@ class EventDrivenMotion:
             clock.real.h = 0.0  # as at a start
 
     def turned(self) -> bool:
-        """Go on by another method where that pays, or where this one does not know what is; whether it does."""
+        """Change the method where that pays, or where the present one is not applicable. Returns whether it changed."""
         pace, c, clock = self.pace, self.here.c, self.here.clock
         implicit, corner = self.now in IMPLICIT_METHODS, slides_on_corner(c)
         if implicit and corner:
@@ -464,7 +474,7 @@ class EventDrivenMotion:
         return True
 
     def over(self) -> bool:
-        """Do what the compiled loop has returned for: whether the motion is over."""
+        """Handle the status with which the compiled loop returned. Returns whether the motion is over."""
         clock, engine = self.here.clock, self.engine
         status = clock.count.status
         if status == EVENT_FOUND:
@@ -483,7 +493,7 @@ class EventDrivenMotion:
         return False
 
     def arrived(self) -> bool:
-        """The loop ran as far as it was to: whether the motion is over."""
+        """Handle the end of an interval. Returns whether the motion is over."""
         clock, through = self.here.clock, self.intervals.through()
         if not through and self.segment_end_finder.here():
             clock.real.h = max(clock.real.h, clock.real.wide)  # the last step was cut short
@@ -506,7 +516,7 @@ class EventDrivenMotion:
         return False
 
     def begin(self) -> None:
-        """What happens as the motion begins."""
+        """Resolve the start of the motion."""
         here, on = self.here, self.here.start.before is not None
         if not on and self.stops is not None and self.stops.due(here.t):
             self.stops.sample(*here.c.buffers, here.clock)
@@ -543,13 +553,13 @@ class EventDrivenMotion:
             self.quota = self.engine.limited(clock, max(done, 1) * CALL_SECONDS / took)
 
     def take(self, rows: np.ndarray) -> None:
-        """Keep rows of output."""
+        """Store output rows."""
         self.rows.append(rows)
         if self.here.seen is not None:
             self.here.seen.add(self.here, rows)
 
     def event(self) -> None:
-        """Have it decided what happens, and begin anew."""
+        """Resolve the event at which the loop stopped, and restart the integration."""
         here = self.here
         fired = self.loop.fired if self.loop else ()
         self.recent.append(here.t)
@@ -567,7 +577,7 @@ class EventDrivenMotion:
         here.astray, here.nothing = frozenset(), {}
 
     def happens(self, fired: Sequence[int]) -> None:
-        """What happens where these guards fired."""
+        """Resolve the instant at which these guards triggered."""
         here, clock = self.here, self.here.clock
         system, before = here.c.system, here.v.copy()
         resolve_event(here, fired)
@@ -594,11 +604,11 @@ class EventDrivenMotion:
             self.jumped(was)
 
     def jumped(self, before: Mapping[int, float]) -> None:
-        """Forces may have jumped: what held may not hold any more, or what was at a stop be pressed on it.
+        """Resolve the instant after a possible jump of forces.
 
-        No guard has passed zero there.
-
-        ``before``: expressions of events on the other side of that time, across which nothing is followed.
+        Active rows may have to open, and stops at their bound may be pressed. No guard has crossed zero there.
+        ``before``:
+        values of event expressions before that time, across which they are not followed.
         """
         here = self.here
         if isinstance(self.loop, GuardedLoop):
@@ -612,7 +622,7 @@ class EventDrivenMotion:
         here.nothing = {}
 
     def stop(self) -> None:
-        """The motion, or a part of it, ends here: the last row is written, but where it is already."""
+        """End the motion or the segment here, and write the last row unless it is there already."""
         here, clock, part = self.here, self.here.clock, self.part
         part.open = part.paused and self.sampling is not None and self.sampling.due(here.t)
         if part.paused and len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
@@ -622,12 +632,12 @@ class EventDrivenMotion:
             clock.count.status = ex.DONE
 
     def row(self) -> np.ndarray:
-        """The row of output of here and now."""
+        """Return the output row at the present time."""
         here, c = self.here, self.here.c
         status = here.clock.count.status
         row, y = np.zeros((1, self.width)), here.y.copy()
         if run_task(*c.buffers, self.method, here.clock, row, REPORT) != 0:
-            row[0, 1 + len(y) :] = np.nan  # what was found last at another state stands there
+            row[0, 1 + len(y) :] = np.nan  # these entries are from the last evaluation, at another state
             here.doubts.append(missing_accelerations(c, row))
         here.y[:], here.clock.count.status = y, status
         return row[0]
@@ -640,17 +650,17 @@ def integrate_events(
 
     Parameters
     ----------
-    here : Here
-        Where the motion begins; gets what happens, and in ``failed`` why it could not go on.
+    here : EventContext
+        The start of the motion; receives the events, and in ``failed`` why it could not continue.
     o : Integration
-        Which integrator, and its choices.
+        The integrator and its options.
     width : int
-        Of a row of output.
+        Width of an output row.
     report : callable
-        Is told how far it is.
-    engine : Engine
-        Which loops compute it where nothing is watched.
-    known : Breaks
+        Called with the completed fraction.
+    engine : CodeSelection
+        Which code runs where there are no guards.
+    known : Breakpoints
         Times at which steps end.
     """
     return EventDrivenMotion(here, o, width, report, engine).go(known)

@@ -31,7 +31,7 @@ ROLE_WORDS = {
 
 
 def rows_in_words(n: InstantProblem, parts: list[ProblemRow]) -> str:
-    """Elements of rows, with the part that they take."""
+    """Name the elements of rows, with their roles."""
     seen = dict.fromkeys(
         (n.here.structure.switches[p.switch].element.title, ROLE_WORDS[n.kind[p.switch]]) for p in parts
     )
@@ -39,7 +39,7 @@ def rows_in_words(n: InstantProblem, parts: list[ProblemRow]) -> str:
 
 
 def guard_titles(n: InstantProblem, fired: Iterable[int]) -> list[str]:
-    """Whose guards these are: events, elements that hold, those whose laws have corners; each once."""
+    """Return the titles of guards: events, elements with active rows, elements whose laws have corners; each once."""
     out = []
     for g in fired:
         kind, s = int(n.S.guards.kind[g]), int(n.S.guards.of[g])
@@ -53,7 +53,7 @@ def guard_titles(n: InstantProblem, fired: Iterable[int]) -> list[str]:
 
 
 def switch_quantity(n: InstantProblem, s: int) -> str:
-    """What a switch acts along, as an expression of coordinates; the length of a rope."""
+    """Return the quantity of a switch as an expression of coordinates."""
     x = n.here.structure.switches[s]
     if not x.switch.along:
         return "its length"
@@ -65,7 +65,7 @@ def switch_quantity(n: InstantProblem, s: int) -> str:
 
 
 def start_beyond_bound(n: InstantProblem, s: int) -> ModelError:
-    """A motion that begins past a stop, or against a freewheel."""
+    """Return the error for a motion that starts past a stop, or against a freewheel."""
     x = n.here.structure.switches[s]
     e, model = x.element, n.here.structure.model
     metric = not x.switch.along or model.unit(x.switch.along[0], e) == "m"
@@ -90,7 +90,7 @@ def start_beyond_bound(n: InstantProblem, s: int) -> ModelError:
 
 
 def passed_bound(n: InstantProblem, s: int, past: float) -> UnresolvedInstant:
-    """What is open is past its bound: no motion of rigid bodies leads there."""
+    """Return the error for an open stop or contact past its bound, which no rigid-body motion reaches."""
     e = n.here.structure.switches[s].element
     what = f"{body_names(e)} are in each other" if isinstance(e, Touch) else f"{switch_quantity(n, s)} is beyond it"
     return UnresolvedInstant(
@@ -101,7 +101,7 @@ def passed_bound(n: InstantProblem, s: int, past: float) -> UnresolvedInstant:
 
 
 def endless_events(n: InstantProblem, recent: Iterable[Sequence[int]], many: int, within: float) -> UnresolvedInstant:
-    """Events that come ever closer; ``recent``: the guards that fired at the last of them."""
+    """Return the error for endless events; ``recent``: the guards that triggered at the last ones."""
     names = guard_titles(n, (g for fired in recent for g in fired))
     return UnresolvedInstant(
         f"at t = {n.here.t:.9g} s events follow each other without end ({many} within {within:.2g} s): "
@@ -111,7 +111,7 @@ def endless_events(n: InstantProblem, recent: Iterable[Sequence[int]], many: int
 
 
 def accumulating_events(n: InstantProblem, guard: int, many: int, end: float) -> UnresolvedInstant:
-    """Events of one guard, ``many`` so far, that come ever closer towards the time ``end``."""
+    """Return the error for events of one guard, ``many`` so far, that accumulate at the time ``end``."""
     return UnresolvedInstant(
         f"at t = {n.here.t:.9g} s {guard_titles(n, [guard])[0]} has happened {many} times, ever sooner after the last, "
         f"without end before t = {end:.6g} s",
@@ -120,7 +120,7 @@ def accumulating_events(n: InstantProblem, guard: int, many: int, end: float) ->
 
 
 def no_admissible_impulses(n: InstantProblem, parts: list[ProblemRow]) -> UnresolvedInstant:
-    """Velocities cannot change as all ask."""
+    """Return the error for impulse equations without solution."""
     return UnresolvedInstant(
         f"at t = {n.here.t:.9g} s no impulses let the velocities fulfil all that is asked of them at once; it is asked "
         f"by {rows_in_words(n, parts)}. Where a driver moves what a stop or a lock holds, one of them must give way",
@@ -129,7 +129,7 @@ def no_admissible_impulses(n: InstantProblem, parts: list[ProblemRow]) -> Unreso
 
 
 def no_admissible_forces(n: InstantProblem, found: ModeDecision) -> UnresolvedInstant:
-    """Accelerations cannot be as all ask."""
+    """Return the error for force equations without solution."""
     sliding = [p for p in found.parts if p.rule in (SLIDING, FRICTION_LINE)]
     jammed = [n.here.structure.switches[p.switch].element for p in sliding]
     if found.ended != HOLD_IMPOSSIBLE and len(jammed) == 1 and hasattr(jammed[0], "joint"):
@@ -151,7 +151,7 @@ def no_admissible_forces(n: InstantProblem, found: ModeDecision) -> UnresolvedIn
 
 
 def endless_instant(t: float, names: list[str], rounds: int) -> UnresolvedInstant:
-    """What happens at an instant has no end."""
+    """Return the error for an instant that cannot be resolved in a finite number of rounds."""
     return UnresolvedInstant(
         f"at t = {t:.9g} s events follow each other without end ({rounds} times at one instant): "
         f"{', '.join(dict.fromkeys(names))}; each undoes what the other did",
@@ -159,7 +159,7 @@ def endless_instant(t: float, names: list[str], rounds: int) -> UnresolvedInstan
     )
 
 
-ENERGY_ROUNDING = 1e-14  # of the energy that a motion is about, or that passes in an impact: as good as nothing lost
+ENERGY_ROUNDING = 1e-14  # part of the motion's or the impact's energy below which a loss is rounding
 CLOSING_WORDS = {
     STOP: ("close", "closes"),
     FRICTION: ("stick", "sticks"),
@@ -183,7 +183,7 @@ CONTACT_WORDS = {"close": ("touch", "touches"), "open": ("part", "parts")}
 
 
 def transition_words(n: InstantProblem, s: int, held: bool) -> tuple[str, str]:
-    """Kind and words of what switch s did."""
+    """Return the kind and description of what switch s did."""
     kind, said = (CLOSING_WORDS if held else OPENING_WORDS).get(int(n.kind[s]), ("", ""))
     if n.here.structure.switches[s].switch.path and kind in ROPE_WORDS:
         return (CONTACT_WORDS if isinstance(n.here.structure.switches[s].element, Touch) else ROPE_WORDS)[kind]
@@ -202,7 +202,7 @@ def record_jump(n: InstantProblem, jumped: Jump, before: np.ndarray) -> None:
         done.append(
             f"{n.name(s)} closes at {abs(u):.6g} {unit}/s, {goes}" if n.kind[s] != LOCK else f"{n.name(s)} locks"
         )
-    for s, x in jumped.impulse.items():  # joints and places of contact have components, by their rows
+    for s, x in jumped.impulse.items():  # impulses of joints and contact points have components, by their rows
         if x != 0.0 and not isinstance(n.here.structure.switches[s].element, (Joint, Touch)):
             impulses[n.name(s)] = impulses.get(n.name(s), 0.0) + x
     if jumped.jammed:
@@ -215,17 +215,17 @@ def record_jump(n: InstantProblem, jumped: Jump, before: np.ndarray) -> None:
 def record_mode_changes(
     n: InstantProblem, old: tuple[np.ndarray, np.ndarray], before: np.ndarray, hits: dict[int, bool]
 ) -> None:
-    """Record what holds, slides or let go now and did not before, one record a kind.
+    """Record mode changes (closed, sliding, released), one record per kind.
 
     Parameters
     ----------
-    n : Instant
+    n : InstantProblem
     old : tuple of ndarray
-        Modes and ways before.
+        Modes and switch states before.
     before : ndarray
         The state before.
     hits : dict
-        Switches whose impact is recorded already, and whether they stay.
+        Switches whose impact is recorded already, and whether they stay closed.
     """
     modes, ways = old
     told: dict[str, list[tuple[int, str]]] = {}
@@ -253,12 +253,12 @@ def record_mode_changes(
 
 
 def _gap_is_open(n: InstantProblem, s: int) -> bool:
-    """Whether the place of a slip parted: it does not slide either."""
+    """Return whether the gap of a slip is open: then it does not slide either."""
     return bool(n.W.modes.mode[n.S.switches.other[s]] == OFF)
 
 
 def _slides_either_way(n: InstantProblem, s: int) -> bool:
-    """Whether a switch slides one way or the other: not a tangent of a place in space."""
+    """Return whether a switch slides in one of two directions: not a tangent of a spatial contact point."""
     return bool(n.kind[s] == FRICTION or (n.kind[s] == SLIP and n.S.switches.partner[s] < 0))
 
 
@@ -271,7 +271,7 @@ def append_record(
     impulses: dict,
     before: np.ndarray,
 ) -> None:
-    """Append a record."""
+    """Append an event record."""
     t = n.over if kind == "rest" and not np.isnan(n.over) else n.here.t
     size = max(jumped.passed, min(n.energy, n.here.clock.real.energy_size)) if jumped else 0.0
     lost = jumped.lost if jumped and abs(jumped.lost) > ENERGY_ROUNDING * size else 0.0

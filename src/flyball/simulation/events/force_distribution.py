@@ -1,13 +1,13 @@
 """Indeterminate contact forces: how redundant rows share a load, and what slides if they cannot.
 
-The forces of rows that hold are those of least squares plus any z with A z = 0, by which nothing moves. If one
-distribution is within all bounds, all is at rest (the lower bound theorem of plastic limit analysis);
-`numerics/complementarity` finds the best one. If none is, accelerations are unique all the same: they minimise
+The forces of active rows are the least-squares solution plus any z with A z = 0, which causes no motion. If one
+distribution is within all bounds, all rows stay at rest (the lower bound theorem of plastic limit analysis);
+`numerics/complementarity` finds the one with the largest margin. If none is, the accelerations are still unique: they
+minimise
 
     |w - w_d|^2 / 2 + sum reach_i |u_i|,    u = b + B w,   A = B B^T
 
-(Gauss's principle with friction, Moreau 1963), w being the change of the accelerations in the metric of the
-masses.
+(Gauss's principle with friction, Moreau 1963), where w is the change of the accelerations in the metric of the masses.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ from ...numerics.complementarity.interior_point import (
 from ...tables.table_definitions import G_SHARED, OFF
 from .instant_problem import InstantProblem, ProblemRow
 
-SINGULAR_ROOT = 1e-9  # of the largest eigenvalue
-SMOOTHING = 1e-11  # of the largest acceleration: how far |u| is rounded off at the end
+SINGULAR_ROOT = 1e-9  # relative eigenvalue below which one counts as zero
+SMOOTHING = 1e-11  # final smoothing of |u|, relative to the largest acceleration
 SMOOTHING_FACTOR = 0.1
 NEWTON_STEPS = 60
-LOAD_ITERATIONS = 60  # times that loads and what slides are found in turns
+LOAD_ITERATIONS = 60  # alternating iterations of loads and sliding friction
 LOAD_TOLERANCE = 1e-10
 
 
 def least_accelerations(P: DenseProblem) -> tuple[np.ndarray, np.ndarray] | None:
-    """Accelerations u and forces x of all rows where what pushes stays closed; None if it cannot or is not found."""
+    """Return accelerations u and forces x of all rows, with unilateral rows closed; None if there is no solution."""
     d = np.sqrt(np.maximum(P.A.diagonal(), 1e-300))
     size, V = np.linalg.eigh(P.A / np.outer(d, d))
     kept = size > SINGULAR_ROOT * size[-1]
@@ -89,7 +89,7 @@ def least_accelerations(P: DenseProblem) -> tuple[np.ndarray, np.ndarray] | None
 
 
 def _smoothing_sequence(scale: float) -> list[float]:
-    """Roundings from coarse to fine."""
+    """Return smoothing parameters from coarse to fine."""
     out = [scale]
     while out[-1] > SMOOTHING * scale:
         out.append(max(SMOOTHING_FACTOR * out[-1], SMOOTHING * scale))
@@ -97,7 +97,7 @@ def _smoothing_sequence(scale: float) -> list[float]:
 
 
 def _minimise(b: np.ndarray, B: np.ndarray, of: tuple, friction: tuple, z: np.ndarray) -> np.ndarray:
-    """The z where it is least, by Newton's method."""
+    """Return the minimiser z, by Newton's method."""
     (first, free, w_d), (pairs, reach, soft) = of, friction
 
     def value(z: np.ndarray) -> float:
@@ -128,19 +128,19 @@ def _minimise(b: np.ndarray, B: np.ndarray, of: tuple, friction: tuple, z: np.nd
     return z
 
 
-SINGULAR = 1e-9  # of the largest eigenvalue: nothing tells rows apart
+SINGULAR = 1e-9  # relative eigenvalue below which rows are linearly dependent
 LOAD_ROUNDING = (
     1e-13 / IMPULSE_STEP
-)  # of what friction holds: rounding of the differences that tell how it follows forces
-NULL_TOLERANCE = 1e-9  # of its largest row: what a null vector does to another is rounding
-FRICTION_REDUCTION = 1e-6  # part of what friction holds that is taken from it to see what gives way
-CLEAR_ACCELERATION = 1e-3  # of the accelerations that this makes: none
-ZERO_FORCE = 1e-6  # of the largest force: what is zero where a group gives way
-ZERO_ACCELERATION = 1e-7  # of the accelerations that one is the difference of: as good as none
+)  # relative rounding of the finite differences of the friction limit by forces
+NULL_TOLERANCE = 1e-9  # entry of a null vector, relative to its largest, that is rounding
+FRICTION_REDUCTION = 1e-6  # part by which friction limits are reduced to find which rows slide
+CLEAR_ACCELERATION = 1e-3  # part of the resulting accelerations below which a row does not slide
+ZERO_FORCE = 1e-6  # part of the largest force that counts as zero where a group releases
+ZERO_ACCELERATION = 1e-7  # part of its terms below which an acceleration counts as zero
 
 
 class Distribution(NamedTuple):
-    """Rows that hold together: forces, and by how much these are within their bounds at best, and of which size."""
+    """Rows that hold together: forces, their largest margin to the bounds, and the reference force."""
 
     x: np.ndarray
     margin: float
@@ -148,13 +148,13 @@ class Distribution(NamedTuple):
 
 
 def force_scales(A: np.ndarray) -> np.ndarray:
-    """By which forces of rows of different units compare."""
+    """Return scales by which forces of rows with different units are comparable."""
     d = np.sqrt(A.diagonal())
     return np.where(d > 0.0, d, 1.0)
 
 
 def null_forces(A: np.ndarray) -> np.ndarray:
-    """Forces that move nothing, (n, k)."""
+    """Return a basis of the forces that cause no acceleration, (n, k)."""
     n, d = len(A), force_scales(A)
     if n < 2:
         return np.zeros((n, 0))
@@ -168,15 +168,15 @@ def null_forces(A: np.ndarray) -> np.ndarray:
 
 
 def load_rounding(A: np.ndarray, x: np.ndarray, reach: np.ndarray) -> float:
-    """How far, by rounding, it is known how friction that holds ``reach`` follows forces x; of rows as they compare."""
+    """Return the rounding of the derivatives of friction limits ``reach`` with respect to scaled forces x."""
     size = float(np.abs(x * force_scales(A)).max(initial=0.0))
     return LOAD_ROUNDING * float(np.abs(reach).max(initial=0.0)) / size if size > 0.0 else 0.0
 
 
 def unloading_null_forces(Z: np.ndarray, loads: np.ndarray, d: np.ndarray, least: float) -> np.ndarray:
-    """Of forces that move nothing those that do not press on what slides.
+    """Return the null forces that do not change the load of sliding friction.
 
-    ``loads``: how its friction follows them; of that ``least`` is nothing (`load_rounding`).
+    ``loads``: derivatives of the sliding friction by the forces, of which ``least`` is rounding (`load_rounding`).
     """
     if not loads.any() or not Z.shape[1]:
         return Z
@@ -188,7 +188,7 @@ def unloading_null_forces(Z: np.ndarray, loads: np.ndarray, d: np.ndarray, least
 
 
 def indeterminate_forces(P: DenseProblem, rows: np.ndarray) -> np.ndarray:
-    """How the forces of these rows, which hold, are left open, (rows, k)."""
+    """Return a basis of the forces by which the solution of these active rows is indeterminate, (rows, k)."""
     Z = null_forces(P.A[np.ix_(rows, rows)])
     driven = np.flatnonzero(P.rule == SLIDING)
     return unloading_null_forces(
@@ -197,7 +197,7 @@ def indeterminate_forces(P: DenseProblem, rows: np.ndarray) -> np.ndarray:
 
 
 def without_acceleration(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem) -> np.ndarray:
-    """Of which rows the acceleration is none; of pairs of both or of neither."""
+    """Return which rows have zero acceleration; of the two rows of a friction disc both or neither."""
     terms = np.abs(P.b) + np.abs(P.A) @ np.abs(P.x)
     out = np.abs(P.u) <= ZERO_ACCELERATION * terms + n.negligible_acceleration[[p.switch for p in parts]]
     for i in np.flatnonzero(P.rule == FRICTION_DISC):
@@ -206,11 +206,11 @@ def without_acceleration(n: InstantProblem, parts: list[ProblemRow], P: DensePro
 
 
 def held_at_rest(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem, ended: int | None) -> np.ndarray:
-    """Rows of friction that hold though they carry all they can: others, which hold, keep them at rest.
+    """Return the friction rows that stay at rest at their limit because other active rows keep them there.
 
-    All that can hold are tried first; where that is one of the solutions, what stuck goes on to stick. Forces that go
-    with it are put into P then. ``ended``: how P was solved; None: all are tried whatever it is, and only where they
-    hold clearly.
+    First it is tested whether all rows that can hold do hold; if that is one of the solutions, sticking rows go on
+    sticking, and the corresponding forces are written into P. ``ended`` is the status of the solve of P. With None all
+    rows are tested whatever the status, and must hold by a clear margin.
     """
     none = np.zeros(len(parts), bool)
     if not n.shares:
@@ -229,7 +229,7 @@ def held_at_rest(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem, en
         P.u[together], P.state[together] = 0.0, AT_REST
         P.reach[:] = P.const + P.gain @ found.x
         return friction
-    if ended != SOLUTION_FOUND:  # also where it was not asked
+    if ended != SOLUTION_FOUND:  # also where P was not solved
         return none
     still = friction & without_acceleration(n, parts, P)
     rows = np.flatnonzero(still | (P.state == AT_REST))
@@ -242,7 +242,7 @@ def held_at_rest(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem, en
 
 
 def admissible_distribution(P: DenseProblem, rows: np.ndarray, Z: np.ndarray) -> Distribution | None:
-    """These rows held, by the best shares; None if they cannot be at rest together."""
+    """Return the distribution with the largest margin that holds these rows; None if they cannot be at rest together."""
     n, d = len(P.b), force_scales(P.A)
     driven = np.flatnonzero(P.rule == SLIDING)
     M, r, s = np.zeros((n, n)), np.zeros(n), 1.0 / d
@@ -266,7 +266,7 @@ def admissible_distribution(P: DenseProblem, rows: np.ndarray, Z: np.ndarray) ->
 
 
 def write_bounds(P: DenseProblem, rows: np.ndarray, x: np.ndarray, Z: np.ndarray, Q) -> None:
-    """Cells of `cone.shares`: bounds of these rows at the forces x, and how they follow more of Z."""
+    """Write the cells of the cone program: bounds of these rows at the forces x, and their derivatives by Z."""
     c, Q.count[UNKNOWN_COUNT], d, all_ = 0, Z.shape[1], force_scales(P.A), np.column_stack([x, Z])
     for i in rows.tolist():
         rule = P.rule[i]
@@ -285,10 +285,11 @@ def write_bounds(P: DenseProblem, rows: np.ndarray, x: np.ndarray, Z: np.ndarray
 
 
 def released_by_group(n: InstantProblem, parts: list[ProblemRow], fired: np.ndarray) -> dict[int, ProblemRow]:
-    """What slides or lets go where a group has come to the end of all shares, as it is then.
+    """Return the rows that slide or open where no distribution within the bounds is left, with their new rules.
 
-    A little is taken from what friction holds: what moves then slides, the way that it moves with what friction is
-    left. If nothing does, what carries nothing by any shares lets go.
+    Friction limits are reduced slightly. Rows that then move slide in the direction of that motion. If none does, rows
+    that
+    carry no force in any distribution open.
     """
     if not n.fired(fired, G_SHARED):
         return {}
@@ -311,7 +312,9 @@ def released_by_group(n: InstantProblem, parts: list[ProblemRow], fired: np.ndar
 
 
 def sliding_without_solution(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem) -> dict[int, ProblemRow]:
-    """What slides where redundancy leaves the small problem without an answer, as `released_by_group` says."""
+    """Return the rows that slide where redundancy leaves the complementarity problem unsolved; see
+    `released_by_group`.
+    """
     together = np.flatnonzero(np.isin(P.rule, (BILATERAL, UNILATERAL, FRICTION_LINE, FRICTION_DISC, FRICTION_DISC_2)))
     if not n.shares or not indeterminate_forces(P, together).shape[1]:
         return {}
@@ -319,11 +322,11 @@ def sliding_without_solution(n: InstantProblem, parts: list[ProblemRow], P: Dens
 
 
 def sliding_rows(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem) -> dict[int, ProblemRow]:
-    """What slides if a little less is held than P says, by its friction in motion."""
+    """Return the rows that slide if friction limits are slightly less than in P, with kinetic friction."""
     d, friction = force_scales(P.A), np.isin(P.rule, (FRICTION_LINE, FRICTION_DISC, FRICTION_DISC_2))
     P.const[friction] *= 1.0 - FRICTION_REDUCTION
     P.gain[friction] *= 1.0 - FRICTION_REDUCTION
-    for _ in range(2):  # with friction at rest: who; with friction in motion: which way
+    for _ in range(2):  # static friction: which rows slide; kinetic friction: in which direction
         P.state[:] = AT_REST
         if n.again(P) != SOLUTION_FOUND:
             found = least_accelerations(P)
@@ -353,15 +356,15 @@ def sliding_rows(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem) ->
 
 
 def write_sharing_group(n: InstantProblem, parts: list[ProblemRow], found: tuple[np.ndarray, ...]) -> None:
-    """What holds together and shares, into the motion: its guard is that of the group.
+    """Write the group of rows with indeterminate forces into the motion, for the guard of the group.
 
-    ``found`` are states, the matrix, how what friction holds follows forces, these, and what it holds.
+    ``found`` are states, the matrix, derivatives of friction limits by forces, the forces, and the friction limits.
     """
     if not n.shares:
         return
     (state, A, gain, x, reach), G, B = found, n.here.group, n.workspaces[len(parts)].B
     n.W.modes.shared[:], G.Q.count[UNKNOWN_COUNT] = 0.0, 0
-    on = n.W.modes.mode[[p.switch for p in parts]] != OFF  # slips of a gap that is let go are no rows
+    on = n.W.modes.mode[[p.switch for p in parts]] != OFF  # slips of an open gap have no rows
     rows = np.flatnonzero((state == AT_REST) & on)
     rules = np.array([p.rule for p in parts])
     if not np.isin(rules[rows], (FRICTION_LINE, FRICTION_DISC)).any():

@@ -1,12 +1,12 @@
-"""Impacts: velocities that jump, and series of bounces that end.
+"""Impacts: jumps of velocities, and the end of series of bounces.
 
-Impulses x along the rows that take part, u+ = A x + u-, each by its rule: a unilateral row only pushes, a locked
-row holds, friction is bounded by the impulse of its load. Restitution by Poisson's law: an inelastic impact, then
-impulses of at least e times those (Pfeiffer and Glocker 1996, section 8.3). Energy never grows: what goes beyond
-the inelastic impact is done only as far as there is energy for it.
+Impulses x along the rows that take part, u+ = A x + u-, follow the rule of each row: a unilateral row can only push, a
+locked row holds, friction is bounded by the impulse of its load. Restitution is by Poisson's law: an inelastic impact,
+then impulses of at least e times those of the impact (Pfeiffer and Glocker 1996, section 8.3). Energy never grows: the
+expansion is reduced to what the energy lost in the inelastic impact allows.
 
-A flight that begins with the rate u and is brought back by the acceleration -a is u^2 / 2 a high and lasts 2 u /
-a. Each is shorter than the one before by a ratio r, so all that are left last T / (1 - r). A series shorter than
+A flight that starts with the rate u against the acceleration -a has the height u^2 / (2 a) and lasts 2 u / a. Each
+flight is shorter than the one before by a ratio r, so all remaining flights last T / (1 - r). A series shorter than
 rounding is over.
 """
 
@@ -23,27 +23,27 @@ from ...numerics.complementarity.dense_problem import BILATERAL, SOLUTION_FOUND,
 from ...tables.table_definitions import BIAS
 from .instant_problem import STOP_KINDS, InstantProblem, ProblemRow
 
-REST_RATE = 1e-12  # of the terms of a rate after the jump: none
+REST_RATE = 1e-12  # part of its terms below which a rate after the jump counts as zero
 
 
 @dataclass
 class Jump:
-    """What a jump did.
+    """The effects of a velocity jump.
 
     Attributes
     ----------
     impulse : dict
         Switch -> impulse along its quantity.
     closing : dict
-        Switch -> rate at which it closed, and that at which it goes on.
+        Switch -> its rates before and after closing.
     lost, given : float
-        Energy [J] that the impacts took, and that kicks gave.
+        Energy [J] dissipated by impacts, and supplied by applied impulses.
     passed : float
-        Energy [J] that the impulses took and gave back, in sum: ``lost`` is a difference of it.
+        Sum of the energies [J] that impulses took and returned, of which ``lost`` is the difference.
     jammed : tuple of int
         Switches that stopped without a collision.
     rows, along : ndarray
-        Impulses of all rows, then of drivers that prescribe coordinates; and change of the velocities, (nv,).
+        Impulses of all rows, followed by those of drivers that prescribe coordinates; change of the velocities, (nv,).
     """
 
     impulse: dict[int, float] = field(default_factory=dict)
@@ -60,7 +60,7 @@ class Jump:
 
 
 def violates_rule(n: InstantProblem, parts: list[ProblemRow], rate: np.ndarray) -> bool:
-    """Whether a rate is against a rule."""
+    """Return whether a rate violates the rule of a row."""
     for p in parts:
         u, still = p.sign * rate[p.switch], n.still[p.switch]
         if (p.rule == UNILATERAL and u < -still) or (p.rule == BILATERAL and abs(u) > still):
@@ -69,7 +69,7 @@ def violates_rule(n: InstantProblem, parts: list[ProblemRow], rate: np.ndarray) 
 
 
 def apply_impulses(n: InstantProblem, parts: list[ProblemRow], kick: np.ndarray | None) -> Jump:
-    """Change the velocities of the motion as the rules of these rows ask; see the module."""
+    """Change the velocities of the motion by the impulses of these rows; see the module."""
     B, P, _ = n.problem(parts)
     out = no_jump(n)
     before = B.sign * n.rate[B.which]
@@ -77,8 +77,8 @@ def apply_impulses(n: InstantProblem, parts: list[ProblemRow], kick: np.ndarray 
     if kick is not None:
         before = before + external_impulse_response(n, kick, out, B, drive)
     P.grain[:] = n.still[B.which]
-    B.loaded[:] = out.rows[: len(B.loaded)]  # what the kick alone asks of joints
-    unmoved = (P.A.diagonal() == 0.0) & (np.abs(before) <= P.grain)  # by impulses: its rate is rounding
+    B.loaded[:] = out.rows[: len(B.loaded)]  # joint impulses due to the applied impulse alone
+    unmoved = (P.A.diagonal() == 0.0) & (np.abs(before) <= P.grain)  # no impulse moves it and its rate is rounding
     P.b[:] = np.where(unmoved, 0.0, before)
     out.ended = n.balance(B, P, SUDDEN_IMPULSES)
     x, u = P.x.copy(), P.u.copy()
@@ -97,7 +97,7 @@ def apply_velocities(
     out: Jump,
     drive: np.ndarray,
 ) -> Jump:
-    """Velocities of the motion after impulses x, which take the rows' rates from ``before`` to u."""
+    """Apply impulses x, which change the rows' rates from ``before`` to u, to the velocities of the motion."""
     B, P = solved
     before, x, u = found
     out.lost = -float(x @ (before + u)) / 2.0
@@ -117,7 +117,7 @@ def apply_velocities(
 
 
 def add_impulses(n: InstantProblem, out: Jump, B: ModeProblem, x: np.ndarray) -> None:
-    """Count further impulses along the rows of a problem to those of a jump; velocities have them already."""
+    """Add further impulses to those of a jump; the velocities include them already."""
     S, nr = n.S, len(n.S.rows.law)
     out.rows[:nr] += x @ B.L
     out.rows[nr:] += (x @ B.E)[S.tree.v[S.tree.law >= 0]]
@@ -127,14 +127,14 @@ def add_impulses(n: InstantProblem, out: Jump, B: ModeProblem, x: np.ndarray) ->
 
 
 def no_jump(n: InstantProblem) -> Jump:
-    """No jump."""
+    """Return a jump without effect."""
     return Jump(rows=np.zeros(len(n.S.rows.law)), along=np.zeros(n.here.structure.nv))
 
 
 def external_impulse_response(
     n: InstantProblem, kick: np.ndarray, out: Jump, B: ModeProblem, drive: np.ndarray
 ) -> np.ndarray:
-    """Change of the rows' rates by a generalised impulse alone; what it does goes to ``out``."""
+    """Return the change of the rows' rates by an applied generalised impulse alone; add its effects to ``out``."""
     dv, rows, effort = n.response(kick)
     v = n.here.v
     out.given = float(kick @ (v + 0.5 * dv))
@@ -152,7 +152,7 @@ def with_restitution(
     before: np.ndarray,
     hit: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Impulses and velocities with what restitution gives back."""
+    """Return impulses and velocities with restitution added."""
     x, u = hit
     bounces = [n.kind[p.switch] in STOP_KINDS and p.switch not in n.here.astray for p in parts]
     bounce = np.where(bounces, n.S.switch_numbers.restitution[[p.switch for p in parts]], 0.0)
@@ -160,7 +160,7 @@ def with_restitution(
     if not least.any():
         return x, u
     more, speed = poisson_expansion(n, B, P, least, u)
-    # energy on the way s from the inelastic impact: E + a s + b s^2
+    # energy after the part s of the expansion: E + a s + b s^2
     E, a, b = 0.5 * float(x @ (before + u)), float(more @ (before + u) + x @ speed) / 2.0, float(more @ speed) / 2.0
     s = 1.0
     if E + a + b > 0.0 and b > 0.0:
@@ -171,7 +171,7 @@ def with_restitution(
 def poisson_expansion(
     n: InstantProblem, B: ModeProblem, P: DenseProblem, least: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Poisson: further impulses of at least so much."""
+    """Return the expansion impulses by Poisson's law, at least ``least``, and the change of the rates."""
     gain = P.gain.copy()
     fixed = np.where(B.way == 0.0, gain @ least, 0.0)
     P.const[:] = np.where(B.way == 0.0, fixed, 0.0)
@@ -182,7 +182,7 @@ def poisson_expansion(
 
 
 def account_for_drivers(n: InstantProblem, out: Jump, drive: np.ndarray) -> None:
-    """What drivers do: their impulses, which go behind those of the rows, times the rates that they prescribe."""
+    """Append the impulses of drivers to those of the rows, and add their works at the prescribed rates."""
     S, W, y, rows = n.S, n.W, n.here.y, out.rows
     for s, x in out.impulse.items():
         rows[S.switches.row[s]] = x
@@ -197,13 +197,15 @@ def account_for_drivers(n: InstantProblem, out: Jump, drive: np.ndarray) -> None
     out.rows = np.r_[rows, efforts]
 
 
-LOW_FLIGHT = 1e-13  # of the mechanism's length or a radian: a flight that is none
-ORIGIN_ROUNDING = 2e-14  # of how far the mechanism is from the origin: the same, since places there are known no better
+LOW_FLIGHT = 1e-13  # height of a negligible flight, relative to the mechanism's length or a radian
+ORIGIN_ROUNDING = 2e-14  # the same relative to the distance from the origin: rounding of positions
 
 
 @dataclass
 class BounceSeries:
-    """Those of one stop: how many there were, when the last one and the one before it were, when they are over."""
+    """Series of bounces of one stop: number, times of the last one and the one before, time at which the series is
+    over.
+    """
 
     count: int = 0
     last: float = -np.inf
@@ -212,7 +214,7 @@ class BounceSeries:
 
 
 def note_bounces(n: InstantProblem, jumped: Jump) -> None:
-    """Count what closed and goes on apart, or lets something else go."""
+    """Count the impacts of this jump in the series of their stops."""
     t = n.here.t
     for s in jumped.closing.keys() - n.here.astray:
         b = n.here.bounces.setdefault(s, BounceSeries())
@@ -222,7 +224,9 @@ def note_bounces(n: InstantProblem, jumped: Jump) -> None:
 
 
 def coming_to_rest(n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray) -> np.ndarray:
-    """Switches whose flights are none, (ns,); the modes are written, and their rates are those that they start with."""
+    """Return the switches whose next flights are negligible, (ns,); modes are written, and rates are those at
+    take-off.
+    """
     over = np.zeros(len(n.kind), bool)
     leaving = [s for s, side in at.items() if not still[s] and len(side) == 1]
     if not leaving:
@@ -235,7 +239,7 @@ def coming_to_rest(n: InstantProblem, at: dict[int, tuple[float, ...]], still: n
         u, back = at[s][0] * n.rate[s], -at[s][0] * acceleration
         if u > 0.0 and back > 0.0 and u * u <= 2.0 * back * max(LOW_FLIGHT * n.unit[s], far * (n.units[s] == "m")):
             over[s] = True
-            if s not in n.here.bounces:  # it did not close before: let go by rounding only
+            if s not in n.here.bounces:  # it did not close before and opens by rounding only
                 continue
             b, flight = n.here.bounces[s], 2.0 * u / back
             past = n.here.t - (b.before if b.last == n.here.t else b.last)
@@ -244,7 +248,8 @@ def coming_to_rest(n: InstantProblem, at: dict[int, tuple[float, ...]], still: n
 
 
 def settle_down(n: InstantProblem, over: list[int], still: np.ndarray, jumped: Jump | None) -> None:
-    """Take their rates from what bounces no more; friction that moved by these alone is at rest, into ``still``.
+    """Set the rates of switches that bounce no more to zero; mark friction that moved by these alone as at rest in
+    ``still``.
 
     ``jumped`` is the impact of the instant, if there was one: it was the last.
     """

@@ -1,11 +1,11 @@
 """The complementarity problem at an instant: its workspace, and the stops, locks and friction rows in it.
 
-`InstantProblem` evaluates the engine there: quantities and rates of all switches, the problem of the rows that
-take part, responses to generalised forces. `rows_of_velocities` and `rows_of_accelerations` say which rows take
-part.
+`InstantProblem` evaluates quantities and rates of all switches, the problem of the rows that take part, and responses
+to generalised forces. `rows_of_velocities` and `rows_of_accelerations` select the rows that take part.
 
-In the plane a slip is one row that GRIPS, in space two that are TURNS and WITH; they carry at most mu times the
-force of the gap. What slides with a speed slides in a known direction: DRIVEN.
+A slip is one row with the rule FRICTION_LINE in the plane, and two rows FRICTION_DISC and FRICTION_DISC_2 in space;
+they carry at most mu times the force of the gap. A contact that slides at a speed slides in a known direction:
+SLIDING.
 """
 
 from __future__ import annotations
@@ -62,28 +62,28 @@ from ...tables.table_definitions import (
 )
 from .context import RELEASED, EventContext, switch_scales, switch_units
 
-POSITION_TOLERANCE = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
+POSITION_TOLERANCE = 1e-10  # distance at which a bound is reached, relative to the mechanism's length or a radian
 RATE_TOLERANCE = (
-    1e-12  # of the length of the mechanism (or a radian) at the rate `reference_rate`: the same where all is at rest
+    1e-12  # rate that counts as zero, relative to the mechanism's length (or a radian) times `reference_rate`
 )
-RELEASED_KIND = -1  # of what was released: it takes no part
+RELEASED_KIND = -1  # kind of a released switch, which takes no part
 IMMOVABLE_MOBILITY = (
-    1e-10  # of all mass: what moves less by a force is moved by drivers only; redundant rows leave 1e-11 of it
+    1e-10  # mobility, relative to that of the total mass, below which only drivers move it; rounding leaves 1e-11
 )
 STOP_KINDS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
-REST_ACCELERATION = 1e-9  # of how gravity accelerates: what nothing moves and has no more than that stands still
-FAINT_ACCELERATION = 1e-5  # of that: an acceleration that is none, whatever it is the difference of
-POSITION_ROUNDING = 2e-15  # of the mechanism's length, or of a radian: last digits of positions
-DECIDED_KINDS = (*STOP_KINDS, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes follow from the small problem
+REST_ACCELERATION = 1e-9  # negligible acceleration of an immovable row, relative to the reference acceleration
+FAINT_ACCELERATION = 1e-5  # part of that which is negligible for any row
+POSITION_ROUNDING = 2e-15  # rounding of positions, relative to the mechanism's length or a radian
+DECIDED_KINDS = (*STOP_KINDS, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes the complementarity problem decides
 
 
 class ProblemRow(NamedTuple):
-    """A row of the small problem."""
+    """A row of the complementarity problem."""
 
     switch: int
     rule: int
     sign: float = 1.0
-    way: float = 0.0  # what its friction is asked for; 0: reach is const + gain on row ``of``
+    way: float = 0.0  # direction (or STATIC) at which the friction law is evaluated; 0: limit is const + gain on row ``of``
     rate: float = 0.0
     lean: float = 0.0
     const: float = 0.0
@@ -93,7 +93,7 @@ class ProblemRow(NamedTuple):
 
 
 class ProblemWorkspace(NamedTuple):
-    """Arrays of a small problem, and what works on them."""
+    """Arrays of a complementarity problem, and its kernel."""
 
     B: ModeProblem
     P: DenseProblem
@@ -101,24 +101,24 @@ class ProblemWorkspace(NamedTuple):
 
 
 class InstantProblem:
-    """A motion at an instant, with all that is decided on its own.
+    """Evaluation and solution of the problem at an instant of a motion.
 
     Attributes
     ----------
     x, rate : ndarray (ns,)
         Value and rate of every switch's quantity.
     near, still : ndarray (ns,)
-        What of these is nothing.
+        Tolerances of these.
     mode, hold, way : ndarray (ns,)
-        Modes, places and ways as they were when it was looked at.
+        Modes, held values and switch states before the evaluation.
     shares : bool
-        Whether what holds may share it with others: the last guard is that of the group.
+        Whether active rows may have indeterminate forces: the last guard is then that of the group.
     over : float
-        When a series of bounces is over that has become shorter than rounding here.
+        Time at which a series of bounces is over that has become shorter than rounding here.
     pace : float [1/s]
         See `reference_rate`.
     energy : float [J]
-        That of all mass at the mechanism's own speed.
+        Reference energy: that of the total mass at the mechanism's own speed.
     """
 
     def __init__(self, here: EventContext) -> None:
@@ -159,22 +159,22 @@ class InstantProblem:
         self.acceleration_rounding = self._acceleration_rounding()
 
     def begin(self) -> None:
-        """At another instant, where other elements may have been released."""
+        """Prepare for another instant, where other elements may have been released."""
         self.over = np.nan
         self.kind = np.where(self.W.modes.released == RELEASED, RELEASED_KIND, self.S.switches.kind)
         self.kinds = self.kind.tolist()
         self.decided = [s for s in self.of(*DECIDED_KINDS) if self.m[s] >= 0]
 
     def _acceleration_rounding(self) -> np.ndarray:
-        """How the last digits of positions change the accelerations of switches' quantities, (ns,).
+        """Return how the rounding of positions changes the accelerations of switches' quantities, (ns,).
 
-        That is rounding of forces, as of stiff springs near their free lengths. Everything that is decided is off.
+        This is rounding of forces, as of stiff springs near their free lengths. All decided switches are off.
         """
         c, nq, nv = self.here.c, len(self.here.q), self.here.structure.nv
         which, modes = np.flatnonzero(self.m >= 0), self.W.modes.mode.copy()
         self.switch_off_decided()
         self.put()
-        self.desk.y[0, nq : nq + nv] = c.sizes * (1.5 + np.cos(np.arange(nv)))  # a way that no symmetry has
+        self.desk.y[0, nq : nq + nv] = c.sizes * (1.5 + np.cos(np.arange(nv)))  # a direction without symmetry
         self.engine(MOTION)
         q_dot, out, before = self.desk.K[0, :nq].copy(), np.zeros(len(self.m)), np.zeros(0)
         for step in (0.0, POSITION_ROUNDING, -POSITION_ROUNDING):
@@ -190,16 +190,16 @@ class InstantProblem:
         return out
 
     def of(self, *kinds: int) -> list[int]:
-        """Switches of these kinds."""
+        """Return the switches of these kinds."""
         return [s for s, kind in enumerate(self.kinds) if kind in kinds]
 
     def fired(self, guards: Iterable[int], *kinds: int) -> set[int]:
-        """Switches of those of some guards that are of these kinds."""
+        """Return the switches of the guards that are of these kinds."""
         rows = (self.guarded[g] for g in guards)
         return {s for kind, s, _ in rows if kind in kinds}
 
     def room(self, n: int) -> ProblemWorkspace:
-        """Room for a small problem of n rows."""
+        """Return the workspace for a problem of n rows."""
         if n not in self.workspaces:
             B, P = empty_mode_problem(n, self.here.structure.nv, len(self.S.rows.law)), allocate_dense(n)
             self.workspaces[n] = ProblemWorkspace(
@@ -208,26 +208,26 @@ class InstantProblem:
         return self.workspaces[n]
 
     def ways(self) -> np.ndarray:
-        """Ways of all switches, in place."""
+        """Return the states of all switches, writable in place."""
         return self.W.sensed[VALUE, self.first :]
 
     def put(self) -> None:
-        """Lay time and state of the motion on the desk."""
+        """Copy time and state of the motion into the workspace."""
         self.desk.real.t = self.here.t
         self.desk.y[0] = self.here.y
 
     def ask(self, task: int) -> int:
-        """Have the engine do a task at the state of the motion; the desk has a copy of it."""
+        """Run a task of the engine at the state of the motion, on a copy of it."""
         self.put()
         return self.engine(task)
 
     def evaluate_switches(self) -> None:
-        """Quantities and rates of all switches, where none of those that are decided acts."""
+        """Evaluate quantities and rates of all switches, with all decided switches off."""
         self.mode, self.hold, self.way = self.W.modes.mode.copy(), self.W.modes.hold.copy(), self.ways().copy()
         self.reevaluate_switches()
 
     def reevaluate_switches(self) -> None:
-        """The same after a jump."""
+        """Evaluate them again after a jump."""
         self.switch_off_decided()
         self.put()
         self.all.do(STORE_RATES)
@@ -235,18 +235,22 @@ class InstantProblem:
         self.x, self.rate, self.still = B.now.copy(), B.rate.copy(), B.seen + self.least
 
     def switch_off_decided(self) -> None:
-        """Switch off what is decided."""
+        """Switch off all decided switches."""
         self.W.modes.mode[self.decided] = OFF
 
     def slide(self, parts: list[ProblemRow]) -> None:
-        """Let friction that is no row of the problem slide as it does; that of its rows acts by them alone."""
+        """Set the sliding direction of friction that is no row of the problem; friction of its rows acts by them
+        alone.
+        """
         ways, own = self.ways(), {p.switch for p in parts}
         for s in self.of(FRICTION):
             loaded = self.S.forces.load[self.force[s]] >= 0
             ways[s] = 0.0 if s in own or loaded else np.sign(self.rate[s])
 
     def response(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What a generalised force does at the state last looked at: accelerations, multipliers, efforts of drivers."""
+        """Return accelerations, multipliers and driver efforts due to a generalised force at the state last
+        evaluated.
+        """
         out, nv, nr = self.output.rows, len(force), len(self.S.rows.law)
         out[:2] = 0.0
         out[0, :nv] = force
@@ -254,7 +258,7 @@ class InstantProblem:
         return out[2, :nv].copy(), out[3, :nr].copy(), self.W.velocities.effort.copy()
 
     def gradients(self, which: np.ndarray) -> np.ndarray:
-        """Gradients of the quantities of these switches, (n, nv)."""
+        """Return the gradients of the quantities of these switches, (n, nv)."""
         S, nr = self.S, len(self.S.rows.law)
         out = np.zeros((len(which), self.here.structure.nv))
         for i, s in enumerate(which.tolist()):
@@ -263,12 +267,12 @@ class InstantProblem:
         return out
 
     def restore_modes(self) -> None:
-        """Modes and ways as they were when it was looked at."""
+        """Restore modes and switch states from before the evaluation."""
         self.W.modes.mode[:] = self.mode
         self.ways()[:] = self.way
 
     def problem(self, parts: list[ProblemRow]) -> tuple[ModeProblem, DenseProblem, int]:
-        """The small problem of these rows at the state of the motion; and how its evaluation ended."""
+        """Set up the problem of these rows at the state of the motion. Returns it and the status of its evaluation."""
         room = self.room(len(parts))
         B, P = room.B, room.P
         for x in (B.asks, P.const, P.gain, P.lean, P.grain):
@@ -289,22 +293,24 @@ class InstantProblem:
         return B, P, status
 
     def balance(self, B: ModeProblem, P: DenseProblem, impulses: int) -> int:
-        """Solve it for forces or impulses, as `equations.instant` names them. Returns how it ended."""
+        """Solve the problem for forces or impulses (constants of `engine.mode_complementarity`). Returns the solver
+        status.
+        """
         B.asks[IMPULSES] = impulses
         self.desk.real.t = self.here.t
         return self.workspaces[len(P.b)].do(SOLVE_MODES)
 
     def again(self, P: DenseProblem) -> int:
-        """Solve it once more from the states that stand in it, with reaches as they are. Returns how it ended."""
+        """Solve it again from the states stored in it, with the present friction limits. Returns the solver status."""
         return self.workspaces[len(P.b)].do(RESUME_SOLVE)
 
     def arrive(self) -> None:
-        """Put the state on the rows as they are now held."""
+        """Project the state onto the active rows."""
         if self.ask(ARRIVE) == 0:
             self.here.y[:] = self.desk.y[0]
 
     def guards(self) -> np.ndarray:
-        """What is watched, (ng,)."""
+        """Return the values of all guards, (ng,)."""
         self.ask(GUARD_VALUES)
         out = self.output.rows[0, : len(self.S.guards.kind)].copy()
         if self.shares:
@@ -312,26 +318,27 @@ class InstantProblem:
         return out
 
     def name(self, s: int) -> str:
-        """Name of the element that switch s is of; of the coordinate that an event locks."""
+        """Return the name of the element of switch s, or of the coordinate that an event locks."""
         spec = self.here.structure.switches[s]
         return str(spec.switch.label if spec.element.category == "events" else spec.element.name)
 
     def holds(self, s: int) -> bool:
-        """Whether switch s held when it was looked at."""
+        """Return whether switch s was active before the evaluation."""
         return bool(self.mode[s] == HELD)
 
 
 def reference_rate(here: EventContext) -> float:
-    """A rate [1/s] that per length is a speed, squared an acceleration, of which small parts are none.
+    """Return a reference rate [1/s], to which velocities (per length) and accelerations (squared) are compared.
 
-    That of the mechanism itself, or a change in the whole time of a motion where that is slower. A time that is short
-    makes nothing small: a force of the weight of a body at rest presses, however little it would move the body.
+    It is the characteristic rate of the mechanism, or the inverse of the motion's duration where that is slower. A
+    short
+    duration does not raise it: a force of the weight of a body at rest counts, however little it would move the body.
     """
     return min(float(here.c.system.scales.rate.real), 1.0 / float(here.clock.real.span))
 
 
 def instant_problem(here: EventContext) -> InstantProblem:
-    """What decides at the instants of a motion, at the present one: the same as long as tables and scratch are."""
+    """Return the `InstantProblem` of a motion at the present instant; reused while tables and workspace are the same."""
     n = here.instant_problem
     if n is None or n.S is not here.c.system or n.W is not here.c.work:
         here.instant_problem = n = InstantProblem(here)
@@ -339,23 +346,23 @@ def instant_problem(here: EventContext) -> InstantProblem:
     return n
 
 
-SLIP_SPEED_SHARE = 0.9  # of the speed at which a slip goes the way of its velocity alone
-SLOW_SLIP = 1e3  # times what is still: slower where the end of a slip in space was found, it is over
+SLIP_SPEED_SHARE = 0.9  # part of the speed from which on the velocity alone gives the direction of a slip
+SLOW_SLIP = 1e3  # speed, in tolerances of rates, below which a spatial slip ends where its guard triggered
 
 
 def slips_at_gap(n: InstantProblem, gap: int) -> list[int]:
-    """Slips of the place of a gap: none, one or two in a row."""
+    """Return the slips of a gap's contact point: none, one, or two in a row."""
     return [s for s in n.of(SLIP) if n.S.switches.other[s] == gap]
 
 
 def gaps_beyond_edges(n: InstantProblem) -> set[int]:
-    """Gaps of corners that leave their face: at its end, and going on."""
+    """Return the gaps of corners that leave their face: at its edge and moving outwards."""
     leaving = (n.x <= n.near) & ((n.rate < -n.still) | (n.x < -n.near))
     return {int(n.S.switches.other[s]) for s in n.of(EDGE) if leaving[s]}
 
 
 def mark_ended_slips(n: InstantProblem, fired: np.ndarray, still: np.ndarray) -> None:
-    """Whether slips are over, into ``still``: of a pair both or none."""
+    """Mark in ``still`` which slips have ended; of a pair both or none."""
     done = n.fired(fired, G_TURNS)
     for s in n.of(SLIP):
         other = int(n.S.switches.partner[s])
@@ -369,9 +376,9 @@ def mark_ended_slips(n: InstantProblem, fired: np.ndarray, still: np.ndarray) ->
 
 
 def stop_slips(n: InstantProblem, fired: np.ndarray) -> None:
-    """Take what is left of their speed from slips in space that are over: what follows slides by its acceleration.
+    """Set the remaining speed of ended spatial slips to zero, so that further sliding follows the acceleration.
 
-    What was closed stays so; all else is looked at again.
+    Closed gaps stay closed; all other switches are evaluated again.
     """
     over = []
     for s in sorted(n.fired(fired, G_TURNS)):
@@ -390,7 +397,7 @@ def stop_slips(n: InstantProblem, fired: np.ndarray) -> None:
 
 
 def _slip_continues(n: InstantProblem, pair: list[int]) -> bool:
-    """Whether a slip that has just begun still goes its way: it is slow since it was at rest."""
+    """Return whether a slip that has just begun keeps its direction: it is slow because it started from rest."""
     fresh = len(pair) > 1 and n.way[pair] @ n.way[pair] > ONSET_LENGTH and n.way[pair] @ n.rate[pair] > 0.0
     return bool(
         fresh and np.linalg.norm(n.rate[pair]) < SLIP_SPEED_SHARE * ONSET_END * ONSET_SPEED * n.here.c.values.length
@@ -398,7 +405,7 @@ def _slip_continues(n: InstantProblem, pair: list[int]) -> bool:
 
 
 def _slip_direction(n: InstantProblem, slips: list[int]) -> np.ndarray:
-    """Direction in which a place slides, as the motion has it (`equations.sliding.heading`)."""
+    """Return the sliding direction of a contact point, as in `engine.loads.sliding_direction`."""
     u = n.rate[slips]
     if _slip_continues(n, slips):
         first = ONSET_SPEED * n.here.c.values.length
@@ -407,9 +414,11 @@ def _slip_direction(n: InstantProblem, slips: list[int]) -> np.ndarray:
 
 
 def slip_rows(n: InstantProblem, gap: int, at: int, still: np.ndarray, *, known_direction: bool) -> list[ProblemRow]:
-    """Rows of the slips of a gap, which is row ``at``.
+    """Return the rows of the slips of a gap, which is row ``at``.
 
-    What slides does so its known way if ``known_direction``; else it is asked where to, as in an impact.
+    With ``known_direction`` a sliding contact slides in its present direction; else the direction is solved for, as in
+    an
+    impact.
     """
     own = slips_at_gap(n, gap)
     if not own:
@@ -425,9 +434,9 @@ def slip_rows(n: InstantProblem, gap: int, at: int, still: np.ndarray, *, known_
 
 
 def use_kinetic_friction(n: InstantProblem, parts: Sequence[ProblemRow], P: DenseProblem, resting: np.ndarray) -> bool:
-    """Let what begins to slip hold what it carries in motion, not what others keep at rest.
+    """Set the kinetic coefficient for contacts that begin to slip, except those that others keep at rest.
 
-    Returns whether that is another problem.
+    Returns whether that changed the problem.
     """
     other = False
     for i, p in enumerate(parts):
@@ -441,9 +450,9 @@ def use_kinetic_friction(n: InstantProblem, parts: Sequence[ProblemRow], P: Dens
 def sliding_at_cone(
     n: InstantProblem, parts: Sequence[ProblemRow], found: tuple[np.ndarray, ...], fired: np.ndarray
 ) -> dict[int, ProblemRow]:
-    """Rows that stick at the very end of what they hold, by guards that fired, as what slides.
+    """Return rows that stick exactly at their friction limit, by guards that triggered, as sliding rows.
 
-    ``found`` are forces, states, reaches, and forces that are nothing.
+    ``found`` are forces, states, friction limits, and negligible forces.
     """
     x, state, reach, least = found
     ends = n.fired(fired, G_CONE)
@@ -466,9 +475,9 @@ def sliding_at_cone(
 
 
 def write_slips(n: InstantProblem, parts: Sequence[ProblemRow], found: tuple[np.ndarray, ...]) -> None:
-    """Modes and ways of all slips: they stick or slide where the gap is closed.
+    """Write modes and states of all slips: they stick or slide where the gap is closed.
 
-    ``found`` are states, forces, rates, and ways that are known.
+    ``found`` are states, forces, rates, and known directions.
     """
     state, x, u, lean = found
     W, ways = n.W, n.ways()
@@ -483,7 +492,7 @@ def write_slips(n: InstantProblem, parts: Sequence[ProblemRow], found: tuple[np.
             W.modes.mode[own], ways[own] = HELD, 0.0
             continue
         d = lean[rows]
-        if state[i] == DISC_SLIPS:  # the way it accelerates; against its friction, where that is none
+        if state[i] == DISC_SLIPS:  # in the direction of the acceleration; opposite to the friction force if that is zero
             d = u[rows] if np.linalg.norm(u[rows]) > 0.0 else -x[rows]
             d = d / np.linalg.norm(d)
         if n.mode[own[0]] == OFF and _slip_continues(n, own):
@@ -493,7 +502,7 @@ def write_slips(n: InstantProblem, parts: Sequence[ProblemRow], found: tuple[np.
 
 
 def _slip_begins(n: InstantProblem, slips: list[int], d: np.ndarray, u: np.ndarray) -> bool:
-    """Whether a slip in space has hardly any speed yet and gets faster the way d."""
+    """Return whether a spatial slip has hardly any speed yet and accelerates in the direction d."""
     speed = np.linalg.norm(n.rate[slips])
     return bool(speed <= n.still[slips].sum() or (speed < ONSET_SPEED * n.here.c.values.length and u @ d > 0.0))
 
@@ -502,7 +511,7 @@ SIDE_OF_GUARD = {G_LOWER: 1.0, G_UPPER: -1.0}
 
 
 def closed_bounds(n: InstantProblem, fired: np.ndarray) -> dict[int, tuple[float, ...]]:
-    """Of every stop the sides that it is at: +1 the lower one, -1 the upper one."""
+    """Return for every stop the bounds that it is at: +1 the lower one, -1 the upper one."""
     hit = {(s, SIDE_OF_GUARD[k]) for k, s, _ in (n.guarded[g] for g in fired) if k in SIDE_OF_GUARD}
     out = {}
     gone = gaps_beyond_edges(n)
@@ -518,7 +527,7 @@ def closed_bounds(n: InstantProblem, fired: np.ndarray) -> dict[int, tuple[float
 
 
 def switches_at_rest(n: InstantProblem, fired: np.ndarray) -> np.ndarray:
-    """Whether the rate of each switch is none, (ns,)."""
+    """Return whether the rate of each switch counts as zero, (ns,)."""
     still = np.abs(n.rate) <= n.still
     still[list(n.fired(fired, G_SLIDES, G_BACK))] = True
     mark_ended_slips(n, fired, still)
@@ -526,7 +535,7 @@ def switches_at_rest(n: InstantProblem, fired: np.ndarray) -> np.ndarray:
 
 
 def rows_of_velocities(n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray) -> list[ProblemRow]:
-    """Rows that impulses may act along."""
+    """Return the rows along which impulses may act."""
     out = []
     for s, kind in enumerate(n.kinds):
         if kind in STOP_KINDS and s in at:
@@ -552,7 +561,9 @@ def rows_of_velocities(n: InstantProblem, at: dict[int, tuple[float, ...]], stil
 
 
 def rows_of_accelerations(n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray) -> list[ProblemRow]:
-    """Rows that forces may act along: of those that move apart, or slide, only friction that follows its load."""
+    """Return the rows along which forces may act; of separating or sliding ones only friction that depends on its
+    load.
+    """
     out = []
     for s, kind in enumerate(n.kinds):
         if kind in STOP_KINDS and s in at and still[s]:
@@ -572,7 +583,7 @@ def rows_of_accelerations(n: InstantProblem, at: dict[int, tuple[float, ...]], s
 
 
 def _stop_rows(s: int, at: tuple[float, ...], state: int = AT_REST) -> list[ProblemRow]:
-    """One that is at both sides holds."""
+    """Return the row of a stop; a stop at both bounds is bilateral."""
     return [ProblemRow(s, BILATERAL)] if len(at) > 1 else [ProblemRow(s, UNILATERAL, at[0], state=state)]
 
 

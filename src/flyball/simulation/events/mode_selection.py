@@ -1,7 +1,7 @@
 """Mode selection: which rows hold, slide or open, from one complementarity problem of accelerations.
 
-Friction that cannot stick slides with its kinetic force, and the rest is decided again. Weakly active rows, at
-their bound with neither force nor acceleration, are decided by the problem a moment later.
+Friction that cannot stick slides with its kinetic force, and the other rows are decided again. Weakly active rows, at
+their bound with neither force nor acceleration, are decided by the problem at a slightly later time.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ from .instant_problem import (
     write_slips,
 )
 
-NO_ACCELERATION = 1e-7  # of the accelerations that one is the difference of: as good as none
-CLEAR_FORCE = 10.0  # times what is rounding: none of it
-LOOKAHEAD_FACTORS = (1.0, 1e2, 1e4)  # moments later, in parts of the first
-LOOKAHEAD_OF_STEP, LOOKAHEAD_OF_SPAN = 1e-6, 1e-9  # the first: part of the step before, of the time of the motion
-DEPENDENT_ROW = 1e-11  # of a row's own response: it moves with others
+NO_ACCELERATION = 1e-7  # part of its terms below which an acceleration counts as zero
+CLEAR_FORCE = 10.0  # factor of rounding above which a force is clearly nonzero
+LOOKAHEAD_FACTORS = (1.0, 1e2, 1e4)  # later times that are tried, relative to the first
+LOOKAHEAD_OF_STEP, LOOKAHEAD_OF_SPAN = 1e-6, 1e-9  # first lookahead, relative to the last step, or to the duration
+DEPENDENT_ROW = 1e-11  # part of a row's own response below which it depends on other rows
 ONE_SIDED_KINDS = (STOP, RATCHET, ONE_WAY)
-FORCE_GUARDS = (G_PULL, G_HOLDS, G_CONE)  # guards of forces of what holds
+FORCE_GUARDS = (G_PULL, G_HOLDS, G_CONE)  # guards of the forces of active rows
 
 
 def weakly_active(n: InstantProblem, found: ModeDecision) -> list[int]:
-    """Rows that could push and do not, and that do not part either."""
+    """Return the one-sided rows at their bound that carry no force and do not open either."""
     led = {p.of for p in found.parts}
     return [
         i
@@ -68,7 +68,7 @@ def weakly_active(n: InstantProblem, found: ModeDecision) -> list[int]:
 
 
 def activate_pressing_rows(n: InstantProblem, found: ModeDecision) -> None:
-    """Have those hold, with no force yet, that push a moment later."""
+    """Activate, with no force yet, the weakly active rows that push a moment later."""
     rows = weakly_active(n, found)
     if not rows:
         return
@@ -93,7 +93,7 @@ def activate_pressing_rows(n: InstantProblem, found: ModeDecision) -> None:
         for i in sorted(open_):
             if P.state[i] == AT_REST and P.x[i] * P.A[i, i] > CLEAR_FORCE * P.grain[i]:
                 found.state[i] = AT_REST
-                found.parts[i] = parts[i]  # it pushes, and is watched for that
+                found.parts[i] = parts[i]  # it pushes, and its guard is evaluated
             if abs(P.u[i]) > CLEAR_FORCE * P.grain[i] or found.state[i] == AT_REST:
                 open_.discard(i)
     here.y[:], here.clock.real.t = y, t
@@ -101,7 +101,7 @@ def activate_pressing_rows(n: InstantProblem, found: ModeDecision) -> None:
 
 
 def rows_tied_to_bound(n: InstantProblem, found: ModeDecision) -> frozenset[tuple[int, int]]:
-    """Guards, as (kind, switch), of rows that are at their ends and that what holds keeps there."""
+    """Return the guards, as (kind, switch), of rows at their bounds that other active rows keep there."""
     out: set[tuple[int, int]] = set()
     held = [i for i in range(len(found.parts)) if found.state[i] == AT_REST and found.A[i, i] > 0.0]
     rows = weakly_active(n, found)
@@ -119,7 +119,7 @@ def rows_tied_to_bound(n: InstantProblem, found: ModeDecision) -> frozenset[tupl
 
 
 def _moved_by_drivers(n: InstantProblem, B: ModeProblem, i: int, others: tuple[list[int], np.ndarray]) -> bool:
-    """Whether row i, less what holds it, does work on what drivers prescribe: these move it then."""
+    """Return whether row i, less the active rows, does work on what drivers prescribe: then the drivers move it."""
     held, c = others
     axes = n.S.tree.v[n.S.tree.law >= 0]
     rows = n.S.rows.work >= 0
@@ -131,9 +131,9 @@ def _moved_by_drivers(n: InstantProblem, B: ModeProblem, i: int, others: tuple[l
 
 
 def write_rounding_levels(here: EventContext, loop: GuardedLoop) -> None:
-    """Have the loop know which forces are rounding, and what is kept at its end by others.
+    """Write into the loop which forces are rounding, and which guards are tied to their bounds by other rows.
 
-    Of the latter a rate is none by which nothing gets anywhere.
+    For quantities held at zero rate, a negligible rate is written as well.
     """
     loop.desk.tied[:] = loop.desk.still[:] = loop.desk.least[:] = 0.0
     if here.still:
@@ -148,16 +148,17 @@ def write_rounding_levels(here: EventContext, loop: GuardedLoop) -> None:
                 loop.desk.tied[g] = n.unit[s] * (n.pace if kind == G_BACK else 1.0)
 
 
-ACCELERATION_TOLERANCE = 1e-7  # of the accelerations that an acceleration is the difference of: as good as none
-MOST_PASSES = 20  # times that others are asked again after some began to slide
+ACCELERATION_TOLERANCE = 1e-7  # part of its terms below which an acceleration counts as zero
+MOST_PASSES = 20  # largest number of solves after rows began to slide
 
 
 @dataclass
 class ModeDecision:
-    """Modes at an instant: rows that took part, and the problem as it was solved.
+    """Modes at an instant: the rows that took part, and the solved problem.
 
-    ``sizes`` has of each switch the forces that its own is the difference of; ``taken_up``: all of them hold, by shares
-    that are clearly within their bounds; ``least``: of each switch the force that rounding of accelerations makes.
+    ``sizes``: for each switch the sum of the force terms whose difference its force is. ``least``: for each switch the
+    force caused by rounding of accelerations. ``all_rows_hold``: all rows hold, by a distribution clearly within their
+    bounds.
     """
 
     parts: list[ProblemRow]
@@ -177,17 +178,17 @@ class ModeDecision:
 def decide_modes(
     n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray
 ) -> ModeDecision:
-    """Modes by one problem of accelerations, into the motion; ``n`` has looked there.
+    """Decide the modes by one problem of accelerations and write them into the motion; ``n`` is evaluated there.
 
-    What a guard says has reached the end of what it holds lets go where that is against no rule: not for the sake of
-    rounding, and not where redundancy leaves open who carries what, should it be held on to.
+    A row whose guard has reached its limit is released if that violates no rule: not because of rounding, and not where
+    redundancy leaves the distribution of forces undetermined and the row can still be held.
     """
     found = solve_rows(n, rows_of_accelerations(n, at, still))
     parts = found.parts
     let_go = _rows_at_limit(n, found, fired) if found.ended == SOLUTION_FOUND else {}
     if (
         let_go and n.shares and (others := solve_rows(n, parts, all_hold=True)).all_rows_hold
-    ):  # what touches can carry more from here on
+    ):  # closed contacts can carry more from here on
         found, let_go = others, {}
     if found.ended == SOLUTION_FOUND:
         let_go |= released_by_group(n, parts, fired)
@@ -205,7 +206,7 @@ def decide_modes(
 
 
 def _rows_at_limit(n: InstantProblem, found: ModeDecision, fired: np.ndarray) -> dict[int, ProblemRow]:
-    """Rows that hold and whose guards fired, as they are when they do not; friction that carries nothing holds on."""
+    """Return active rows whose guards triggered, as released rows; friction that carries nothing stays active."""
     ends = {s: kind for kind, s, _ in (n.guarded[g] for g in fired) if kind in (G_PULL, G_HOLDS)}
     out = sliding_at_cone(n, found.parts, (found.x, found.state, found.reach, np.full(len(found.x), np.inf)), fired)
     asked = {(G_PULL, UNILATERAL), (G_HOLDS, FRICTION_LINE)}
@@ -217,7 +218,7 @@ def _rows_at_limit(n: InstantProblem, found: ModeDecision, fired: np.ndarray) ->
 
 
 def _violates_rule(n: InstantProblem, found: ModeDecision, i: int) -> bool:
-    """Whether row i, which was let go, moves against its rule; of rows that slip together whether both do."""
+    """Return whether the released row i moves against its rule; of two slip rows they are tested together."""
     p = found.parts[i]
     least = ACCELERATION_TOLERANCE * found.sizes[p.switch] * found.A[i, i] + n.negligible_acceleration[p.switch]
     if p.rule != SLIDING:
@@ -227,7 +228,7 @@ def _violates_rule(n: InstantProblem, found: ModeDecision, i: int) -> bool:
 
 
 def _released_row(p: ProblemRow, x: float) -> ProblemRow:
-    """The same row when it does not hold any more."""
+    """Return the row as it is after its release."""
     if p.rule == UNILATERAL:
         return p._replace(rule=INACTIVE)
     way = -1.0 if x > 0.0 else 1.0
@@ -235,13 +236,13 @@ def _released_row(p: ProblemRow, x: float) -> ProblemRow:
 
 
 def solve_rows(n: InstantProblem, parts: list[ProblemRow], *, all_hold: bool = False) -> ModeDecision:
-    """The problem solved; what begins to slide slides with what it carries then.
+    """Solve the problem; rows that begin to slide carry their kinetic friction.
 
-    ``all_hold``: all that touches holds if it can, though less would do.
+    ``all_hold``: all closed rows hold if they can, even if fewer would suffice.
     """
     B, P, _ = n.problem(parts)
     free = [i for i in range(len(parts)) if P.rule[i] != FRICTION_LINE or P.A[i, i] > 0.0]
-    if len(free) < len(parts):  # nothing free moves it, so its row cannot hold it
+    if len(free) < len(parts):  # no freedom moves it, so its row cannot hold it
         parts = [parts[i]._replace(of=free.index(parts[i].of) if parts[i].of >= 0 else -1) for i in free]
         B, P, _ = n.problem(parts)
     ended, resting = SOLUTION_FOUND, np.zeros(len(parts), bool)
@@ -272,12 +273,12 @@ def solve_rows(n: InstantProblem, parts: list[ProblemRow], *, all_hold: bool = F
 
 
 def element_titles(n: InstantProblem, parts: list[ProblemRow]) -> list[str]:
-    """Titles of the elements that rows are of."""
+    """Return the titles of the elements of rows."""
     return list(dict.fromkeys(n.here.structure.switches[p.switch].element.title for p in parts))
 
 
 def remove_residual_rates(n: InstantProblem, found: ModeDecision) -> None:
-    """Take the rounding from the rates of what holds."""
+    """Remove the rounding from the rates of active rows."""
     room = n.workspaces[len(found.parts)]
     B, P = room.B, room.P
     held = [i for i, p in enumerate(found.parts) if found.state[i] == AT_REST and n.rate[p.switch] != 0.0]
@@ -289,7 +290,7 @@ def remove_residual_rates(n: InstantProblem, found: ModeDecision) -> None:
 
 
 def write_modes(n: InstantProblem, found: ModeDecision, still: np.ndarray) -> None:
-    """Modes, ways and places to hold into the motion."""
+    """Write modes, switch states and held values into the motion."""
     W, ways, taking = n.W, n.ways(), {p.switch for p in found.parts}
     for s, kind in enumerate(n.kinds):
         if kind in DECIDED_KINDS and n.m[s] >= 0:
@@ -311,19 +312,19 @@ def write_modes(n: InstantProblem, found: ModeDecision, still: np.ndarray) -> No
     write_sharing_group(n, found.parts, (found.state, found.A, found.gain, found.x, found.reach))
     if len(n.S.load_terms.load):
         W.counts.load_updates = SLOPES_UNKNOWN
-        W.sensed[LOAD, 2 * len(n.here.structure.measured) : n.first] = 0.0  # of two solutions the one from no load
+        W.sensed[LOAD, 2 * len(n.here.structure.measured) : n.first] = 0.0  # of two solutions take the one reached from zero load
 
 
-# Rates that events name and that what holds keeps at zero: what is seen of these is the rounding of what holds.
+# Rates in event expressions that active rows keep at zero: their values are rounding.
 
 
-DEPENDENT_RESPONSE = 1e-11  # of its own response: it moves with what holds
+DEPENDENT_RESPONSE = 1e-11  # part of its own response below which a rate depends on the active rows
 
 
 def held_rates(n: InstantProblem, found: ModeDecision) -> tuple[int, ...]:
-    """Measured quantities whose rates events name, that could move and that what holds now keeps still.
+    """Return measured quantities whose rates events name, that could move, and that active rows keep at rest.
 
-    What cannot move by anything here, as a slider at its dead centre, is none of them, nor is what a driver moves.
+    Quantities that nothing here can move (a slider at its dead centre) or that a driver moves are not among them.
     """
     held = [i for i in range(len(found.parts)) if found.state[i] == AT_REST and found.A[i, i] > 0.0]
     named = _rates_in_events(n) if held else []
@@ -354,7 +355,7 @@ def held_rates(n: InstantProblem, found: ModeDecision) -> tuple[int, ...]:
 
 
 def _rates_in_events(n: InstantProblem) -> list[int]:
-    """Measured quantities whose rates expressions of events name."""
+    """Return measured quantities whose rates are named in event expressions."""
     s = n.here.structure
     found: list[int] = s.kept.get("rates of events", 0, 1, lambda: _find_rates_in_events(s))
     return found

@@ -1,12 +1,12 @@
 """Nonsmooth laws: the side of each corner (abs, max, sign), crossing it or sliding along it (Filippov).
 
-The rates of all u at the corner depend on the sides s there, du/dt = d + B s: on s = 1 they must not fall, on s =
--1 not rise, and where both sides push towards u = 0 they are zero, with s between (Filippov, *Differential
+The rates of all arguments u at their corners depend on the sides s: du/dt = d + B s. On s = 1 u must not fall, on
+s = -1 not rise. Where both sides push towards u = 0, du/dt is zero, with s between -1 and 1 (Filippov, *Differential
 Equations with Discontinuous Righthand Sides*, 1988, section 4).
 
-With friction -sign(v) beside a relay -sign(x) each pair of oscillations is shorter than the one before by the same
-ratio, and after a finite time x and v are zero (the twisting algorithm: Levant, *International Journal of Control*
-58, 1993). Once the oscillations are below rounding the rest of the series is taken at once.
+With friction -sign(v) and a relay -sign(x) each pair of oscillations is shorter than the one before by the same ratio,
+and after a finite time x and v are zero (the twisting algorithm: Levant, *International Journal of Control* 58, 1993).
+Once the oscillations are below rounding, the rest of the series is taken at once.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from ...tables.table_definitions import G_CORNER, HELD, OFF, STEADY, VALUE
 from .impacts import LOW_FLIGHT
 from .instant_problem import RATE_TOLERANCE, InstantProblem
 
-PASSAGES_OF_SERIES = 4  # ways through a corner that tell whether swings get shorter
-CONVERGING_RATIO = 0.999  # ratio of two swings and the two before them: a series with an end
+PASSAGES_OF_SERIES = 4  # passages through a corner that show whether oscillations get shorter
+CONVERGING_RATIO = 0.999  # largest ratio of successive pairs of oscillations of a converging series
 
 
 class Corner(NamedTuple):
-    """A function u whose sign a law asks for, at the state last evaluated.
+    """A function u on whose sign a law depends, at the state last evaluated.
 
     Attributes
     ----------
     row : ndarray (nv,)
-        Slopes of its rate by velocities.
+        Derivatives of its rate by velocities.
     rates : bool
-        Whether u depends on rates, so that ``row`` is of u itself, and du/dt of accelerations.
+        Whether u depends on rates; then ``row`` has the derivatives of u itself, and du/dt depends on accelerations.
     size : float
-        The mechanism's length, or a radian, in units of u; with rates those at the rate `instant_problem.reference_rate`.
+        The mechanism's length, or a radian, in units of u; with rates times `instant_problem.reference_rate`.
     still : float
-        Rounding of what ``row`` is the slope of.
+        Rounding of the quantity that ``row`` is the derivative of.
     grain : float
         Rounding of u.
     """
@@ -57,13 +57,13 @@ class Corner(NamedTuple):
 
 
 def corner_derivatives(n: InstantProblem, s: int, seed: int) -> tuple[float, float, float]:
-    """The u of a corner and its derivatives, by what ``seed`` says (`laws.evaluation.evaluate_jet`)."""
+    """Return u of a corner and its derivatives along ``seed`` (`laws.bytecode.evaluate_jet`)."""
     law = int(n.S.switches.law[s])
     return evaluate_jet(n.S.code, n.S.const, law, n.W.stack, n.here.t, n.W.sensed, seed)
 
 
 def corner_at(n: InstantProblem, s: int) -> Corner:
-    """The corner of switch s."""
+    """Return the corner of switch s."""
     S, W, v = n.S, n.W, n.here.v
     nm, nr = count_measured(S), len(S.rows.law)
     terms, rows = n.here.structure.terms, len(n.here.structure.rows)
@@ -86,7 +86,7 @@ def corner_at(n: InstantProblem, s: int) -> Corner:
 
 
 def note_passage(n: InstantProblem, s: int) -> None:
-    """Keep in mind that the motion passes the corner of switch s now."""
+    """Store the present time as a passage through the corner of switch s."""
     past = n.here.corner_passages.setdefault(s, [])
     if not past or n.here.t > past[-1]:
         past.append(n.here.t)
@@ -94,9 +94,9 @@ def note_passage(n: InstantProblem, s: int) -> None:
 
 
 def remaining_time(n: InstantProblem, s: int) -> float:
-    """How long [s] all swings to come last together, by those of late; nan if they do not get shorter.
+    """Return the total duration [s] of all oscillations to come, by the last ones; nan if they do not get shorter.
 
-    Swings to one side and to the other are two series of one ratio.
+    Oscillations to one side and to the other are two series with the same ratio.
     """
     past = n.here.corner_passages.get(s, [])
     if len(past) < PASSAGES_OF_SERIES:
@@ -107,18 +107,20 @@ def remaining_time(n: InstantProblem, s: int) -> float:
 
 
 def below_rounding(n: InstantProblem, s: int, rate: float, acceleration: float) -> bool:
-    """Whether the next swing is none: its height, rate^2 / (2 acceleration), is rounding."""
+    """Return whether the height of the next oscillation, rate^2 / (2 acceleration), is rounding."""
     return rate * rate <= 2.0 * acceleration * LOW_FLIGHT * corner_at(n, s).size
 
 
 def remove_rates(n: InstantProblem, rows: np.ndarray, misses: np.ndarray) -> None:
-    """Take from the velocities what row v is too much, by the smallest change in the metric of the masses."""
+    """Subtract the excess ``misses`` of row v from the velocities, by the smallest change in the metric of the
+    masses.
+    """
     Y = np.column_stack([n.response(row)[0] for row in rows])
     n.here.v[:] -= Y @ np.linalg.lstsq(rows @ Y, misses, rcond=1e-9)[0]
 
 
 def inverse_of_slopes(B: np.ndarray) -> np.ndarray:
-    """Sides by rates, the inverse of B; where B is singular they bear in proportion to what they can."""
+    """Return the inverse of B (sides by rates); where B is singular, sides are scaled in proportion to their effects."""
     scale = 1.0 / np.maximum(np.abs(B).max(axis=1), 1e-300)
     N = scale[:, None] * B
     most = np.linalg.norm(N, axis=0)
@@ -126,22 +128,23 @@ def inverse_of_slopes(B: np.ndarray) -> np.ndarray:
     return np.asarray(W[:, None] * N.T @ np.linalg.pinv((N * W) @ N.T, rcond=1e-9) * scale)
 
 
-CORNER_ROUNDING = 1e-12  # of the terms that u is the sum of: as good as zero
-SIDE_REACHED = 1e-9  # how near to 1 the side is where the motion leaves a corner
-LEVEL_RATE = 1e-9  # part of what sides can do to du/dt, or of du/dt on both sides, that is nothing
+CORNER_ROUNDING = 1e-12  # part of its terms below which u counts as zero
+SIDE_REACHED = 1e-9  # distance of the side from 1 at which the motion leaves a corner
+LEVEL_RATE = 1e-9  # part of the effect of sides on du/dt, or of du/dt on both sides, that counts as zero
 RELAXATION_SWEEPS = 500
-HISTORY_FACTOR = 1e3  # times rounding: where the motion is held on a corner it is still there
-THROWN_FACTOR = 10.0  # times what is left of u where its corner was found: farther off by a jump of velocities
-SAME_RATE = 1e-6  # of u: what is left of it where the same rate that is taken away was all of it
-TIME_RESOLUTION = 1e-12  # of the time: to that the instant is known at which u passes zero
-LOOKAHEAD_SHARE = 1e-7  # part of the time span by which it is tried where the motion goes, at most
-LOOKAHEAD_STEP_SHARE = 1e-3  # part of the width of steps, where that is less
+HISTORY_FACTOR = 1e3  # factor of rounding within which a motion held on a corner is still there
+THROWN_FACTOR = 10.0  # factor of the residual of u beyond which a jump of velocities moved it off its corner
+SAME_RATE = 1e-6  # part of u below which the removed rate was all of u
+TIME_RESOLUTION = 1e-12  # relative accuracy of the time at which u crosses zero
+LOOKAHEAD_SHARE = 1e-7  # largest lookahead, relative to the time span
+LOOKAHEAD_STEP_SHARE = 1e-3  # largest lookahead, relative to the step width
 
 
 class CornerProblem(NamedTuple):
-    """Corners and what sides do to them: du/dt = d + B sides, of the second ones d^2u/dt^2; and the sides that follow.
+    """Corners and the effects of their sides: du/dt = d + B sides (d^2u/dt^2 for those in ``second``); and the
+    solution.
 
-    ``held``: with a side between, ``left``: where the motion has come to the end of such a one.
+    ``held``: corners with a side between -1 and 1; ``left``: held corners whose side has reached its end.
     """
 
     which: list[int]
@@ -175,12 +178,12 @@ class Corners:
         self.velocity_at_guard = n.here.v.copy()
 
     def begin(self) -> None:
-        """Sides as the motion begins."""
+        """Set the sides at the start of the motion."""
         self.n.ask(MOTION)
         for s in self.all.tolist():
             u, least = self.value(s)
             if self.n.W.modes.mode[s] != OFF and abs(u) <= HISTORY_FACTOR * max(least, corner_at(self.n, s).grain):
-                self.at.add(s)  # it goes on
+                self.at.add(s)  # it stays held
                 continue
             self.n.ways()[s] = 1.0 if u >= 0.0 else -1.0
             if abs(u) <= self._nothing(s, u, least):
@@ -188,14 +191,14 @@ class Corners:
         self.n.ask(MOTION)
 
     def fired(self, guards: np.ndarray) -> None:
-        """Take note of guards that fired, and of the velocities with which they did."""
+        """Note the guards that triggered, and the velocities at that time."""
         found = self.n.fired(guards, G_CORNER)
         astray = found & self.n.here.astray
         self.at |= found - astray - self._carried(found - astray)
         self.velocity_at_guard = self.n.here.v.copy()
 
     def _carried(self, found: set[int]) -> set[int]:
-        """Corners that what jumps with time, or a sample, has carried to the other side: u has not passed zero."""
+        """Return corners moved to the other side by a jump in time or a sampling: u has not crossed zero there."""
         n, real = self.n, self.n.here.clock.real
         if not found:
             return found
@@ -211,12 +214,12 @@ class Corners:
         return {s for s in off if abs(now[s][0]) > late * fast[s]}
 
     def _lookahead(self) -> float:
-        """How far ahead it is tried where the motion goes [s]."""
+        """Return the lookahead [s] for testing where the motion goes."""
         real = self.n.here.clock.real
         return min(LOOKAHEAD_SHARE * float(real.span), LOOKAHEAD_STEP_SHARE * float(real.h) or np.inf)
 
     def settle(self) -> bool:
-        """Decide all sides. Returns whether forces jump by that."""
+        """Decide all sides. Returns whether forces jump as a result."""
         if not len(self.all):
             return False
         n, ways = self.n, self.n.ways()
@@ -234,7 +237,7 @@ class Corners:
                 n.W.modes.mode[s] = OFF
             if abs(u) > self._nothing(s, u, least):
                 ways[s] = np.sign(u)
-            else:  # as of a rate that something has held: its side is rounding, where it goes now is not
+            else:  # for example a rate that was held at zero: its sign is rounding, but its direction now is not
                 self.at.add(s)
         jumps = self.decide() if self.at else False
         moved = bool((np.abs(ways[self.all] - before) > 1e-6).any())
@@ -244,11 +247,11 @@ class Corners:
         return jumps
 
     def _not_at(self, before: np.ndarray) -> bool:
-        """Whether a side changed away from zero: a jump of velocities made it."""
+        """Return whether a side changed away from zero, by a jump of velocities."""
         return any(s not in self.at and w != self.n.ways()[s] for s, w in zip(self.all.tolist(), before, strict=True))
 
     def _moved_off_by_jump(self) -> set[int]:
-        """Corners that a jump of velocities has taken off zero."""
+        """Return the corners that a jump of velocities has moved off zero."""
         n, v = self.n, self.n.here.v.copy()
         if not self.at or (v == self.velocity_at_guard).all():
             return set()
@@ -265,7 +268,7 @@ class Corners:
         }
 
     def value(self, s: int) -> tuple[float, float]:
-        """The u of a corner at the state last evaluated, and what of it is rounding."""
+        """Return u of a corner at the state last evaluated, and its rounding."""
         S, W, t = self.n.S, self.n.W, self.n.here.t
         size = abs(t * corner_derivatives(self.n, s, BY_TIME)[1])
         for m in range(2 * count_measured(S)):
@@ -273,13 +276,13 @@ class Corners:
         return float(corner_value(S, W, t, s)), CORNER_ROUNDING * float(size)
 
     def _nothing(self, s: int, u: float, least: float) -> float:
-        """What of u is no side: of a rate, which something may hold, what is rounding of it there, too."""
+        """Return the size of u below which its sign is rounding, including that of rates that may be held."""
         if abs(u) <= least or not (found := corner_at(self.n, s)).rates:
             return least
         return max(least, found.still)
 
     def rates(self, which: list[int], signs: np.ndarray, second: list[int]) -> np.ndarray:
-        """How fast u of these corners changes with these sides; of the second ones, how fast the rate of u does."""
+        """Return the rates of u of these corners for these sides; for those in ``second`` the second derivatives."""
         n = self.n
         n.ways()[which] = signs
         n.ask(MOTION)
@@ -289,7 +292,7 @@ class Corners:
         return n.W.modes.drift[which].copy()
 
     def pushed(self, which: list[int], second: list[int]) -> CornerProblem:
-        """What sides do to these corners."""
+        """Return the effects of the sides on these corners, and the sides that satisfy the conditions."""
         d = self.rates(which, np.zeros(len(which)), second)
         B = self._effects(which, d, second)
         size = np.abs(d) + np.abs(B).sum(axis=1)
@@ -299,7 +302,7 @@ class Corners:
         sides = _relaxed_branches(d, B, old)
         sides = np.where(left & (np.abs(sides) > 0.5), np.sign(old), sides)
         none = (np.abs(d + B @ sides) <= LEVEL_RATE * size) & (np.diag(B) < 0.0) & ~left
-        if none.any():  # in proportion to what they can, where the equations leave it open
+        if none.any():  # in proportion to their effects, where the equations are underdetermined
             even = sides.copy()
             even[none] = -inverse_of_slopes(B[np.ix_(none, none)]) @ (d[none] + B[np.ix_(none, ~none)] @ sides[~none])
             if (np.abs(even[none]) < 1.0).all() and (np.abs(B @ (even - sides))[none] <= LEVEL_RATE * size[none]).all():
@@ -308,11 +311,11 @@ class Corners:
         return CornerProblem(which, second, d, B, size, sides, held, left)
 
     def _effects(self, which: list[int], d: np.ndarray, second: list[int]) -> np.ndarray:
-        """What each side does to each rate beyond d."""
+        """Return the effect of each side on each rate, beyond d."""
         return np.column_stack([self.rates(which, e, second) - d for e in np.eye(len(which))])
 
     def _of_rounding(self, which: list[int], second: list[int], B: np.ndarray) -> np.ndarray:
-        """What of B is made by what is left of u: a side of abs(u) does nothing where u is zero."""
+        """Return the part of B caused by the residual of u: the side of abs(u) has no effect where u is zero."""
         n, out, v = self.n, np.zeros_like(B), self.n.here.v.copy()
         n.ask(MOTION)
         held = [(s, at) for s in which if (at := corner_at(n, s)).rates and abs(self.value(s)[0]) <= at.still]
@@ -326,7 +329,7 @@ class Corners:
         return out
 
     def decide(self) -> bool:
-        """Sides of the corners that the motion is at. Returns whether forces depend on them."""
+        """Decide the sides of the corners that the motion is at. Returns whether forces depend on them."""
         n, W = self.n, self.n.W
         which = sorted(self.at)
         self.sides = n.ways().copy()
@@ -347,7 +350,7 @@ class Corners:
         return bool(found.B.any())
 
     def ended(self, found: CornerProblem) -> CornerProblem:
-        """The same, with the corners on which swings have come to their end: the motion may rest on these."""
+        """Return the problem with the corners on which oscillations have ended: the motion may rest on these."""
         n, y, ways = self.n, self.n.here.y.copy(), self.n.ways().copy()
         n.ways()[found.which] = found.sides
         n.ask(MOTION)
@@ -384,7 +387,9 @@ class Corners:
         return found if not still else self.pushed(found.which, still)
 
     def _hold(self, which: list[int], found: CornerProblem) -> None:
-        """Hold the motion on these corners: u is put to zero by what moves it least, and the slopes are known."""
+        """Hold the motion on these corners: u is set to zero by the smallest change, and the inverse slopes are
+        stored.
+        """
         n, W = self.n, self.n.W
         inverse = inverse_of_slopes(found.B[np.ix_(found.held, found.held)])
         n.ask(MOTION)
@@ -399,7 +404,7 @@ class Corners:
         remove_rates(n, rows, misses)
 
     def _choose_side_by_trial(self, which: list[int], k: int, signs: np.ndarray, old: np.ndarray) -> None:
-        """The side on which the motion goes on where u does not change at once: it is tried."""
+        """Choose the side on which the motion continues by trial, where u does not change at first order."""
         n, s = self.n, which[k]
         fits = []
         for side in (1.0, -1.0):
@@ -409,7 +414,7 @@ class Corners:
         n.ways()[s] = fits[0] if len(fits) == 1 else (np.sign(old[k]) or 1.0)
 
     def _predicted_values(self, which: list[int]) -> list[tuple[float, float]]:
-        """The `value` of each of these corners a little later, if sides are as they stand: by the midpoint rule."""
+        """Return the `value` of each of these corners a little later with the present sides, by the midpoint rule."""
         n = self.n
         t, y, real = n.here.t, n.here.y.copy(), n.here.clock.real
         h = self._lookahead()
@@ -422,7 +427,7 @@ class Corners:
         return out
 
     def _goes_on(self, which: list[int], found: CornerProblem) -> None:
-        """Refuse a point where several corners meet and sides lead back at once: none of them is one to go on."""
+        """Refuse a point where several corners meet and every choice of sides leads back at once."""
         n = self.n
         back = [
             s for s, (u, least) in zip(which, self._predicted_values(which), strict=True) if n.ways()[s] * u < -least
@@ -453,9 +458,9 @@ class Corners:
 
 
 def _relaxed_branches(d: np.ndarray, B: np.ndarray, old: np.ndarray) -> np.ndarray:
-    """Sides with which no u leaves the side that its law is on: by projected relaxation, row by row.
+    """Return sides for which no u leaves the side of its law, by projected relaxation, row by row.
 
-    Where both ways lead away from a corner the motion goes on across it.
+    Where both sides lead away from a corner, the motion crosses it.
     """
     out = np.where(np.abs(old) == 1.0, -np.sign(old), 0.0)
     for _ in range(RELAXATION_SWEEPS):

@@ -1,9 +1,9 @@
-"""Resolution of an instant: actions, jumps of velocities and modes, repeated until nothing violates its rule.
+"""Resolution of an instant: actions, jumps of velocities and modes, repeated until no rule is violated.
 
-Elastic stops and ratchets need no problem. Where friction grows with the load that it makes itself, rigid bodies
-may have no accelerations, or several (Painleve 1895): of several the one is taken that continues the modes before;
-with none velocities jump without a collision, the impulses being the limit of a time step that goes to zero
-(Stewart 2000, SIAM Review 42).
+Elastic stops and ratchets need no complementarity problem. Where friction grows with the load that it causes,
+rigid-body equations may have no solution for the accelerations, or several (Painleve 1895). Of several the one is
+taken that continues the modes before. With none, velocities jump without a collision; the impulses are the limit of a
+time step that tends to zero (Stewart 2000, SIAM Review 42).
 """
 
 from __future__ import annotations
@@ -67,17 +67,19 @@ from .instant_problem import (
 from .mode_selection import ModeDecision, decide_modes, element_titles, remove_residual_rates
 from .nonsmooth_laws import Corners
 
-SLOW_ACCELERATION = 1e-9  # of the mechanism's length (of a radian), at its own rate: an acceleration that is none
-TOOTH_TOLERANCE = 1e-9  # of the pitch: as good as at a tooth
-UNDECIDED_SIDE = 0.0  # way of an elastic switch whose force looks where it is
+SLOW_ACCELERATION = 1e-9  # negligible acceleration, relative to length (or a radian) times the squared rate
+TOOTH_TOLERANCE = 1e-9  # part of the pitch within which a tooth is reached
+UNDECIDED_SIDE = 0.0  # state of an elastic switch whose force follows from its position
 
 
 def update_ratchets(n: InstantProblem, still: np.ndarray) -> None:
-    """Ratchets that do not hold: going on, or back to the last tooth that was passed; ``still``: those at rest."""
+    """Update ratchets that do not hold: moving forwards, or back to the last passed tooth; ``still``: switches at
+    rest.
+    """
     for s in n.of(RATCHET):
         first, n.W.modes.upper[s] = n.W.modes.upper[s] < np.inf, np.inf
         if n.mode[s] != OFF:
-            n.W.modes.lower[s] = n.hold[s]  # of a motion that goes on, too
+            n.W.modes.lower[s] = n.hold[s]  # for continued motions too
         elif n.rate[s] > 0.0 and not still[s]:
             _move_freely(n, s)
         elif first or n.way[s] >= 0.0:
@@ -87,8 +89,9 @@ def update_ratchets(n: InstantProblem, still: np.ndarray) -> None:
 
 
 def release_ratchets(n: InstantProblem, hit: Collection[int]) -> None:
-    """Ratchets whose tooth let go, or threw back what it was ``hit`` by, go on, and those that begin to; modes are
-    decided.
+    """Set ratchets free whose tooth opened or rebounded from an impact (``hit``), and those that begin to move.
+
+    The modes are decided already.
     """
     for s in n.of(RATCHET):
         if n.W.modes.mode[s] != OFF:
@@ -105,13 +108,13 @@ def release_ratchets(n: InstantProblem, hit: Collection[int]) -> None:
 
 
 def _move_freely(n: InstantProblem, s: int) -> None:
-    """No tooth is in the way until it turns round."""
+    """Remove the bound of a ratchet until it reverses."""
     n.ways()[s] = n.way[s] = 1.0
     n.W.modes.lower[s] = -np.inf
 
 
 def _switch_acceleration(n: InstantProblem, s: int) -> float:
-    """Second derivative of a quantity with the modes as they stand."""
+    """Return the second derivative of a quantity with the present modes."""
     n.ask(MOTION)
     nq = n.S.sizes.coordinates
     vdot = n.desk.K[0, nq : nq + n.here.structure.nv]
@@ -119,9 +122,9 @@ def _switch_acceleration(n: InstantProblem, s: int) -> float:
 
 
 def update_elastic_stops(n: InstantProblem, fired: np.ndarray, previous: np.ndarray) -> None:
-    """Which sides of elastic stops are pressed now; ``n`` has looked there.
+    """Set which sides of elastic stops are pressed; ``n`` is evaluated there.
 
-    What fired is pressed if it was open by the ``previous`` before the instant, and the other way round.
+    A side whose guard triggered is pressed if it was open according to ``previous``, and open if it was pressed.
     """
     for s in n.of(ELASTIC):
         hit = {k for k, of, _ in (n.guarded[g] for g in fired) if of == s}
@@ -129,7 +132,7 @@ def update_elastic_stops(n: InstantProblem, fired: np.ndarray, previous: np.ndar
 
 
 def _pressed_side(n: InstantProblem, s: int, old: float, hit: set[int]) -> float:
-    """1 if pressed at the lower side, -1 at the upper, 0 if open; `UNDECIDED_SIDE` less `FROZEN` where nothing tells."""
+    """Return 1 if pressed at the lower side, -1 at the upper, 0 if open; `UNDECIDED_SIDE` less `FROZEN` if undecided."""
     k, c = n.S.switch_numbers.stiffness[s], n.S.switch_numbers.damping[s]
     now = 0.0
     bounds = n.W.modes.lower, n.W.modes.upper
@@ -153,14 +156,14 @@ def _pressed_side(n: InstantProblem, s: int, old: float, hit: set[int]) -> float
     return now
 
 
-DIFFERENT_SOLUTION = 1e-6  # of the accelerations: they are others
-NULL_EIGENVALUE = 1e-9  # of the largest eigenvalue: nothing tells rows apart
-LIMIT_STEP = 1e-9  # part of the speed that forces make in a step of time that goes to zero
-IMPULSE_FACTOR = 1e3  # times the impulse that forces make in it: a blow
+DIFFERENT_SOLUTION = 1e-6  # relative difference of accelerations of another solution
+NULL_EIGENVALUE = 1e-9  # relative eigenvalue below which rows are linearly dependent
+LIMIT_STEP = 1e-9  # relative velocity change by forces in the time step that tends to zero
+IMPULSE_FACTOR = 1e3  # ratio to the impulse of forces in that step above which an impulse is a velocity jump
 
 
 def report_indeterminacy(n: InstantProblem, found: ModeDecision) -> None:
-    """Say what is left open at this instant, of the same elements once in a motion."""
+    """Add remarks on what is undetermined at this instant, once per element in a motion."""
     if not found.gain.any():
         return
     if (said := _several_solutions(n, found)) and not any(x.endswith(said) for x in n.here.doubts):
@@ -170,7 +173,7 @@ def report_indeterminacy(n: InstantProblem, found: ModeDecision) -> None:
 
 
 def report_distribution(n: InstantProblem, guards: Sequence[int]) -> None:
-    """Say whose shares of what holds a body no guard watches: it holds by others than those that are computed."""
+    """Add a remark on elements that hold only by a force distribution other than the computed one."""
     group = np.flatnonzero(n.W.modes.shared).tolist()
     own = [x for g in guards for x in (group if n.guarded[g][0] == G_SHARED else [n.guarded[g][1]])]
     which = [n.here.structure.switches[s].element for s in dict.fromkeys(own)]
@@ -187,11 +190,11 @@ def report_distribution(n: InstantProblem, guards: Sequence[int]) -> None:
 
 
 def _several_solutions(n: InstantProblem, found: ModeDecision) -> str:
-    """Other solutions of the problem that was solved last, looked for from the opposite modes."""
+    """Return a remark if the problem solved last has other solutions, searched from the opposite modes."""
     P = n.workspaces[len(found.parts)].P
     size = max(
         np.abs(P.b).max(), P.grain.max() / TERM_ROUNDING
-    )  # at a take-off accelerations are differences of larger ones
+    )  # at a take-off accelerations are differences of larger terms
     for state in (NO_IMPULSE, AT_REST):
         P.state[:] = state
         if n.again(P) == SOLUTION_FOUND and np.abs(P.u - found.u).max() > DIFFERENT_SOLUTION * size:
@@ -204,7 +207,7 @@ def _several_solutions(n: InstantProblem, found: ModeDecision) -> str:
 
 
 def _undetermined_friction(n: InstantProblem, found: ModeDecision) -> str:
-    """Friction whose most depends on what redundancy leaves open."""
+    """Return a remark on friction limits that depend on reactions which redundancy leaves undetermined."""
     held = np.flatnonzero(found.state == AT_REST)
     grips = [i for i in held.tolist() if found.parts[i].rule == FRICTION_LINE and found.gain[i].any()]
     if len(held) < 2 or not grips:
@@ -228,7 +231,7 @@ def _undetermined_friction(n: InstantProblem, found: ModeDecision) -> str:
 
 
 def _friction_is_needless(n: InstantProblem, found: ModeDecision, rows: list[int]) -> bool:
-    """Whether these are places of contact without whose friction nothing moves either: a ball at rest in a groove."""
+    """Return whether these are contact points that stay at rest without friction too, as a ball in a groove."""
     if any(n.kind[found.parts[i].switch] != SLIP for i in rows):
         return False
     P = n.workspaces[len(found.parts)].P
@@ -238,9 +241,10 @@ def _friction_is_needless(n: InstantProblem, found: ModeDecision, rows: list[int
 
 
 def jump_without_collision(n: InstantProblem, parts: list[ProblemRow], held: float) -> Jump | None:
-    """The jump of velocities without a collision, if there is one, for rows that have no accelerations.
+    """Return the velocity jump without a collision for rows without solution for the accelerations; None if there is
+    none.
 
-    ``held`` is what friction holds at least, without any load.
+    ``held`` is the largest friction limit.
     """
     B, P, _ = n.problem(parts)
     forces, before = P.b.copy(), B.sign * n.rate[B.which]
@@ -265,21 +269,21 @@ def jump_without_collision(n: InstantProblem, parts: list[ProblemRow], held: flo
 
 
 MOST_ROUNDS = 100
-MOST_REPEATS = 5  # times that ways of sliding are decided again for the same modes
-RATE_GUARDS = (G_SLIDES, G_BACK, G_TURNS, G_PRESS_LOWER, G_PRESS_UPPER)  # guards of rates, or whose meaning they decide
-HOLDING_GUARDS = (G_PULL, G_HOLDS, G_CONE)  # guards of what holds, by the forces that it carries
-BROKEN_FORCE = 1e-8  # of the forces that a force is the difference of: beyond what rounding makes
-VIOLATED_START = 1e-9  # of the mechanism's length or a radian, of rates at its own rate: a start beyond its limit
-PENETRATED = 1e-7  # of the same: what is open and past its bound has gone through it
+MOST_REPEATS = 5  # repeated decisions of sliding directions for the same modes
+RATE_GUARDS = (G_SLIDES, G_BACK, G_TURNS, G_PRESS_LOWER, G_PRESS_UPPER)  # guards of rates, or whose meaning depends on rates
+HOLDING_GUARDS = (G_PULL, G_HOLDS, G_CONE)  # guards of active rows, by the forces that they carry
+BROKEN_FORCE = 1e-8  # part of its terms beyond which a force violates its bound
+VIOLATED_START = 1e-9  # violation that is refused at the start, relative to length or a radian (rates: times the rate)
+PENETRATED = 1e-7  # penetration of an open stop that is refused, relative to the same
 
 
 def resolve_start(here: EventContext) -> None:
-    """As the motion begins: what is kicked, closed, stuck or slides there.
+    """Resolve the start of the motion: applied impulses, closed stops, sticking and sliding friction.
 
     Raises
     ------
     ModelError
-        If a limit starts violated.
+        If a limit is violated at the start.
     """
     s = here.structure
     if here.start.before is None and not (s.switches or s.events or s.model.events):
@@ -299,24 +303,24 @@ def resolve_start(here: EventContext) -> None:
 
 
 def resolve_event(here: EventContext, fired: Sequence[int]) -> None:
-    """Where guards fired.
+    """Resolve the instant at which guards triggered.
 
     Parameters
     ----------
-    here : Here
+    here : EventContext
     fired : sequence of int
-        Rows of `System.guard_i`.
+        Rows of `System.guards`.
 
     Raises
     ------
     SimulationError
-        If no forces or impulses go with all that is asked, or there is no end of it.
+        If no consistent forces or impulses exist, or the resolution does not end.
     """
     _resolve_chain(here, np.array(fired, np.int64))
 
 
 def _resolve_chain(here: EventContext, fired: np.ndarray) -> None:
-    """Events, jumps and modes, as long as expressions of events pass zero by what was done."""
+    """Resolve events, jumps and modes repeatedly, as long as actions make expressions of events cross zero."""
     for _ in range(MOST_ROUNDS if len(fired) else 0):
         acts = perform_actions(here, fired.tolist())
         if len(here.c.system.switches.row) or here.external_impulse is not None:
@@ -324,7 +328,7 @@ def _resolve_chain(here: EventContext, fired: np.ndarray) -> None:
             resolve_jumps_and_corners(n, Corners(n), fired)
         acts.told(["start"])
         fired = acts.passed()
-        here.settled_keys.clear()  # what follows from it comes later
+        here.settled_keys.clear()  # events caused by these actions count as later
         if not len(fired) or here.stopped:
             return
     if len(fired):
@@ -332,7 +336,7 @@ def _resolve_chain(here: EventContext, fired: np.ndarray) -> None:
 
 
 def resolve_jumps_and_corners(n: InstantProblem, corners: Corners, fired: np.ndarray, record: bool = True) -> None:
-    """Jumps and modes, and the sides of laws' corners: each by what the others are, until they agree."""
+    """Resolve jumps and modes alternately with the sides of laws' corners, until they agree."""
     corners.fired(fired)
     by_rows = [g for g in fired.tolist() if n.guarded[g][0] != G_CORNER]
     if not len(fired) or by_rows:
@@ -356,7 +360,7 @@ def refuse_violated(n: InstantProblem) -> None:
 
 
 def refuse_penetration(n: InstantProblem) -> None:
-    """Refuse to go on from where what is open is past its bound, by more than what is closed may be."""
+    """Refuse to continue where an open stop or contact is past its bound by more than a closed one may be."""
     for s in n.of(STOP):
         past = max(n.W.modes.lower[s] - n.x[s], n.x[s] - n.W.modes.upper[s])
         if n.mode[s] == OFF and past > PENETRATED * n.unit[s] + n.W.options.position_tolerance:
@@ -364,13 +368,13 @@ def refuse_penetration(n: InstantProblem) -> None:
 
 
 def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> None:
-    """Jumps and modes at the instant, until nothing is against its rule; those that a motion begins in are no news."""
+    """Resolve jumps and modes at the instant until no rule is violated; modes at the start are not recorded."""
     here = n.here
     before, modes, ways = here.y.copy(), n.W.modes.mode.copy(), n.ways().copy()
     since = before  # the last jump that was recorded
     hits: dict[int, bool] = {}
     calm: list[int] = []
-    gone: list[int] = []  # guards of what was held and could not hold
+    gone: list[int] = []  # guards of rows that were released because they could not hold
     again = 0
     for _ in range(MOST_ROUNDS):
         n.evaluate_switches()
@@ -391,7 +395,7 @@ def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> 
             still[list(jumped.at_rest)] = True
         update_elastic_stops(n, fired, ways)
         found = modes_or_jump(n, at, still, fired, jumped)
-        if isinstance(found, Jump):  # no accelerations: velocities have jumped, all is looked at again
+        if isinstance(found, Jump):  # no solution for the accelerations: velocities have jumped, all is evaluated again
             record_jump(n, found, since)
             since = here.y.copy()
             n.reevaluate_switches()
@@ -413,7 +417,7 @@ def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> 
         against = broken_guards(n, found, guards)
         new = [g for g in against if g not in gone]
         if not new:
-            if against:  # it was let go, and is held again: by other shares than the least
+            if against:  # it was released and holds again, by another distribution than that of least squares
                 report_distribution(n, against)
             if record:
                 record_mode_changes(n, (modes, ways), before, hits)
@@ -423,13 +427,13 @@ def resolve_modes(n: InstantProblem, fired: np.ndarray, record: bool = True) -> 
 
 
 def slides_against_direction(n: InstantProblem, guards: np.ndarray) -> bool:
-    """Whether something slides against its way: where bounces are cut off, what they were changes other rates too."""
+    """Return whether a row slides against its direction: the end of a series of bounces also changes other rates."""
     sliding = ((g, s) for g, (kind, s, _) in enumerate(n.guarded) if kind in (G_SLIDES, G_TURNS))
     return any(guards[g] < -n.still[s] for g, s in sliding)
 
 
 def guards_still_valid(n: InstantProblem, fired: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Guards that fired, without those of rates that were something else before a jump."""
+    """Return the triggered guards without guards of rates that a jump has changed."""
     other = np.abs(n.rate - rate) > n.still
     return np.array(
         [g for g in fired.tolist() if n.guarded[g][0] not in RATE_GUARDS or not other[n.guarded[g][1]]], np.int64
@@ -437,7 +441,7 @@ def guards_still_valid(n: InstantProblem, fired: np.ndarray, rate: np.ndarray) -
 
 
 def jump_if_needed(n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Jump | None:
-    """The jump of velocities, if there is one; ``n`` has looked where it leads."""
+    """Return the jump of velocities, or None if there is none; ``n`` is evaluated afterwards."""
     here = n.here
     parts = rows_of_velocities(n, at, still)
     kick, here.external_impulse = here.external_impulse, None
@@ -458,9 +462,9 @@ def jump_if_needed(n: InstantProblem, at: dict[int, tuple[float, ...]], still: n
 def modes_or_jump(
     n: InstantProblem, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray, jumped: Jump | None
 ) -> ModeDecision | Jump:
-    """Modes; a series of bounces that has become shorter than rounding is over.
+    """Decide the modes; end series of bounces that have become shorter than rounding.
 
-    Where there are no accelerations velocities may jump without a collision.
+    Where there is no solution for the accelerations, velocities may jump without a collision.
     """
     found = decide_modes(n, at, still, fired)
     if found.ended == SOLUTION_FOUND and (over := coming_to_rest(n, at, still)).any():
@@ -483,7 +487,7 @@ def modes_or_jump(
 
 
 def broken_guards(n: InstantProblem, found: ModeDecision, guards: np.ndarray) -> list[int]:
-    """Guards of what holds that say that it cannot, beyond rounding."""
+    """Return the guards of active rows that are violated beyond rounding."""
     out = [
         k
         for k, (kind, s, _) in enumerate(n.guarded)
@@ -495,15 +499,15 @@ def broken_guards(n: InstantProblem, found: ModeDecision, guards: np.ndarray) ->
     return out
 
 
-# Overlaps of rounding size at the start: bodies are put side by side, as assembly closes joints.
+# Overlaps of rounding size at the start are removed by displacing bodies, as assembly closes joints.
 
 
-SLIGHT_OVERLAP = 1e-5  # of the mechanism's length, or of a radian: as positions are rounded in a description
-REPORTED_OVERLAP = 1e-7  # of the same: worth a word
+SLIGHT_OVERLAP = 1e-5  # overlap that is removed, relative to the mechanism's length or a radian: rounded input data
+REPORTED_OVERLAP = 1e-7  # overlap that is reported, relative to the same
 
 
 def remove_slight_overlaps(n: InstantProblem) -> None:
-    """Take overlaps up to `SLIGHT_OVERLAP` away, of contacts, stops and ropes; velocities stay."""
+    """Remove overlaps up to `SLIGHT_OVERLAP` of contacts, stops and ropes; velocities are unchanged."""
     over = {}
     for s in np.flatnonzero(n.kind == STOP).tolist():
         lower, upper = n.W.modes.lower[s], n.W.modes.upper[s]
@@ -518,7 +522,7 @@ def remove_slight_overlaps(n: InstantProblem) -> None:
     n.arrive()
     n.W.modes.mode[:], n.W.modes.hold[:] = modes, hold
     n.here.v[:] = y[n.here.structure.nq : n.here.structure.nq + n.here.structure.nv]
-    n.arrive()  # velocities on the rows of joints, where they are now
+    n.arrive()  # project the velocities onto the joints' rows at the new positions
     n.evaluate_switches()
     n.restore_modes()
     told = {s: x for s, (_, x) in over.items() if x > REPORTED_OVERLAP * n.unit[s]}

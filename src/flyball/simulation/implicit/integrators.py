@@ -1,4 +1,4 @@
-"""Implicit integrators bound to a mechanism: radau, generalised-alpha, variational; workspaces, tolerances."""
+"""Implicit integrators bound to a mechanism (radau, generalised-alpha, variational): workspaces and tolerances."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ from .jacobian_pattern import inverse_inertias, jacobian_layout, substitute_iner
 ROW_REGULARISATION, LOADED_ROW_REGULARISATION = (
     1e-10,
     1e-8,
-)  # regularisation of rows, as part of their natural size; where forces depend on multipliers
+)  # relative regularisation of rows; the second where forces depend on multipliers
 SMALL_CORRECTION, LARGE_CORRECTION = (
     1e-7,
     1e-6,
-)  # relative corrections that are taken for rounding if they do not fall: where errors of steps
-# are looked at, and where they are not
+)  # relative corrections that count as rounding if they do not fall: with step size control,
+# and without
 CHEAP_JACOBIAN_RATE, EXPENSIVE_JACOBIAN_RATE, FEW_GROUPS = (
     1e-3,
     0.1,
     12,
-)  # rates of the iteration up to which a Jacobian serves on, where it takes few
+)  # convergence rates up to which a Jacobian is reused, where it takes few
 # evaluations and where it takes more
 MACHINE_EPSILON = float(np.finfo(float).eps)
-MOST_POOLS = 2  # of what steps work with, of a structure, that is known
+MOST_POOLS = 2  # cached workspace pools of one structure
 GUARD_POINTS = np.array(
     [0.0, 0.0, 0.25, 0.6, 0.857]
-)  # places in a step at which guards are seen, behind two that are not
+)  # points of a step at which guards are evaluated, after two unused entries
 
 
 class ImplicitIntegrator:
@@ -57,11 +57,11 @@ class ImplicitIntegrator:
 
     Parameters
     ----------
-    c : Compiled
-        In the coordinates of the motion, with the scratch that it is run on.
-    clock : Clock
+    c : CompiledMechanism
+        In the coordinates of the motion, with the workspace that it is run on.
+    clock : StepState
     index_3 : bool
-        Whether velocities are not held to the constraints.
+        Whether only positions are kept on the constraints (index 3).
     """
 
     door, workspace_type, means = radau_steps, ImplicitWorkspace, ImplicitArguments
@@ -92,9 +92,9 @@ class ImplicitIntegrator:
         progress: StructBuffer,
         addresses: np.ndarray,
     ) -> BoundKernel:
-        """The door with these tuples bound to it."""
+        """Return the kernel of the steps bound to these arguments."""
         S = tables.fields
-        if S is not self.system:  # other values of parameters: masses too, perhaps
+        if S is not self.system:  # other parameter values: masses may have changed
             self.system = S
             self.count.jacobians = 0
         means = JoinedBuffer(self.means, self._complex_tables(S), self.own)
@@ -102,7 +102,7 @@ class ImplicitIntegrator:
         return BoundKernel(self.door, tables, scratch, means, state, progress)
 
     def _workspace_pool(self, ny: int) -> StructPool:
-        """What steps work with besides tables, as it is new: scratch, benches, plan, desk."""
+        """Return a new pool of workspaces: engine workspace, derivative workspaces, Jacobian plan, solver workspace."""
         x, S = self.layout, self.system
         still = [y for y in (*vars(x).values(), *x.terms, *x.mass, *x.P, *x.whole_P)
                  if isinstance(y, np.ndarray)]  # fmt: skip
@@ -119,12 +119,12 @@ class ImplicitIntegrator:
         )
 
     def _complex_tables(self, S: System) -> StructBuffer:
-        """Tables in complex numbers, as compiled code has them: the same for every run with them."""
+        """Return the tables in complex numbers, shared by all runs with these tables."""
         return self.layout.s.kept.get("stepped", id(S), MOST_POOLS, lambda: (S, StructBuffer(complex_system(S))))[1]
 
     @property
     def failed(self) -> SimulationError | None:
-        """Why steps of fixed width do not go on; else nothing."""
+        """Error that explains why steps of fixed width do not continue; None if they do."""
         t, step = float(self.clock.real.t), float(self.clock.real.step)
         if not step or self.clock.count.status != ex.STEP_FAILED:
             return None
@@ -152,7 +152,7 @@ class ImplicitIntegrator:
         return out[0], out[1], out[2]
 
     def _settle(self, real: ds.ImplicitReals, turns: bool) -> None:
-        """Put the tolerances of a run, and what it counts by, on its desk."""
+        """Write tolerances and limits of a run into its workspace."""
         x, count, step = self.layout, self.count, float(self.clock.real.step)
         rtol, atol = float(self.clock.real.rtol), float(self.clock.real.atol)
         own = 0.1 * rtol ** (2.0 / 3.0) if step == 0.0 else rtol
@@ -172,7 +172,7 @@ class ImplicitIntegrator:
         return s.kept.get("steep laws", None, 1, lambda: steep_law_names(s.model))
 
     def _solver_workspace(self, nz: int, springy: np.ndarray) -> RadauStepWorkspace:
-        """The desk of a run as it is new."""
+        """Return the new solver workspace of a run."""
         x = self.layout
         nv, nr, nx, P = x.nv, x.nr, x.nx, x.P
         n = x.n
@@ -196,7 +196,7 @@ class ImplicitIntegrator:
         )  # fmt: skip
 
     def _plain(self) -> np.ndarray:
-        """Component of the state that each velocity is the rate of, or -1: a turn."""
+        """Return for each velocity the component of the state whose rate it is, or -1 for angular velocities."""
         out = np.full(self.layout.nv, -1, np.int64)
         tree = self.system.tree
         for kind, q, v, nv in zip(tree.joint, tree.q, tree.v, tree.nv, strict=True):
@@ -209,9 +209,9 @@ class ImplicitIntegrator:
 TIGHT_VIOLATION, ALLOWED_VIOLATION = (
     1e-15,
     1e-9,
-)  # parts of the mechanism's length: violations that are none; that rounding may leave
+)  # relative to the mechanism's length: negligible violation; violation that rounding may leave
 
-REMEMBERED_STEPS = 12  # steps that the iteration remembers
+REMEMBERED_STEPS = 12  # steps stored by the iteration
 
 
 class VariationalIntegrator:
@@ -219,12 +219,12 @@ class VariationalIntegrator:
 
     Parameters
     ----------
-    c : Compiled
+    c : CompiledMechanism
         In absolute coordinates.
-    clock : Clock
+    clock : StepState
     """
 
-    R = tableau("rk45")  # is not looked at
+    R = tableau("rk45")  # not used
     c, stages = GUARD_POINTS, len(GUARD_POINTS)
 
     def __init__(self, c: CompiledMechanism, clock: ex.StepState) -> None:
@@ -249,12 +249,12 @@ class VariationalIntegrator:
         progress: StructBuffer,
         addresses: np.ndarray,
     ) -> BoundKernel:
-        """The door with these tuples bound to it."""
+        """Return the kernel of the steps bound to these arguments."""
         return BoundKernel(variational_steps, tables, scratch, StructBuffer(self.desk), state, progress)
 
     @property
     def failed(self) -> SimulationError | None:
-        """Why steps do not go on; else nothing."""
+        """Error that explains why steps do not continue; None if they do."""
         t, step = float(self.clock.real.t), float(self.clock.real.step)
         if self.clock.count.status != ex.STEP_FAILED:
             return None
@@ -266,7 +266,7 @@ class VariationalIntegrator:
 
 
 def refuse_for_variational(start: InitialState) -> None:
-    """Refuse what the variational method does not know.
+    """Refuse what the variational method does not support.
 
     Raises
     ------
@@ -294,14 +294,14 @@ def refuse_for_variational(start: InitialState) -> None:
 def implicit_integrator(
     method: str, c: CompiledMechanism, clock: ex.StepState, o: Integration
 ) -> ImplicitIntegrator | VariationalIntegrator:
-    """Steps of a method for one motion.
+    """Return the integrator of a method for one motion.
 
     Parameters
     ----------
     method : str
-    c : Compiled
-        In the coordinates of the motion, with the scratch that it is run on.
-    clock : Clock
+    c : CompiledMechanism
+        In the coordinates of the motion, with the workspace that it is run on.
+    clock : StepState
     o : Integration
     """
     if method == VARIATIONAL:
@@ -312,7 +312,7 @@ def implicit_integrator(
     return ImplicitIntegrator(c, clock, index_3)
 
 
-# A motion by the generalised-alpha method: what its steps work with.
+# The generalised-alpha method.
 
 
 class AlphaIntegrator(ImplicitIntegrator):
@@ -320,12 +320,12 @@ class AlphaIntegrator(ImplicitIntegrator):
 
     Parameters
     ----------
-    c : Compiled
-    clock : Clock
+    c : CompiledMechanism
+    clock : StepState
     rho : float
-        Spectral radius at infinity: 1 damps nothing, 0 all that steps do not resolve.
+        Spectral radius at infinity: 1 damps nothing, 0 damps all modes that steps do not resolve.
     index_3 : bool
-        Whether velocities are not held to the constraints.
+        Whether only positions are kept on the constraints (index 3).
     """
 
     door, workspace_type, means = alpha_steps, AlphaWorkspace, AlphaArguments  # type: ignore[assignment]
@@ -336,7 +336,7 @@ class AlphaIntegrator(ImplicitIntegrator):
 
     def _settle(self, real: ImplicitReals, turns: bool) -> None:
         super()._settle(real, turns)
-        steps = float(self.clock.real.span / self.clock.real.step)  # what each leaves to its iteration adds up
+        steps = float(self.clock.real.span / self.clock.real.step)  # the iteration errors of all steps add up
         real.newton = max(10.0 * MACHINE_EPSILON / real.rtol, min(0.1, 1.0 / steps))
         self.own.array("desk.rho")[0] = self.rho
 

@@ -1,4 +1,4 @@
-"""Sparsity of an implicit integrator's Jacobian: dependences of each term, and places in the matrix."""
+"""Sparsity of an implicit integrator's Jacobian: dependences of each term, and their places in the matrix."""
 
 from __future__ import annotations
 
@@ -19,33 +19,33 @@ from ...tables.structure_definition import Structure
 from ...tables.table_definitions import ALONG, BETWEEN, SCHUR, SLIDING, System
 
 Dependence = tuple[np.ndarray, np.ndarray]
-"""Equations in which it stands, one after the other; what it depends on: velocities, of which also the positions, and
-states of controllers. Both are numbered so, and behind the equations of the states stand rates of the rows."""
+"""Equations of a term, and the variables that it depends on: velocities (and the positions along them), followed by
+states of controllers. Equations have the same numbers; those of the states are followed by rates of the rows."""
 
 
 class Terms(NamedTuple):
-    """A sparse matrix of derivatives as sums of what steps of velocities change."""
+    """A sparse matrix of derivatives, assembled as sums of finite differences (complex steps)."""
 
     i: np.ndarray  # equations and velocities of its entries
     j: np.ndarray
-    pick: np.ndarray  # (n, 3): entry, step, place among what is found: sums of these
-    group: np.ndarray  # (nv + nx,): the step in which each velocity and state is taken
+    pick: np.ndarray  # (n, 3): entry, step, index in the residual terms; an entry is the sum over its rows here
+    group: np.ndarray  # (nv + nx,): the step in which each velocity and state is perturbed
 
     @property
     def groups(self) -> int:
-        """How many steps there are."""
+        """Number of steps."""
         return int(self.group.max(initial=-1)) + 1
 
 
 class DependencePattern:
-    """Parts of a mechanism in the order in which `engine/residual.py` writes them.
+    """Dependences of all terms of a mechanism, in the order in which `engine/residual.py` writes them.
 
     Parameters
     ----------
     s : Structure
     S : System
     nx : int
-        States of controllers that are unknowns.
+        Number of controller states that are unknowns.
     """
 
     def __init__(self, s: Structure, S: System, nx: int) -> None:
@@ -68,16 +68,16 @@ class DependencePattern:
         self.rates = [(np.array([s.nv + nx + k]), row) for k, row in enumerate(self.row[: self.nr])]
 
     def _read(self, s: Structure, names: Iterable[str], nm: int) -> np.ndarray:
-        """Velocities on which measured quantities depend, by the names that laws have for them."""
+        """Return the velocities on which measured quantities depend, given the names used in laws."""
         columns = {s.slots[name] for name in names if name in s.slots}
         return _union_of([self.row[self.nr + m % nm] for m in sorted(columns) if m < 2 * nm])
 
     def _hung(self, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
-        """Velocities of bodies and of all that they hang on."""
+        """Return the velocities of bodies and of all bodies that carry them."""
         return _union_of([self.chain[b] for b in bodies])
 
     def _law(self, k: int, velocities: np.ndarray) -> np.ndarray:
-        """With what the laws of force k are told."""
+        """Return these velocities with those that the laws of force k depend on."""
         return np.union1d(velocities, self.told) if (self.S.forces.laws[k] >= 0).any() else velocities
 
     def _between(self) -> list[Dependence]:
@@ -103,7 +103,7 @@ class DependencePattern:
         return out
 
     def terms(self, some: Sequence[Dependence], first: np.ndarray) -> Terms:
-        """Derivatives of the sums of some parts, which begin at these places among what is found."""
+        """Return the derivatives of the sums of some terms, whose entries begin at ``first``."""
         group = self._groups([depends for _, depends in some])
         none = np.zeros(0, np.int64)
         i = np.concatenate([none, *(np.repeat(e, len(d)) for e, d in some)])
@@ -116,7 +116,7 @@ class DependencePattern:
         return Terms(keys // n, keys % n, pick.astype(np.int64), group)
 
     def _groups(self, together: Sequence[np.ndarray]) -> np.ndarray:
-        """What no part depends on together has one number, (nv + nx,)."""
+        """Return a number for each variable, equal for variables that no term depends on together, (nv + nx,)."""
         from scipy.sparse import csc_matrix
 
         part = np.repeat(np.arange(len(together)), [len(d) for d in together])
@@ -129,20 +129,20 @@ def _union_of(some: Sequence[np.ndarray]) -> np.ndarray:
     return np.unique(np.concatenate([np.zeros(0, np.int64), *some]))
 
 
-EXPENSIVE_FACTOR = 50  # products of a factor, by unknowns, from which on it costs more than a step
-NO_INERTIA, SLIGHT_INERTIA = 1e-14, 1e-8  # part of a body's largest inertia that is none, and what is put in its place
-THIN_METRIC = 1e-6  # part of the largest inertia (turns by the mechanism's length) below which the metric sees none
+EXPENSIVE_FACTOR = 50  # products per unknown from which on a factorization costs more than a step
+NO_INERTIA, SLIGHT_INERTIA = 1e-14, 1e-8  # relative inertia that counts as zero, and its substitute
+THIN_METRIC = 1e-6  # smallest inertia in the metric, relative to the largest (rotations times the mechanism's length)
 
 
 class JacobianLayout:
-    """Which numbers the Jacobian has and where they go in the matrix of one stage, (d, v, lam, mu, x).
+    """Entries of the Jacobian and their places in the matrix of one stage, with the unknowns (d, v, lam, mu, x).
 
     Parameters
     ----------
     s : Structure
     S : System
     index_3 : bool
-        Whether only positions are held to the constraints: lam by g = 0, and no mu.
+        Whether only positions are kept on the constraints: lam by g = 0, and no mu.
     """
 
     def __init__(self, s: Structure, S: System, index_3: bool = False) -> None:
@@ -168,13 +168,13 @@ class JacobianLayout:
         self.expensive = bool((np.diff(P.Up)[P.Lj]).sum() > EXPENSIVE_FACTOR * self.n)
 
     def _entries(self) -> None:
-        """Entries (row, column, number) of F, of F' and of the regularisation; which numbers stand where."""
+        """Set the entries (row, column, number) of F, of F' and of the regularisation, and the order of the numbers."""
         nv, nr = self.nv, self.nr
         v, lam, mu = nv, 2 * nv, 2 * nv + nr
         i, j, pick = self.terms.i, self.terms.j, self.terms.pick
         ways, at, end = np.arange(nv), np.arange, nv + self.nx
         own = 2 * (nv + nr) + at(self.nx)
-        both = (i < end) & (j < nv)  # what depends on velocities, too; of G v it is known how
+        both = (i < end) & (j < nv)  # terms that depend on velocities too; the dependence of G v is known
         again = np.cumsum(both) - 1 + len(i)
         more = pick[both[pick[:, 0]]]
         self.pick = np.r_[pick, np.column_stack([again[more[:, 0]], self.groups + more[:, 1], more[:, 2]])]
@@ -184,7 +184,7 @@ class JacobianLayout:
         first = np.cumsum([1, a + both.sum(), c, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
         self.first = first.astype(np.int64)
         picked, mass, rows, metric, valued_rows, sizes, turns, presses, _ = first.tolist()
-        own_mass = mass + np.flatnonzero(self.mass.i == self.mass.j)  # one for each velocity, in their order
+        own_mass = mass + np.flatnonzero(self.mass.i == self.mass.j)  # one for each velocity, in order
         self.own_mass = own_mass.astype(np.int64)
         e = np.flatnonzero((i < nv) & (j < nv))
         self.spring = np.column_stack([i[e], j[e], picked + e, own_mass[i[e]], picked + again[e]]).astype(np.int64)
@@ -223,7 +223,7 @@ class JacobianLayout:
         self._place(one, scaled, soft, rows + at(nG)[~pressed])
 
     def _place(self, one: list, scaled: list, soft: list, negative: np.ndarray) -> None:
-        """Pattern and order of elimination; places of all entries in the matrix."""
+        """Set pattern and elimination order, and the places of all entries in the matrix."""
         nv, n = self.nv, self.n
         minus = int(self.first[-1])  # numbers behind the others: -1, and the negative entries of rows
         self.negative = negative
@@ -237,7 +237,7 @@ class JacobianLayout:
         self.part = np.cumsum(count)[:2].astype(np.int64)
 
     def _whole(self, i: np.ndarray, j: np.ndarray, number: np.ndarray, count: list[int]) -> None:
-        """The same of all three stages at once: what F' has couples them."""
+        """Set the same for all three stages at once, which F' couples."""
         n = self.n
         own, scaled = np.r_[: count[0], sum(count[:2]) : sum(count)], np.arange(count[0], sum(count[:2]))
         parts = [(own, k, k, np.where(own < count[0], UNSCALED, SOFTENED)) for k in range(STAGES)]
@@ -252,16 +252,16 @@ class JacobianLayout:
     def _ordered(
         self, n: int, i: np.ndarray, j: np.ndarray, number: np.ndarray, stages: int
     ) -> tuple[LUPattern, np.ndarray]:
-        """Pattern of a matrix with such entries; places of these with the numbers that stand there.
+        """Return the pattern of a matrix with these entries, and their places with the numbers stored there.
 
-        Increments come first: only a few of their own stand beside the diagonal, and what is left is half as large.
+        Increments are eliminated first: they have only few entries beside the diagonal, and the rest is half as large.
         """
         nv = self.s.tables["tree"].nv
         body, bodies = np.repeat(np.arange(len(nv)), nv), len(nv)
         rows, states = bodies + np.arange(self.nr), bodies + self.nr + np.arange(self.nx)
         groups = np.tile(np.concatenate([body, body, rows, rows, states]), stages)
         order = constrained_order(groups, np.arange(bodies + self.nr + self.nx) >= bodies, i, j)
-        one = np.r_[self._together(), self.nv + np.arange(n // stages - self.nv)]  # d of a quaternion go together
+        one = np.r_[self._together(), self.nv + np.arange(n // stages - self.nv)]  # increments of a quaternion stay together
         first = np.tile(np.arange(n // stages) < self.nv, stages)
         place = np.empty(n, np.int64)
         place[np.lexsort((np.arange(n), np.where(first, np.tile(one, stages), order), ~first))] = np.arange(n)
@@ -269,7 +269,7 @@ class JacobianLayout:
         return P, np.ascontiguousarray(np.column_stack([at, number]))
 
     def _together(self) -> np.ndarray:
-        """Of each velocity the first of those whose increments depend on each other."""
+        """Return for each velocity the first of those whose increments are coupled."""
         out = np.arange(self.nv)
         for w in self.turns.tolist():
             out[w : w + 3] = w
@@ -277,18 +277,18 @@ class JacobianLayout:
 
 
 def pressing_rows(S: System) -> np.ndarray:
-    """Rows of gaps of places of contact, whose multipliers the friction there follows."""
+    """Return the rows of contact gaps on whose multipliers friction depends."""
     sliding = S.forces.switch[S.forces.family == SLIDING]
     return np.asarray(S.switches.row[S.switches.other[sliding]], np.int64)
 
 
 def jacobian_layout(s: Structure, S: System, index_3: bool = False) -> JacobianLayout:
-    """The same for every run of a structure."""
+    """Return the layout, cached for all runs of a structure."""
     return s.kept.get("implicit", index_3, 2, lambda: JacobianLayout(s, S, index_3))
 
 
 def inverse_inertias(c: CompiledMechanism, t: float, y: np.ndarray) -> np.ndarray:
-    """Of each velocity the inverse of its inertia, (nv,), which is at least a small part of the largest."""
+    """Return the inverse inertia along each velocity, (nv,), with a lower bound on the inertia."""
     s, S, W = c.structure, c.system, c.work
     if S.sizes.solver == SCHUR:
         inertia = c.mass().diagonal()
@@ -302,13 +302,14 @@ def inverse_inertias(c: CompiledMechanism, t: float, y: np.ndarray) -> np.ndarra
 
 
 def substitute_inertias(c: CompiledMechanism) -> np.ndarray:
-    """Inertias that bodies without any about some axis are given in Jacobians, (nv,); nothing where none is without.
+    """Return substitute inertias in Jacobians for bodies without inertia about some axis, (nv,); empty if there are
+    none.
 
-    Bodies are eliminated before the rows that hold them, without pivots; Newton's iteration takes out again what this
-    part of the body's own mass, at the mechanism's length, does.
+    Bodies are eliminated without pivoting before the rows that hold them. Newton's iteration removes the effect of the
+    substitute, which is a small part of the body's mass times the mechanism's length squared.
     """
     S, out = c.system, np.zeros(c.structure.nv)
-    if S.sizes.solver != SCHUR:  # moving masses are those of what hangs on each other
+    if S.sizes.solver != SCHUR:  # in joint coordinates the masses of carried bodies count too
         return out[:0]
     inertia, mass = S.bodies.inertia.reshape(-1, 3, 3), S.bodies.mass
     if c.structure.model.planar:

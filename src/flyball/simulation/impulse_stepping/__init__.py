@@ -1,8 +1,8 @@
-"""Time stepping by impulses, for mechanisms with contact: all contacts and joints of a step in one cone problem.
+"""Impulse time stepping for mechanisms with contact: one cone problem per step for all contacts and joints.
 
-`impulse_motion` is the motion from the model to its result; `setup` makes the scene and the tables; `stepper`
-calls the compiled loop (`step_loop`). The formulas: `free_bodies`, `contact_constraints`, `compliant_contact`,
-`restitution`, and of the jointed mechanism `mechanism_step`, `mechanism_rows`, `implicit_springs`. Cone solvers
+`impulse_motion` simulates a model and builds its result; `setup` creates contact scene and tables; `stepper` calls the
+compiled loop (`step_loop`). The formulas are in `free_bodies`, `contact_constraints`, `compliant_contact` and
+`restitution`, and for the jointed mechanism in `mechanism_step`, `mechanism_rows` and `implicit_springs`. Cone solvers
 are in `numerics/complementarity/`, contact search is in `collision/`.
 """
 

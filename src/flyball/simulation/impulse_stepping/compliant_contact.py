@@ -1,15 +1,15 @@
 """Compliant contacts: the law of their normal force as rows of the cone problem with compliance.
 
-With overlap d, f = k d^n (1 + c ddot) + (d/dt) damping d, not less than 0 (Hertz 1881; Hunt and Crossley 1975).
-Over a step of length h from the overlap a to b, U' = k d^n, the impulse is
+With overlap d, f = k d^n (1 + c ddot) + (d/dt) damping d, not less than 0 (Hertz 1881; Hunt and Crossley 1975). Over a
+step of length h from overlap a to b, with U' = k d^n, the impulse is
 
     p = h ((1 - s) (U(b) - U(a)) / (b - a) + s U'(b)) (1 + c (b - a) / h) + damping (b - a),
     b = a - h ((1 - s) / 2 u- + (1 + s) / 2 u+).
 
-With s = 0 the elastic energy is conserved exactly (Gonzalez 1996), but for what c and damping take; the step is of
-second order. With s = 1 it is Euler's implicit one, which brings to rest what is too stiff for the step; s goes
-with the square of h^2 k' / m. As p falls with u+, the problem is monotone; by Newton's method p(u+) becomes rows u
-+ bias + soft p >= 0. Displacements end at the overlaps b.
+With s = 0 elastic energy is conserved exactly (Gonzalez 1996) except for the losses by c and damping; the step is of
+second order. With s = 1 it is the implicit Euler rule, which brings contacts to rest that are too stiff for the step;
+s grows with the square of h^2 k' / m. Since p falls with u+, the problem is monotone. Newton's method linearises p(u+)
+to rows u + bias + soft p >= 0. Displacements end at the overlaps b.
 """
 
 from __future__ import annotations
@@ -41,20 +41,20 @@ from .stepping_tables import (
     VELOCITY_TOLERANCE,
 )
 
-LAW_ITERATIONS = 20  # of Newton's method; three or four are usual
-FEW_LAW_ITERATIONS = 3  # after which it is enough where solves are cut off
-LAW_TOLERANCE = 1e-2  # of the residual that is enough: what the law may differ by from its tangent
-RESIDUAL_SHARE = 0.1  # of the residual that is left: the same
+LAW_ITERATIONS = 20  # Newton iterations; three or four are usual
+FEW_LAW_ITERATIONS = 3  # iterations where the cone solver does not converge
+LAW_TOLERANCE = 1e-2  # allowed difference of law and tangent, relative to the velocity tolerance
+RESIDUAL_SHARE = 0.1  # the same relative to the residual of the solve
 SMALL_CHANGE = (
-    1e-3  # change of the overlap, relative to it, over which a mean force is that in its middle, and a correction
+    1e-3  # relative change of the overlap below which the mean force is a series at the middle
 )
-LARGEST_COMPLIANCE = 1e6  # times the mobility: compliance of what does not touch
-RESOLVED_STIFFNESS = 0.01  # h^2 k' / 4 m of a step that resolves an impact: 20 steps of one by Hertz
+LARGEST_COMPLIANCE = 1e6  # compliance of open contacts, relative to the mobility
+RESOLVED_STIFFNESS = 0.01  # largest h^2 k' / 4 m that resolves an impact: 20 steps for one by Hertz's law
 
 
 @formula
 def contact_law(G, C, L, c):
-    """Exponent, dissipation and damping of contact c, and what its stiffness is or follows from."""
+    """Return exponent, dissipation, damping, stiffness and modulus of contact c."""
     a, b = G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]
     return (
         L.pair[a, b, EXPONENT],
@@ -67,7 +67,7 @@ def contact_law(G, C, L, c):
 
 @formula
 def contact_stiffness(G, C, L, c):
-    """Stiffness of contact c, 0 if it is hard; of spheres by E*: k = 4/3 E* sqrt(R), 1/R = 1/R_1 + 1/R_2."""
+    """Return the stiffness of contact c, 0 if it is rigid; of spheres by E*: k = 4/3 E* sqrt(R), 1/R = 1/R_1 + 1/R_2."""
     _, _, _, k, modulus = contact_law(G, C, L, c)
     if modulus > 0.0:
         s = 0.0
@@ -81,13 +81,13 @@ def contact_stiffness(G, C, L, c):
 
 @formula
 def elastic_energy(k, n, d):
-    """Stored at the overlap d."""
+    """Return the elastic energy at the overlap d."""
     return k * d ** (n + 1.0) / (n + 1.0) if d > 0.0 else 0.0
 
 
 @formula
 def elastic_force(k, n, d):
-    """Elastic force, and its slope."""
+    """Return the elastic force and its derivative."""
     if d <= 0.0:
         return 0.0, 0.0
     f = k * d**n
@@ -96,7 +96,7 @@ def elastic_force(k, n, d):
 
 @formula
 def mean_elastic_force(k, n, a, b):
-    """What the energy changes by from a to b, over the way; its slope with b."""
+    """Return the energy difference between a and b divided by b - a, and its derivative by b."""
     m, d = 0.5 * (a + b), b - a
     if abs(d) <= SMALL_CHANGE * abs(m):
         f, slope = elastic_force(k, n, m)
@@ -108,7 +108,7 @@ def mean_elastic_force(k, n, a, b):
 
 @formula
 def law_impulse(k, law, a, b, h, share):
-    """Impulse, less than 0 where the law would pull, and its slope with b."""
+    """Return the impulse, negative where the law would pull, and its derivative by b."""
     n, c, damping, _, _ = law
     mean, at_end = mean_elastic_force(k, n, a, b), elastic_force(k, n, b)
     f = (1.0 - share) * mean[0] + share * at_end[0]
@@ -120,14 +120,14 @@ def law_impulse(k, law, a, b, h, share):
 
 @formula
 def end_overlap(now, c, h, u):
-    """Overlap at the end of the step, of which the law is, with the rate u then."""
+    """Return the overlap at the end of the step in the contact law, given the rate u there."""
     s = now[c, HISTORY_SHARE]
     return now[c, HISTORY_OVERLAP] - h * (0.5 * (1.0 - s) * now[c, HISTORY_OVERLAP_RATE] + 0.5 * (1.0 + s) * u)
 
 
 @formula
 def find_compliant_contacts(G, C, P, L, X, pace, now, before):
-    """Put aside what is known of contacts that give way at the start of the step. Returns whether there are any."""
+    """Store the data of compliant contacts at the start of the step. Returns whether there are any."""
     any_ = False
     gone = pace.real[STORED_ENERGY]
     for c in range(C.count[FOUND]):
@@ -157,16 +157,16 @@ def find_compliant_contacts(G, C, P, L, X, pace, now, before):
 
 @formula
 def elastic_overlap(share, overlap, target):
-    """The part of an overlap that is its spring's."""
+    """Return the part of an overlap that stores elastic energy."""
     return overlap - share * max(0.0, overlap - max(target, 0.0))
 
 
 @formula
 def start_overlap(now, c, k, n, new):
-    """Set the overlap that contact c begins the step with; energy that comes of what is no spring's.
+    """Set the overlap of contact c at the start of the step; return the energy not accounted for by its spring.
 
-    What is too stiff for the step has the overlap that its law ended with. Where surfaces have turned, they overlap by
-    more, which displacements take away. Points that come and go take their energy from those that go and come.
+    A contact too stiff for the step has the overlap with which its law ended. Rotation of the surfaces increases the
+    overlap, which displacements remove. Appearing contact points take over the energy of disappearing ones.
     """
     s, kept = now[c, HISTORY_SHARE], now[c, HISTORY_SPRING_OVERLAP]
     now[c, HISTORY_OVERLAP] = elastic_overlap(s, now[c, HISTORY_OVERLAP], kept)
@@ -177,7 +177,7 @@ def start_overlap(now, c, k, n, new):
 
 @formula
 def expected_speed(C, now, before, c, pace):
-    """Speed of contact c along its normal, and what it may change by in the step: as it did in the one before."""
+    """Return the normal speed of contact c plus its expected change in the step, as in the step before."""
     o = C.at[c, BEFORE]
     change = (
         now[c, HISTORY_OVERLAP_RATE] - before[o, HISTORY_OVERLAP_RATE]
@@ -190,10 +190,10 @@ def expected_speed(C, now, before, c, pace):
 
 @formula
 def start_compliant_rows(G, C, P, L, X, pace, now, before):
-    """Choose shares, by how stiff the contacts are, and the first rows; ``X``: velocities without contact.
+    """Choose the implicit shares s by stiffness, and the first rows; ``X``: velocities without contact.
 
-    Rows are tangent to the law at the overlap that there was, or at that with these velocities. Returns whether the
-    step is to be divided: too long for an impact.
+    Rows are tangent to the law at the overlap of the step before, or at that with these velocities. Returns whether the
+    step must be divided because it is too long for an impact.
     """
     h, too_long = pace.real[STEP], False
     slow = rest_speed(pace, pace.real[LONGEST_STEP])
@@ -220,7 +220,7 @@ def start_compliant_rows(G, C, P, L, X, pace, now, before):
 
 @formula
 def tangent_row(G, C, P, L, pace, now, c, u):
-    """Make row c tangent to the law at the velocity u."""
+    """Linearise row c at the velocity u; return the impulse there."""
     h, mobility = pace.real[STEP], diagonal_block(P, c)[0]
     now[c, HISTORY_LAW_OVERLAP] = end_overlap(now, c, h, u)
     law = contact_law(G, C, L, c)
@@ -235,7 +235,7 @@ def tangent_row(G, C, P, L, pace, now, c, u):
 
 @formula
 def linearise_compliant_rows(G, C, P, L, X, pace, now):
-    """Rows that give way, tangent to the law at the velocities of ``X``; how far off the last were [m/s]."""
+    """Linearise compliant rows at the velocities of ``X``; return the largest error of the previous rows [m/s]."""
     worst = 0.0
     for c in range(C.count[FOUND]):
         if now[c, HISTORY_STIFFNESS] > 0.0:
@@ -248,7 +248,7 @@ def linearise_compliant_rows(G, C, P, L, X, pace, now):
 
 @formula
 def restore_free_velocities(N, M, X):
-    """Velocities without contact, from which the rows are solved once more."""
+    """Restore the velocities without contact, from which the rows are solved again."""
     for k in range(N.body.shape[0]):
         for i in range(6):
             X.v[k, i] = M.twist[k, i]
@@ -256,7 +256,7 @@ def restore_free_velocities(N, M, X):
 
 @formula
 def remaining_gap(now, c, gap):
-    """What is left of the gap at the end of the step beyond that at which contact c comes to be, if it gives way."""
+    """Return the gap at the end of the step beyond that at which the law of contact c ends, if it is compliant."""
     if now[c, HISTORY_STIFFNESS] > 0.0:
         now[c, HISTORY_END_GAP] = gap
         return gap + max(now[c, HISTORY_LAW_OVERLAP], 0.0)
@@ -265,7 +265,7 @@ def remaining_gap(now, c, gap):
 
 @formula
 def dissipated_energy(k, law, now, c, h, pressed):
-    """Energy that the law itself takes in the step; all that was stored where it would pull."""
+    """Return the energy that the law dissipates in the step; all stored energy where the law would pull."""
     n, dissipation, damping, _, _ = law
     a, b = now[c, HISTORY_OVERLAP], now[c, HISTORY_LAW_OVERLAP]
     if dissipation == 0.0 and damping == 0.0:
@@ -281,10 +281,7 @@ def dissipated_energy(k, law, now, c, h, pressed):
 
 @formula
 def store_elastic_energy(G, C, P, L, X, Y, pace, now):
-    """Energy in contacts at the end of the step, and what of the work done on them was not stored.
-
-    What the law does not take of that is the method's.
-    """
+    """Update the elastic energy of contacts at the end of the step, and the energy dissipated or lost numerically."""
     h = pace.real[STEP]
     pace.real[STORED_ENERGY] = 0.0
     for c in range(C.count[FOUND]):
@@ -303,5 +300,5 @@ def store_elastic_energy(G, C, P, L, X, Y, pace, now):
 
 @formula
 def law_is_met(worst, residual, pace):
-    """Whether rows are as near to the law as velocities are asked to be, or as they came."""
+    """Return whether rows agree with the law to the velocity tolerance, or to the residual of the solve."""
     return worst <= max(LAW_TOLERANCE * pace.real[VELOCITY_TOLERANCE], RESIDUAL_SHARE * residual)

@@ -1,16 +1,15 @@
 """Contacts as constraints of the cone problem: rows, warm start, persistent contacts, energy account.
 
-A contact that pressed in the step before, and neither opens nor is hit, takes no energy if its impulse p acts
-along the row D along which the mean velocity of the step vanishes: its work is p . D (v- + v+) / 2. So D v+ = -D
-v-, with rows in the middle of the step, where bodies are after half of it with the velocities of its start. This
-is the midpoint rule of constraints. Gaps and overlaps that are left are closed by displacements, as far as the
-contact presses; what these change the energy of gravity by is the error that is left, of third order in the step.
+A persistent contact pressed in the step before and neither opens nor has an impact. It does no work if its impulse p
+acts along the row D along which the mean velocity of the step vanishes: the work is p . D (v- + v+) / 2, so
+D v+ = -D v-. The rows are taken in the middle of the step, where bodies are after half of it with the initial
+velocities. This is the midpoint rule of constraints. Displacements close the remaining gaps and overlaps, as far as the
+contact presses. The change of gravity's energy by them is the remaining error, of third order in the step.
 
-The rule returns a velocity that the contact has at the start of the step with the opposite sign, so that what
-impacts and solvers leave would never decay. It is used where this velocity is less than the change of the rows in
-half a step, which is of a lower order in smooth motion; else the velocity at the start is left out, and the
-contact has at the end of the step only the change of its rows. The same holds along the tangents of what slides or
-has just come to stick.
+The rule reverses the sign of the contact's velocity at the start of the step, so that residuals of impacts and solvers
+would never decay. It is used where this velocity is less than the change of the rows in half a step, which is of lower
+order in smooth motion. Otherwise the velocity at the start is left out, and the contact has at the end of the step only
+the change of its rows. The same holds along the tangents of sliding contacts and of those that have just come to stick.
 """
 
 from __future__ import annotations
@@ -68,7 +67,7 @@ from .stepping_tables import (
 
 @formula
 def fill_rows(G, M, C, P, L, pace):
-    """Everything of the problem but impulses and masses; its sizes too."""
+    """Fill the contact problem except impulses and masses; its sizes too."""
     h = pace.real[STEP]
     P.size[0] = C.count[FOUND]
     P.island[0], P.island[1] = 0, C.count[FOUND]
@@ -93,19 +92,19 @@ def fill_rows(G, M, C, P, L, pace):
 
 @formula
 def movers_of_contact(G, C, c):
-    """Movers of contact c."""
+    """Return the movers of contact c."""
     return G.shape_i[C.at[c, SHAPE_1], MOVER], G.shape_i[C.at[c, SHAPE_2], MOVER]
 
 
 @formula
 def arm_to(M, a, point):
-    """From the origin of mover a to a point; 0 for what stands still."""
+    """Return the vector from the origin of mover a to a point; 0 for fixed shapes."""
     return sub(point, load3(M.pose, a, 0)) if a >= 0 else (0.0, 0.0, 0.0)
 
 
 @formula
 def fill_tangents(G, M, C, P, L, c):
-    """Tangents of contact c, and how its surfaces move along these by themselves."""
+    """Set the tangents of contact c, and the velocities of moving surfaces along them."""
     i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
     a, b = G.shape_i[i, MOVER], G.shape_i[j, MOVER]
     law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
@@ -119,9 +118,11 @@ def fill_tangents(G, M, C, P, L, c):
 
 @formula
 def tangent_direction(M, L, first, second, n):
-    """A tangent along the grain of either shape, and whether there is none in the tangent plane: then it is any other.
+    """Return a tangent along the grain of either shape, and whether any tangent may serve (no grain in the tangent
+    plane).
 
-    ``first`` and ``second``: shape and mover. Of two surfaces with a grain, friction does not depend on the direction.
+    ``first`` and ``second``: shape and mover. Between two surfaces with a grain, friction does not depend on the
+    direction.
     """
     if L.grain.shape[0] > 0:
         for shape, mover in (first, second):
@@ -135,20 +136,20 @@ def tangent_direction(M, L, first, second, n):
 
 @formula
 def in_world_axes(M, a, g):
-    """A vector in the axes of mover a, or of what stands still, along the world's."""
+    """Return a vector in the axes of mover a, or of a fixed shape, in world axes."""
     return mv(load9(M.pose, a, 3), g) if a >= 0 else g
 
 
 @formula
 def write_tangents(frame, c, t, along, across):
-    """Rows t1 = along t and t2 = across n x t: in a circular cone, forces are so many times as large in either."""
+    """Set the rows t1 = along t and t2 = across n x t; they scale a circular cone to an elliptic one."""
     store3(frame, c, 3, scale(along, t))
     store3(frame, c, 6, scale(across, cross(load3(frame, c, 0), t)))
 
 
 @formula
 def add_surface_velocity(M, L, P, c, shape, mover, sign):
-    """The velocity of a surface on its mover, such as a conveyor's."""
+    """Add the velocity of a surface relative to its mover, such as a conveyor's."""
     g = in_world_axes(M, mover, load3(L.belt, shape, 0))
     for k in range(2):
         P.bias[c, 1 + k] += sign * dot(load3(P.frame, c, 3 + 3 * k), g)
@@ -156,7 +157,7 @@ def add_surface_velocity(M, L, P, c, shape, mover, sign):
 
 @formula
 def warm_start(C, P, X, now, before):
-    """Impulses of the same contacts in the step before; what stuck there has the static friction coefficient."""
+    """Start from the impulses of the same contacts in the step before; note which contacts stuck."""
     for c in range(C.count[FOUND]):
         o = C.at[c, BEFORE]
         now[c, HISTORY_SLIDING] = before[o, HISTORY_SLIDING] if o >= 0 else -1.0
@@ -167,7 +168,9 @@ def warm_start(C, P, X, now, before):
 
 @formula
 def previous_impulse(P, c, before, o, first):
-    """What `to_world_frame` makes a vector in the world that is kept in row o; 0 where nothing is (-1)."""
+    """Return the stored world vector of row o in the contact frame, the inverse of `to_world_frame`; 0 without row
+    (-1).
+    """
     if o < 0:
         return (0.0, 0.0, 0.0)
     x = to_contact_frame(P, c, load3(before, o, first))
@@ -177,14 +180,14 @@ def previous_impulse(P, c, before, o, first):
 
 @formula
 def projection_coefficient(x, row):
-    """Product x of a vector and a row over the row's square; 0 along a row that is zero, where friction is none."""
+    """Return x divided by the square of a row; 0 for a zero row, where there is no friction."""
     square = dot(row, row)
     return x / square if square > 0.0 else 0.0 * x
 
 
 @formula
 def static_friction_of_sticking(G, C, P, L, X, pace, now):
-    """The static coefficient for contacts that stuck before, and for new ones that hardly slide."""
+    """Set the static coefficient for contacts that stuck before, and for new ones that hardly slide."""
     slow = speed_of_fall(pace, pace.real[STEP])
     for c in range(C.count[FOUND]):
         law = L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]]
@@ -196,19 +199,19 @@ def static_friction_of_sticking(G, C, P, L, X, pace, now):
 
 
 SAME_NORMAL = (
-    0.95  # cosine between normals of a step's start and its middle from which on a contact is none that goes on
+    0.95  # least cosine between the normals at start and middle of the step of a persistent contact
 )
 LARGEST_JUMP = (
-    0.3  # part of the velocities by which rows may change in half a step: a contact that jumps does not go on
+    0.3  # largest relative change of velocities by the change of rows in half a step, for a persistent contact
 )
-CLEAR_FACTOR = 10.0  # times the residual of the last solve: what is slower may be noise of it
-NO_CHANGE = 1e-9  # change of a normal, or turn of a body, in a step that is none
-NO_ARM = 1e-10  # part of an arm across the normal that is none: as in balls
+CLEAR_FACTOR = 10.0  # factor of the residual of the last solve below which a speed may be an error of it
+NO_CHANGE = 1e-9  # negligible change of a normal, or rotation of a body, in a step
+NO_ARM = 1e-10  # negligible part of an arm across the normal, as for spheres
 
 
 @formula
 def side_of_contact(P, M, G, C, c, side):
-    """Mover of a side of contact c, its arm, and the part of that across the normal, 0 where nothing moves."""
+    """Return the mover on a side of contact c, its arm, and the part of the arm across the normal (0 if negligible)."""
     a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
     n, r = load3(P.frame, c, 0), load3(P.arm, c, 3 * side)
     s = sub(r, scale(dot(r, n), n))
@@ -219,14 +222,16 @@ def side_of_contact(P, M, G, C, c, side):
 
 @formula
 def arms_along_normal(P, M, G, C, c):
-    """Whether both arms are along the normal."""
+    """Return whether both arms are along the normal."""
     s, t = side_of_contact(P, M, G, C, c, 0)[2], side_of_contact(P, M, G, C, c, 1)[2]
     return dot(s, s) + dot(t, t) == 0.0
 
 
 @formula
 def rows_change(G, M, C, D, P, c, h):
-    """Whether the rows of contact c change within the step: normals turn, or bodies whose arms are across them."""
+    """Return whether the rows of contact c change within the step, by rotation of normals or of bodies with transverse
+    arms.
+    """
     change = norm(sub(load3(C.x, c, NORMAL), load3(D.x, C.at[c, BEFORE], NORMAL)))
     for side in range(2):
         a, _, s = side_of_contact(P, M, G, C, c, side)
@@ -237,13 +242,13 @@ def rows_change(G, M, C, D, P, c, h):
 
 @formula
 def point_velocity(M, a, r):
-    """Velocity of the point at r from the origin of mover a."""
+    """Return the velocity of the point at r from the origin of mover a."""
     return add(load3(M.twist, a, 0), cross(load3(M.twist, a, 3), r)) if a >= 0 else (0.0, 0.0, 0.0)
 
 
 @formula
 def contact_jumps(M, P, c, movers, arms):
-    """Whether contact c with other arms is elsewhere: where bodies move otherwise by a part of their speeds."""
+    """Return whether other arms of contact c change the velocities by more than a part of the bodies' speeds."""
     fast, way = 0.0, (0.0, 0.0, 0.0)
     for side in range(2):
         a, r = movers[side], load3(P.arm, c, 3 * side)
@@ -255,7 +260,7 @@ def contact_jumps(M, P, c, movers, arms):
 
 @formula
 def save_start(N, M, X):
-    """Keep poses, and twists, which at the start of a step are in ``M`` those of the mechanism's bodies only."""
+    """Store poses and twists; at the start of a step ``M`` has the present twists of the mechanism's bodies only."""
     for k in range(M.pose.shape[0]):
         for i in range(12):
             N.start[k, i] = M.pose[k, i]
@@ -265,7 +270,7 @@ def save_start(N, M, X):
 
 @formula
 def start_velocity(G, C, N, P, X, c):
-    """Relative velocity of contact c at the start of the step, in the world."""
+    """Return the relative velocity of contact c at the start of the step, in world axes."""
     u = (0.0, 0.0, 0.0)
     for side in range(2):
         a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
@@ -277,7 +282,7 @@ def start_velocity(G, C, N, P, X, c):
 
 @formula
 def start_twist(N, X, a):
-    """Velocities of mover a at the start of the step."""
+    """Return the velocities of mover a at the start of the step."""
     if a < N.body.shape[0]:
         return load3(X.v, a, 0), load3(X.v, a, 3)
     return load3(N.start, a, 12), load3(N.start, a, 15)
@@ -285,7 +290,7 @@ def start_twist(N, X, a):
 
 @formula
 def speed_is_clear(G, C, N, P, X, c, pace):
-    """Whether the bodies' speeds at contact c are more than what the last solve left."""
+    """Return whether the bodies' speeds at contact c exceed the residual of the last solve."""
     fast, way = 0.0, (0.0, 0.0, 0.0)
     for side in range(2):
         a = G.shape_i[C.at[c, SHAPE_1 if side == 0 else SHAPE_2], MOVER]
@@ -298,7 +303,7 @@ def speed_is_clear(G, C, N, P, X, c, pace):
 
 @formula
 def had_impact(now, c):
-    """Whether contact c had an impact before the step."""
+    """Return whether contact c had an impact before the step."""
     return (
         now[c, HISTORY_IMPACT_IMPULSE] != 0.0
         or now[c, HISTORY_IMPACT_IMPULSE + 1] != 0.0
@@ -308,7 +313,7 @@ def had_impact(now, c):
 
 @formula
 def was_in_impact(G, C, now, c, impacts):
-    """Whether contact c was hit before the step, or a mechanism that it is on.
+    """Return whether contact c, or a mechanism that it is on, had an impact before the step.
 
     impacts: first mover of the mechanism, and whether there were any.
     """
@@ -319,7 +324,9 @@ def was_in_impact(G, C, now, c, impacts):
 
 @formula
 def find_persistent_contacts(G, M, C, D, N, P, X, L, pace, now, before, impacts):
-    """Which contacts go on, and the relative velocities at the start. Returns whether rows are wanted in the middle."""
+    """Find persistent contacts, and the relative velocities at the start. Returns whether rows in the middle are
+    needed.
+    """
     h, wanted = pace.real[STEP], False
     slow = rest_speed(pace, h)
     for c in range(C.count[FOUND]):
@@ -342,7 +349,7 @@ def find_persistent_contacts(G, M, C, D, N, P, X, L, pace, now, before, impacts)
 
 @formula
 def move_half_step(N, M, X, h):
-    """Free bodies where they are after half the step with the velocities of its start."""
+    """Move free bodies by half the step with the velocities at its start."""
     for k in range(N.body.shape[0]):
         w = load3(X.v, k, 3)
         store3(M.pose, k, 0, add(load3(M.pose, k, 0), scale(0.5 * h, load3(X.v, k, 0))))
@@ -354,7 +361,7 @@ def move_half_step(N, M, X, h):
 
 @formula
 def restore_poses(N, M):
-    """Poses of the start of the step again."""
+    """Restore the poses at the start of the step."""
     for k in range(M.pose.shape[0]):
         for i in range(12):
             M.pose[k, i] = N.start[k, i]
@@ -362,7 +369,7 @@ def restore_poses(N, M):
 
 @formula
 def middle_rows(G, M, C, H, P, L, now):
-    """Rows of the contacts that go on, with poses and contacts ``H`` of the middle. Returns whether there are any."""
+    """Set the rows of persistent contacts from poses and contacts ``H`` in the middle. Returns whether there are any."""
     found = False
     for k in range(H.count[FOUND]):
         c = H.at[k, BEFORE]
@@ -373,7 +380,7 @@ def middle_rows(G, M, C, H, P, L, now):
         r, s = arm_to(M, a, point), arm_to(M, b, point)
         if dot(n, load3(P.frame, c, 0)) < SAME_NORMAL or contact_jumps(M, P, c, (a, b), (r, s)):
             continue
-        if arms_along_normal(P, M, G, C, c):  # it stays so to rounding
+        if arms_along_normal(P, M, G, C, c):  # keep it exact
             r, s = scale(dot(r, n), n), scale(dot(s, n), n)
         store3(P.frame, c, 0, n)
         store3(P.arm, c, 0, r)
@@ -386,7 +393,7 @@ def middle_rows(G, M, C, H, P, L, now):
 
 @formula
 def bias_persistent_contacts(G, M, C, P, X, now, before):
-    """Biases of the contacts whose rows are in the middle; see above."""
+    """Set the biases of contacts with rows in the middle of the step; see the module docstring."""
     for c in range(C.count[FOUND]):
         if now[c, HISTORY_PERSISTS] != MIDDLE_FOUND:
             continue
@@ -403,23 +410,24 @@ def bias_persistent_contacts(G, M, C, P, X, now, before):
                 s, t = u[1] + own[0], u[2] + own[1]
             ahead = (ahead[0], s, t)
         store3(now, c, HISTORY_MIDDLE_BIAS, ahead)
-        if mean:  # displacements close its gap
+        if mean:  # its gap is closed by displacements
             P.bias[c, 0] = 0.0
         else:
             now[c, HISTORY_PERSISTS] = MIDDLE_WANTED
         store3(P.bias, c, 0, add(load3(P.bias, c, 0), ahead))
 
 
-CONE_TOLERANCE = 1e-9  # part of the friction cone's radius within which an impulse is on it
+CONE_TOLERANCE = 1e-9  # relative distance from the friction cone within which an impulse is on it
 
 
 @formula
 def account_contact(P, X, c, u, pace, now):
-    """Impulse of contact c for the next step, and its work at the mean velocities u of the step.
+    """Store the impulse of contact c for the next step, and account for its work at the mean velocities u of the step.
 
-    A contact that goes on neither opens nor is hit: work along its normal is the method's error, and so is that along
-    its tangents where it sticks before and after. Friction never gives energy: what it would have given as a mean of
-    the step is the other part's, whose sum with it is exact.
+    For a persistent contact, work along the normal is a numerical error, and so is work along its tangents if it sticks
+    before and after. Friction never supplies energy: a negative mean loss is added to the other account, whose sum with
+    it
+    is exact.
     """
     n, s, t = X.p[c, 0], X.p[c, 1], X.p[c, 2]
     store3(now, c, HISTORY_IMPULSE, to_world_frame(P, c, n, s, t))
@@ -441,7 +449,9 @@ def account_contact(P, X, c, u, pace, now):
 
 @formula
 def account_rolling(P, X, Y, c, pace, now):
-    """Impulse of rolling and spinning friction at contact c, and its work at the mean velocities ``Y`` of the step."""
+    """Store the impulse of rolling and spinning friction at contact c, and account for its work at mean velocities
+    ``Y``.
+    """
     t = load3(X.torque, c, 0)
     store3(now, c, HISTORY_TORQUE, to_world_frame(P, c, t[0], t[1], t[2]))
     worn = -dot(t, contact_angular_velocity(P, Y.v, Y.wide, c))

@@ -1,4 +1,4 @@
-"""Free bodies in a step: gravity, displacements, and rotation that keeps angular momentum and energy exactly."""
+"""Free bodies in a step: gravity, displacements, and rotation that conserves angular momentum and energy exactly."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ from .stepping_tables import (
     STEP,
 )
 
-SPIN_ITERATIONS = 20  # of Newton's method for half a step of turning; three or four are usual
-SPIN_TOLERANCE = 1e-15  # change of the angular momentum, relative to it, that is rounding
+SPIN_ITERATIONS = 20  # Newton iterations for half a step of rotation; three or four are usual
+SPIN_TOLERANCE = 1e-15  # relative change of the angular momentum that is rounding
 
 
 @formula
 def turned_by_cayley(q, w, h):
-    """The unit quaternion after turning by Cayley's map of h w, w along the world's axes.
+    """Return the unit quaternion after the Cayley map of h w, w in world axes.
 
-    The rotation is cay(h w) = (1 - h/2 [w])^-1 (1 + h/2 [w]), whose quaternion is (1, h w / 2) made unit.
+    The rotation is cay(h w) = (1 - h/2 [w])^-1 (1 + h/2 [w]), whose quaternion is (1, h w / 2) normalised.
     """
     e = scale(0.5 * h, w)
     return unit_quaternion(quaternion_product((1.0, e[0], e[1], e[2]), q))
@@ -55,7 +55,7 @@ def turned_by_cayley(q, w, h):
 
 @formula
 def turned_by_angle(q, w, h):
-    """The unit quaternion after turning by the angle |w| h about w, which is exact where w stays what it is."""
+    """Return the unit quaternion after a rotation by |w| h about w, which is exact for constant w."""
     a = sqrt(dot(w, w))
     half = 0.5 * h * a
     e = scale(sin(half) / a, w)
@@ -64,18 +64,17 @@ def turned_by_angle(q, w, h):
 
 @formula
 def unit_quaternion(q):
-    """A quaternion made one of length 1."""
+    """Return the normalised quaternion."""
     s = 1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return (s * q[0], s * q[1], s * q[2], s * q[3])
 
 
 @formula
 def mean_spin(inverse, momentum, h):
-    """Angular velocity, in body axes, that a free body turns with for a step h: (mean, momentum at the end).
+    """Return the mean angular velocity in body axes of a free body in a step h, and the angular momentum at its end.
 
-    With p the angular momentum in body axes, p+ - p = h m x w, w = J^-1 m, m = (p + p+) / 2, and the turn cay(h w):
-    energy and momentum stay what they are (Lewis and Simo, 1994, section 3). By Newton's method on m:
-    m - h/2 m x J^-1 m = p.
+    With p the angular momentum in body axes, p+ - p = h m x w, w = J^-1 m, m = (p + p+) / 2, and the rotation cay(h w),
+    energy and momentum are conserved (Lewis and Simo, 1994, section 3). Newton's method on m: m - h/2 m x J^-1 m = p.
     """
     p = momentum
     m = p
@@ -90,7 +89,7 @@ def mean_spin(inverse, momentum, h):
 
 @formula
 def newton_correction(inverse, m, w, h, e):
-    """(1 - h/2 ([m] J^-1 - [w]))^-1 e, the step of Newton's method, by the columns of the matrix."""
+    """Return (1 - h/2 ([m] J^-1 - [w]))^-1 e, the step of Newton's method, from the columns of the matrix."""
     a = newton_column(inverse, m, w, h, (1.0, 0.0, 0.0))
     b = newton_column(inverse, m, w, h, (0.0, 1.0, 0.0))
     c = newton_column(inverse, m, w, h, (0.0, 0.0, 1.0))
@@ -106,36 +105,36 @@ def newton_column(inverse, m, w, h, d):
 
 @formula
 def inverse_in_world(R, J, k, node):
-    """The inverse inertia along the world's axes, R J^-1 R', into a node of the cone problem."""
+    """Write the inverse inertia in world axes, R J^-1 R', into a node of the cone problem."""
     xx, xy, xz, yy, yz, zz = symmetric_block(J, k, FREE_INVERSE)
     set_symmetric_block(node, k, INVERSE_INERTIA, turned_inertia(R, (xx, xy, xz, xy, yy, yz, xz, yz, zz)))
 
 
 def rotation_matrices(turn: np.ndarray) -> np.ndarray:
-    """Rotations (n, 9), row by row, of unit quaternions (n, 4)."""
+    """Return the rotation matrices (n, 9), row by row, of unit quaternions (n, 4)."""
     return np.stack(quaternion_matrix(*turn.T), axis=1)
 
 
 NO_SPIN = 1e-300
-REST_FACTOR = 2.0  # times the speed that gravity makes in a step: what is slower rests
+REST_FACTOR = 2.0  # closing speed of a resting contact, relative to the speed by gravity in a step
 
 
 @formula
 def speed_of_fall(pace, h):
-    """Speed that gravity makes in h seconds."""
+    """Return the speed that gravity causes in h seconds."""
     g0, g1, g2 = pace.real[GRAVITY], pace.real[GRAVITY + 1], pace.real[GRAVITY + 2]
     return h * sqrt(g0 * g0 + g1 * g1 + g2 * g2)
 
 
 @formula
 def rest_speed(pace, h):
-    """Speed up to which what closes rests, or comes to rest, and is not hit, in steps of h seconds."""
+    """Return the closing speed up to which a contact rests, rather than having an impact, in steps of h seconds."""
     return max(pace.real[NO_BOUNCE_BELOW], REST_FACTOR * speed_of_fall(pace, h))
 
 
 @formula
 def velocities_without_contact(N, M, P, X, pace):
-    """Velocities without contact, in ``M.twist``; masses of the nodes. ``X.v`` keeps those of the start."""
+    """Compute the velocities without contact in ``M.twist``, and the masses of the nodes; ``X.v`` keeps the start."""
     h = pace.real[STEP]
     for k in range(N.body.shape[0]):
         for i in range(3):
@@ -148,7 +147,7 @@ def velocities_without_contact(N, M, P, X, pace):
 
 @formula
 def start_from_free_velocities(N, M, X):
-    """Keep the velocities of the start, and go on from those without contact."""
+    """Store the velocities at the start, and continue from those without contact."""
     for k in range(N.body.shape[0]):
         for i in range(6):
             N.before[k, i] = X.v[k, i]
@@ -157,7 +156,7 @@ def start_from_free_velocities(N, M, X):
 
 @formula
 def mean_velocities(N, X, Y):
-    """The mean velocities of the step in ``Y``; by what they differ from those at its end in ``N.move``."""
+    """Compute the mean velocities of the step in ``Y``, and their difference from those at its end in ``N.move``."""
     for k in range(N.body.shape[0]):
         for i in range(6):
             N.move[k, i] = 0.5 * (N.before[k, i] - X.v[k, i])
@@ -166,7 +165,7 @@ def mean_velocities(N, X, Y):
 
 @formula
 def clear_velocities(Y):
-    """No velocities."""
+    """Set all velocities to zero."""
     for k in range(Y.v.shape[0]):
         for i in range(6):
             Y.v[k, i] = 0.0
@@ -176,11 +175,13 @@ def clear_velocities(Y):
 
 @formula
 def displace_bodies(N, M, X, displacements, pace):
-    """Positions and turns at the end of the step.
+    """Compute positions and orientations at the end of the step.
 
-    By the velocities at its end, and then by what displaces bodies beside these: x += h v + h d, d = ``N.move`` and
-    the velocities of ``displacements``. Turns by v keep energy and angular momentum; d takes the velocities along, so that it
-    changes no energy. What the lifts change the energy of gravity by is the method's.
+    Bodies move with the velocities at the end and the additional displacements: x += h v + h d, where d is ``N.move``
+    plus
+    ``displacements``. Rotation by v conserves energy and angular momentum. The rotation d also rotates the velocities,
+    so
+    that it changes no energy. The change of gravity's energy by displacements is accounted as numerical.
     """
     h = pace.real[STEP]
     for k in range(N.body.shape[0]):

@@ -1,19 +1,19 @@
-"""Springs and dampers of the mechanism taken implicitly, as an addition of low rank to the mass matrix.
+"""Springs and dampers of the mechanism treated implicitly, as a low-rank addition to the mass matrix.
 
 A force s along J v, with stiffness k and damping c, is taken at
 
     x + (1 - b) / 4 h (r+ - r-) + b h r+   and   (1 - b) / 2 r- + (1 + b) / 2 r+
 
-x being the place at half the step, r- and r+ the rates at the ends of the step: J v- and J v+ less and more h / 2
-times the bias acceleration. With b = 0 that is the trapezoidal rule, which keeps the energy of a linear spring;
-with b = 1 whatever is stiff is at rest after two steps. Between them it is stable for any h, k, c: with z = h^2 k
-/ m the matrix of one step has the determinant (1 + (1 - b) / 4 z) / (1 + b' z), where b' = (1 + 3 b) / 4. b goes
-with the square of z, so that the step stays of second order. M + J' A J, with A = h^2 k b' + h c (1 + b) / 2, is
-inverted by Sherman, Morrison and Woodbury's formula.
+where x is the position at half the step, and r- and r+ are the rates at the ends of the step: J v- and J v+ less and
+plus h / 2 times the bias acceleration. With b = 0 this is the trapezoidal rule, which conserves the energy of a linear
+spring; with b = 1 a stiff spring is at rest after two steps. In between it is stable for any h, k, c: with z = h^2 k /
+m
+the matrix of one step has the determinant (1 + (1 - b) / 4 z) / (1 + b' z), where b' = (1 + 3 b) / 4. b grows with the
+square of z, so that the step stays of second order. M + J' A J, with A = h^2 k b' + h c (1 + b) / 2, is inverted by the
+Sherman-Morrison-Woodbury formula.
 
-The end of a stiff spring that rotates leaves the line along which the spring was taken implicitly, by w^2 h^2 / 8
-of its length, more than a stiff spring ever yields: its length at the end of the step is corrected along its own
-response.
+The end of a rotating stiff spring leaves the line along which the spring was linearised by w^2 h^2 / 8 of its length,
+more than a stiff spring ever deflects. Its length at the end of the step is therefore corrected along its own response.
 """
 
 from __future__ import annotations
@@ -41,12 +41,14 @@ from .stepping_tables import (
     STEP_DISPLACEMENT,
 )
 
-SOFT_SPRING = 1e-3  # h^2 k / m + h c / m: what is softer than this is left to the evaluation at half the step
+SOFT_SPRING = 1e-3  # h^2 k / m + h c / m below which a spring is evaluated explicitly at half the step
 
 
 @formula
 def add_wrench_power(S, W, b, out, at, sign, force, torque, point):
-    """Add the power of a wrench on body b along all velocities that move it; ``out[at]`` is that of velocity 0."""
+    """Add the power of a wrench on body b for unit velocities of all bodies that carry it; ``out[at]`` is that of
+    velocity 0.
+    """
     while b >= 0:
         if S.tree.nv[b] > 0:
             project_wrench(S, W, b, out, at + S.tree.v[b], sign, force, torque, point)
@@ -55,7 +57,7 @@ def add_wrench_power(S, W, b, out, at, sign, force, torque, point):
 
 @formula
 def spring_gradient(S, W, k, n, i, row):
-    """What force k acts along, direction i of n, as a row over all velocities."""
+    """Compute the gradient of direction i of n of force k, as a row over all velocities."""
     for d in range(row.shape[0]):
         row[d] = 0.0
     if S.forces.family[k] == 1:
@@ -82,7 +84,7 @@ def dot_rows(a, b):
 
 @formula
 def impulse_response(A, force, out):
-    """What generalised impulses change the velocities by, rows of joints closed; springs have no say."""
+    """Compute the change of velocities by generalised impulses with closed joints, without implicit springs."""
     nv, nr = A.wide.shape[1], A.S.rows.law.shape[0]
     rows = A.output.rows
     for d in range(nv):
@@ -96,7 +98,7 @@ def impulse_response(A, force, out):
 
 @formula
 def find_implicit_springs(A, h):
-    """Find what is to be taken implicitly, at the state evaluated last, and factor what it adds."""
+    """Find the springs to be treated implicitly, at the state evaluated last, and factorise their contribution."""
     S, W = A.S, A.W
     A.count.springs = 0
     if S.forces.F.shape[0] == 0:
@@ -118,11 +120,11 @@ def find_implicit_springs(A, h):
 
 @formula
 def add_spring(A, h, n, which, stiffness, damping):
-    """Put a spring into row n of the tables; whether it is stiff enough to stay there."""
+    """Write a spring into row n of the tables. Returns whether it is stiff enough to be kept."""
     J, Y, x = A.spring_J[n], A.spring_Y[n], A.spring_x[n]
     spring_gradient(A.S, A.W, which[0], which[1], which[2], J)
     z = h * (h * stiffness + damping)
-    if A.S.sizes.solver == SCHUR:  # joints make nothing lighter
+    if A.S.sizes.solver == SCHUR:  # joints never increase the response
         for b in range(A.S.tree.parent.shape[0]):
             apply_inverse_mass(A.S, b, J, A.S.tree.v[b], Y, A.S.tree.v[b])
         if z * dot_rows(J, Y) < SOFT_SPRING:
@@ -140,7 +142,7 @@ def add_spring(A, h, n, which, stiffness, damping):
 
 @formula
 def factor_springs(A):
-    """Cholesky's factor of 1 / A + J M^-1 J'."""
+    """Compute the Cholesky factor of 1 / A + J M^-1 J'."""
     C = A.stiff
     for i in range(A.count.springs):
         for j in range(i + 1):
@@ -154,7 +156,7 @@ def factor_springs(A):
 
 @formula
 def with_spring_response(A, x):
-    """Turn a response without springs into one with them, in place."""
+    """Change a response without springs to one with them, in place."""
     n, t = A.count.springs, A.spring_x
     for i in range(n):
         t[i, SPRING_SOLUTION] = dot_rows(A.spring_J[i], x)
@@ -166,7 +168,7 @@ def with_spring_response(A, x):
 
 @formula
 def solve_springs(A):
-    """Solve with Cholesky's factor, in place."""
+    """Solve with the Cholesky factor, in place."""
     n, C, t = A.count.springs, A.stiff, A.spring_x
     for i in range(n):
         s = t[i, SPRING_SOLUTION]
@@ -182,7 +184,7 @@ def solve_springs(A):
 
 @formula
 def spring_impulse(A, h, i, before, change):
-    """Impulse against spring i beyond the force at half the step and half the change of velocities."""
+    """Return the impulse of spring i beyond that of the force at half the step, for this change of velocities."""
     x = A.spring_x[i]
     b, bend = x[SPRING_SHARE], h * x[SPRING_BIAS]
     r, dr = dot_rows(A.spring_J[i], before) - 0.5 * bend, dot_rows(A.spring_J[i], change) + bend
@@ -190,13 +192,13 @@ def spring_impulse(A, h, i, before, change):
 
 
 LENGTH_ITERATIONS = 3
-STIFF_SHARE = 1e-3  # share of the end of the step from which on a spring is put right
-LENGTH_TOLERANCE = 1e-12  # change of a spring's length that is none, of its own or a radian
+STIFF_SHARE = 1e-3  # implicit share b above which the length of a spring is corrected
+LENGTH_TOLERANCE = 1e-12  # negligible change of a spring's length, relative to itself or a radian
 
 
 @formula
 def force_length(S, W, k, n, i):
-    """How far force k is along its direction i of n, at the kinematics in W."""
+    """Return the length of force k along its direction i of n, at the kinematics in W."""
     if S.forces.family[k] == 1:
         return W.sensed[VALUE, S.forces.F[k]]
     F, M = load_record(W.FK, S.forces.F[k]), load_record(W.FK, S.forces.M[k])
@@ -217,7 +219,7 @@ def spring_length(A, i):
 
 @formula
 def save_spring_biases(A):
-    """Keep the bias accelerations of what springs act along."""
+    """Store the bias accelerations of the springs' lengths."""
     for i in range(A.count.springs):
         x = A.spring_x[i]
         k = int(x[SPRING_FORCE])
@@ -230,7 +232,7 @@ def save_spring_biases(A):
 
 @formula
 def distance_bias(F, M):
-    """Bias acceleration of the distance of two origins."""
+    """Return the bias acceleration of the distance of two origins."""
     d, u = sub(M[0], F[0]), sub(M[3], F[3])
     far = norm(d)
     if not far > 0.0:
@@ -241,14 +243,14 @@ def distance_bias(F, M):
 
 @formula
 def save_spring_lengths(A):
-    """Keep where the springs are at half the step."""
+    """Store the lengths of the springs at half the step."""
     for i in range(A.count.springs):
         A.spring_x[i, SPRING_LENGTH] = spring_length(A, i)
 
 
 @formula
 def correct_spring_lengths(A):
-    """Move the positions in the clock, which went ``A.wide[WAY]`` from half the step, to where springs were told."""
+    """Correct the positions at the end of the step, so that spring lengths agree with their linearised values."""
     stiff = False
     for i in range(A.count.springs):
         stiff = stiff or A.spring_x[i, SPRING_SHARE] > STIFF_SHARE

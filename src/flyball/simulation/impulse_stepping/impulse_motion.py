@@ -1,4 +1,4 @@
-"""Motion by impulse time stepping, from the model to its result: steps to the output times, health."""
+"""Motion by impulse time stepping, from the model to its result: steps to the output times, health report."""
 
 from __future__ import annotations
 
@@ -79,15 +79,15 @@ ENERGY_SUMS = (LOST_FRICTION, LOST_IMPACT, GIVEN_BY_SURFACES, NUMERICAL, STORED_
 
 
 class OutputRecorder:
-    """Rows of output, put together at the end.
+    """Output rows, assembled at the end.
 
     Parameters
     ----------
     stepper : Stepper
-    held : Held, optional
-        The mechanism.
+    held : MechanismMotion, optional
+        The jointed mechanism.
     side_of : (movers + 1,) of int
-        Of each mover the side that it is in `ContactBodies`; the last one is that of ground.
+        Index in `ContactBodies` of each mover; the last one is that of ground.
     """
 
     def __init__(self, stepper: Stepper, held: MechanismMotion | None, side_of: np.ndarray) -> None:
@@ -95,16 +95,16 @@ class OutputRecorder:
         self.t: list[float] = []
         self.pose: list[np.ndarray] = []
         self.turn: list[np.ndarray] = []
-        self.angle: list[np.ndarray] = []  # of bodies in the plane: whole turns count
+        self.angle: list[np.ndarray] = []  # of planar bodies, with whole turns
         self.twist: list[np.ndarray] = []
         self.acceleration: list[
             np.ndarray
-        ] = []  # mean of the step that ends at the time; of the first step at the start
+        ] = []  # mean over the step that ends at the time; at the start over the first step
         self.sums: list[np.ndarray] = []
         self.contacts: list[dict[str, np.ndarray]] = []
 
     def add(self, moved: bool) -> None:
-        """Keep where the stepper is now, and the contacts of the last step if one led here."""
+        """Record the present state, and the contacts of the last step if there was one."""
         s = self.stepper
         self.t.append(float(s.pace.real[TIME]))
         self.pose.append(s.movers.pose[: len(s.free.turn), :3].copy())
@@ -122,20 +122,21 @@ class OutputRecorder:
         self.contacts.append(self._active_contacts() if moved else {})
 
     def first(self) -> None:
-        """Keep the mean accelerations of the first step for the start, and what was stored there."""
+        """Record the mean accelerations of the first step for the start, and the energy stored there."""
         self.sums[0][ENERGY_SUMS.index(STORED_ENERGY)] = self.stepper.pace.real[STORED_AT_START]
         self.begin()
 
     def begin(self) -> None:
-        """Keep the mean accelerations of the last step."""
+        """Record the mean accelerations of the last step."""
         s = self.stepper
         self.acceleration.append((s.workspaces.X.v[:, :6] - s.free.before[:, :6]) / s.pace.real[STEP])
 
     def _active_contacts(self) -> dict[str, np.ndarray]:
-        """Contacts with a force, and the normals along which these were found: those of the middle of the step.
+        """Return the contacts with a force, and their normals, which are those of the middle of the step.
 
-        Their points have the arms by which they were found, from where mass centres were when the step began; between
-        two that move the mean of both. So the torques of the table are those of the motion.
+        Contact points are given by the arms with which forces were computed, from the mass centres at the start of the
+        step;
+        between two moving bodies the mean of both. The torques in the table are thus those of the motion.
         """
         s = self.stepper
         C, kept = s.last()
@@ -161,7 +162,7 @@ class OutputRecorder:
         }
 
     def as_contacts(self, contact_bodies: ContactBodies, planar: bool) -> Contacts:
-        """All contacts of all output times."""
+        """Return all contacts of all output times."""
         empty: dict[str, Any] = {"pair": np.zeros((0, 2), np.int64), "state": np.zeros(0, np.int64)}
         empty |= {k: np.zeros((0, 3)) for k in ("point", "normal", "force")}
         empty |= {k: np.zeros(0) for k in ("gap", "friction")}
@@ -174,7 +175,7 @@ class OutputRecorder:
 def free_coordinates(
     base: Assembly, scene: ContactTables, recorder: OutputRecorder
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Absolute coordinates (n, nq), velocities and accelerations (n, nv) of single bodies over time."""
+    """Return absolute coordinates (n, nq), velocities and accelerations (n, nv) of free bodies over time."""
     s = base.compiled.structure
     tree = s.tables["tree"]
     n = len(recorder.t)
@@ -186,7 +187,7 @@ def free_coordinates(
         if b < 0 or name not in scene.carriers.slices:
             continue
         k = scene.carriers.slices[name].start
-        if k >= pose.shape[1]:  # of the mechanism
+        if k >= pose.shape[1]:  # a body of the mechanism
             continue
         q0, v0, width = tree.q[b], tree.v[b], tree.nv[b]
         line = slice(v0, v0 + 2 if s.model.planar else v0 + 3)
@@ -208,7 +209,7 @@ def free_coordinates(
 
 
 def body_sets(model: Model, scene: ContactTables, recorder: OutputRecorder) -> dict[str, BodySetMotion]:
-    """Sets of bodies by name."""
+    """Return the motions of body sets by name."""
     out = {}
     for name in scene.carriers.names:
         if name in scene.carriers.single:
@@ -242,7 +243,7 @@ def make_impulse_result(
     since: float,
     message: str,
 ) -> Result:
-    """The motion by name; ``message`` says how it ended."""
+    """Build the result; ``message`` describes how the motion ended."""
     values, model = base.compiled.values, base.compiled.structure.model
     q, v, vdot = free_coordinates(base, scene, recorder)
     t = np.array(recorder.t)
@@ -286,7 +287,7 @@ def make_impulse_result(
 
 
 def _solvers_in_words(stepper: Stepper, solver: str) -> str:
-    """The solver, and which islands went where."""
+    """Describe the solver, and how many islands each solver solved."""
     picked = solver_counts(stepper.workspaces.F)
     if not len(picked):
         return solver
@@ -326,7 +327,7 @@ NO_WAY_MESSAGE = (
 MOST_STEPS_PER_CALL, CALL_SECONDS = (
     1000,
     1.0,
-)  # steps after which it is told how far it is, and seconds that they take at most
+)  # steps between two progress reports, and their largest duration
 
 
 def simulate_by_impulses(
@@ -339,14 +340,14 @@ def simulate_by_impulses(
     before: Result | None = None,
     part: Segment | None = None,
 ) -> Result:
-    """The motion by steps of impulses over a span of time; see `Mechanism.simulate`.
+    """Simulate by impulse time stepping over a time span; see `Mechanism.simulate`.
 
     Raises
     ------
     ModelError
-        If the scene makes no sense.
+        If the contact scene is invalid.
     SimulationError
-        If the steps cannot go on.
+        If the stepping cannot continue.
     """
     since, part = time.perf_counter(), part or whole_motion()
     model = model.snapshot()
@@ -396,9 +397,9 @@ def step_to_outputs(
     report: ReportProgress,
     part: Segment,
 ) -> bool:
-    """Steps that end at the output times, as equal as these allow. Returns whether the user interrupted.
+    """Take steps that end at the output times, as equal as these allow. Returns whether the user interrupted.
 
-    Where the part ends there is a row of output in any case.
+    At the end of the segment there is always an output row.
     """
     first, last = span
     real, each = stepper.pace.real, 1
@@ -440,11 +441,11 @@ def step_to_outputs(
     return False
 
 
-# A start of bodies on which nothing acts: as drawn and told, without the engine, which need not be compiled then.
+# The start of free bodies is the reference configuration itself; the engine need not be compiled for it.
 
 
 def unassembled_start(c: CompiledMechanism, t: float) -> Assembly | None:
-    """The assembled start if there is nothing to assemble; None otherwise."""
+    """Return the assembled start if there is nothing to assemble; None otherwise."""
     s, model = c.structure, c.structure.model
     if s.rows or s.terms or s.states or len(s.forces) or model.initial:
         return None
@@ -453,7 +454,7 @@ def unassembled_start(c: CompiledMechanism, t: float) -> Assembly | None:
 
 
 def body_states(base: Assembly) -> dict[str, BodyState]:
-    """How every body moves at that start."""
+    """Return pose and velocity of every body at that start."""
     values, out = base.compiled.values, {}
     tree = values.structure.tables["tree"]
     for name, b in values.structure.place.items():

@@ -1,11 +1,11 @@
-"""Rows on the mechanism: its contacts, and single rows (stops, ropes, friction in joints), with their responses.
+"""Rows of the jointed mechanism: its contacts, and single rows (stops, ropes, joint friction), with their responses.
 
-- A stop: velocity and impulse are complementary, as at a contact; it rebounds by Newton's law.
-- A rope pulls or is slack within one step, and is taken implicitly as springs are.
-- Friction is bounded by its own law, at the load that follows from the reactions of the last step.
+- Stop: velocity and impulse are complementary, as at a contact; it rebounds by Newton's law.
+- Rope: it is taut or slack within one step, and treated implicitly as springs are.
+- Friction: bounded by its own law, at the load that follows from the reactions of the last step.
 
-The response to a row's impulse is one solve with the factor of the joints; groups are independent of each other,
-so that one solve answers a row of each.
+The response to a row's impulse is one solve with the factor of the joints. Groups are independent of each other, so
+that one solve gives the response of a row of each group.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ from .stepping_tables import (
     V_IMPULSIVE,
 )
 
-REST_SHARE = 1e-9  # part of what friction slows down within a step below which a rate is none
-STOP_LOOKAHEAD = 4.0  # a stop is a line where what it stops may reach it within as many steps
+REST_SHARE = 1e-9  # negligible rate, relative to the deceleration by friction within a step
+STOP_LOOKAHEAD = 4.0  # a stop gets a row if its coordinate may reach it within this number of steps
 INFINITE = 1e300
 
 
 @formula
 def line_group(A, k):
-    """Group of the quantity that line k acts along; -1 if nothing moves it."""
+    """Return the group of the quantity of single row k; -1 if nothing moves it."""
     r = A.S.rows.law.shape[0] + A.line[k, LINE_QUANTITY]
     for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
         for g in range(A.queue.shape[0]):
@@ -64,7 +64,7 @@ def line_group(A, k):
 
 @formula
 def line_rate(A, k, v):
-    """Rate of the quantity of line k with velocities v."""
+    """Return the rate of the quantity of single row k at velocities v."""
     s = 0.0
     r = A.S.rows.law.shape[0] + A.line[k, LINE_QUANTITY]
     for e in range(A.S.row_start[r], A.S.row_start[r + 1]):
@@ -74,14 +74,16 @@ def line_rate(A, k, v):
 
 @formula
 def stop_gap(A, k, side):
-    """How far the quantity of a stop was from it when the step began; side 1 is the lower stop, -1 the upper."""
+    """Return the gap of a stop at the start of the step; side 1 is the lower stop, -1 the upper."""
     x = A.W.sensed[VALUE, A.line[k, LINE_QUANTITY]] - 0.5 * A.real.step * line_rate(A, k, A.wide[V_BEFORE])
     return x - A.line_x[k, LINE_LOWER] if side > 0 else A.line_x[k, LINE_UPPER] - x
 
 
 @formula
 def line_acts(A, k, side):
-    """Whether line k acts in this step: of two stops always the nearer one, since impacts elsewhere may lead there."""
+    """Return whether single row k acts in this step; of two stops the nearer one always does, since impacts may reach
+    it.
+    """
     if A.line[k, LINE_KIND] != LINE_STOP:
         return side > 0
     r, dr = line_rate(A, k, A.wide[V_BEFORE]), line_rate(A, k, A.wide[V_CHANGE])
@@ -92,7 +94,7 @@ def line_acts(A, k, side):
 
 @formula
 def line_rows(A, P, used, jobs, write):
-    """Rows of the lines that act, behind those of the contacts, if ``write``. Returns (numbers, jobs, lines)."""
+    """Add the active single rows after those of the contacts, if ``write``. Returns (numbers, jobs, rows)."""
     n = 0
     for k in range(A.line.shape[0]):
         g = line_group(A, k)
@@ -114,7 +116,7 @@ def line_rows(A, P, used, jobs, write):
 
 @formula
 def line_row(A, P, k, g, where):
-    """The gradient of the quantity of line k, reversed for an upper stop."""
+    """Write the gradient of the quantity of single row k, reversed for an upper stop."""
     at, size, side = where
     for d in range(size):
         P.J[at + d] = 0.0
@@ -125,7 +127,7 @@ def line_row(A, P, k, g, where):
 
 @formula
 def line_laws(A, P, n):
-    """Biases, compliances and bounds of the lines, whose responses are known."""
+    """Set biases, compliances and bounds of the single rows, whose responses are known."""
     h = A.real.step
     P.size[3] = n
     for i in range(n):
@@ -147,7 +149,7 @@ def line_laws(A, P, n):
 
 @formula
 def friction_law(A, P, i, k, x):
-    """Between -h F and h F. What moves no faster than rounding would have it is at rest, and held by more."""
+    """Bound friction by -h F and h F; where the rate is zero to rounding, by the static limit."""
     h = A.real.step
     g, at = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
     w = 0.0
@@ -163,7 +165,9 @@ def friction_law(A, P, i, k, x):
 
 @formula
 def rope_law(A, P, i, k, x):
-    """-s = h (K (x - x0) + C r), at the place and the rate that `implicit` takes springs at; it never pushes."""
+    """Set the law of a rope, -s = h (K (x - x0) + C r), at position and rate as in `implicit_springs`; it never
+    pushes.
+    """
     h = A.real.step
     K, C = A.line_x[k, ROPE_K], A.line_x[k, ROPE_C]
     g, at = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
@@ -182,7 +186,7 @@ def rope_law(A, P, i, k, x):
 
 @formula
 def account_lines(A, P, X):
-    """Works of the lines, and the loads of joints with friction for the next step."""
+    """Account for the works of the single rows, and update the loads of joint friction for the next step."""
     for i in range(P.size[3]):
         k = abs(A.active[i, LINE_OF]) - 1
         side = 1.0 if A.active[i, LINE_OF] > 0 else -1.0
@@ -200,7 +204,7 @@ def account_lines(A, P, X):
 
 @formula
 def update_friction_loads(A):
-    """Loads of joints with friction, from the reactions of the step."""
+    """Compute the loads of joints with friction from the reactions of the step."""
     if A.S.load_terms.load.shape[0] == 0:
         return
     for r in range(A.lam.shape[1]):
@@ -213,7 +217,7 @@ def update_friction_loads(A):
 
 @formula
 def keep_stops_only(A, P, X):
-    """For the second solve: stops let pass what they are overrun by, and nothing else acts."""
+    """For the position solve: stops correct their overrun, and no other single row acts."""
     A.real.overrun = 0.0
     for i in range(P.size[3]):
         k = abs(A.active[i, LINE_OF]) - 1
@@ -230,9 +234,10 @@ def keep_stops_only(A, P, X):
 
 @formula
 def mechanism_contact_rows(A, M, C, P):
-    """Rows of all contacts on the mechanism into ``P``, whose sides are movers' numbers: they become groups.
+    """Write the rows of all contacts on the mechanism into ``P``; the movers in its sides become groups.
 
-    Returns 0, or NO_ROOM where J and Y, or the table of jobs, are too small for ``A.count[NEEDED]`` and [JOBS].
+    Returns 0, or TABLES_FULL where J and Y, or the table of jobs, are too small for ``A.count.needed`` and
+    ``A.count.jobs``.
     """
     first = A.count.first
     rows = 6 if P.turn.shape[0] > 0 else 3
@@ -253,7 +258,7 @@ def mechanism_contact_rows(A, M, C, P):
             if mover < first:
                 continue
             b, g = A.mover[mover - first, 0], A.mover[mover - first, 1]
-            if g < 0:  # joints hold it to the ground
+            if g < 0:  # joints fix it to ground
                 P.at[c, side] = FIXED_SIDE
                 continue
             n = A.group[g + 1] - A.group[g]
@@ -283,7 +288,7 @@ def mechanism_contact_rows(A, M, C, P):
 
 @formula
 def table_sizes(A, P, rows):
-    """How many numbers J and Y hold, and how many jobs there are."""
+    """Return how many numbers J and Y hold, and the number of jobs."""
     used = 0
     jobs = 0
     for c in range(P.size[0]):
@@ -301,14 +306,14 @@ def table_sizes(A, P, rows):
 
 @formula
 def queue_row(A, g, job, at, rows):
-    """Ask for the response to rows of group g."""
+    """Queue a job: the responses to rows of group g."""
     A.job[job, JOB_AT], A.job[job, JOB_ROWS], A.job[job, JOB_NEXT] = at, rows, A.queue[g]
     A.queue[g] = job
 
 
 @formula
 def side_rows(A, P, c, where, point, rows):
-    """Add velocities of a point of body b along the frame of contact c; with six rows its turning after them."""
+    """Add velocities of a point of body b along the frame of contact c; with six rows also its angular velocity."""
     b, at, n = where
     zero = (0.0, 0.0, 0.0)
     for i in range(rows):
@@ -319,7 +324,7 @@ def side_rows(A, P, c, where, point, rows):
 
 @formula
 def row_responses(A, P):
-    """Responses Y to all rows that are queued: a row of each group in every solve."""
+    """Compute the responses Y to all queued rows: one row of each group per solve."""
     force, out = A.wide[GENERALISED_IMPULSE], A.wide[V_IMPULSIVE]
     busy = True
     while busy:
@@ -339,7 +344,7 @@ def row_responses(A, P):
 
 @formula
 def fill_impulses(A, P, i, force):
-    """Row i of the job that is next in each group; how many have one."""
+    """Set the impulse of row i of the next job of each group; return how many groups have one."""
     asked = 0
     for d in range(force.shape[0]):
         force[d] = 0.0
@@ -357,7 +362,7 @@ def fill_impulses(A, P, i, force):
 
 @formula
 def read_responses(A, P, i, out):
-    """Read what `fill_impulses` asked for."""
+    """Read the responses to the impulses of `fill_impulses`."""
     for g in range(A.queue.shape[0]):
         k = A.queue[g]
         if k >= 0 and i < A.job[k, JOB_ROWS]:

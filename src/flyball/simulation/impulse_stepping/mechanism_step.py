@@ -1,11 +1,12 @@
 """The jointed mechanism in a step: smooth velocities, impulses, projection onto the constraints, energy.
 
-Positions go half a step on with the velocities before. There everything is evaluated, at the mean of the
-velocities before and after: a step that is symmetric in time, so of second order. The mean is found by Anderson's
-mixing (1965; Walker and Ni 2011); stiff springs and dampers are solved for with the masses.
+Positions advance half a step with the initial velocities. There everything is evaluated at the mean of initial and
+final velocities: the step is symmetric in time and therefore of second order. The mean is found by Anderson mixing
+(1965; Walker and Ni 2011); stiff springs and dampers are solved together with the masses.
 
-Impulses are found where joints are at half the step, and bodies are then projected onto the constraints at its
-end, measured by the masses, which takes energy and never gives any. That energy is counted as the method's.
+Impulses are computed at the joints' positions at half the step. At the end of the step bodies are projected onto the
+constraints in the metric of the masses, which dissipates energy and never supplies any. That energy is accounted as
+numerical.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ from .stepping_tables import (
 
 @formula
 def kinetic_energy(A):
-    """Kinetic energy at the kinematics in the engine's room."""
+    """Return the kinetic energy at the kinematics in the engine's workspace."""
     total = 0.0
     for b in range(A.S.tree.parent.shape[0]):
         v, w = load3(A.W.BK, b, 15), mtv(load9(A.W.BK, b, 3), load3(A.W.BK, b, 12))
@@ -71,7 +72,9 @@ def kinetic_energy(A):
 
 @formula
 def gravity_sum(A, column):
-    """Sum of m g . x, x in three columns of the bodies' kinematics: places from 0 on, velocities from 15 on."""
+    """Return the sum of m g . x, x from three columns of the bodies' kinematics: positions from 0, velocities from
+    15.
+    """
     total = 0.0
     for b in range(A.S.tree.parent.shape[0]):
         x = load3(A.W.BK, b, column)
@@ -81,30 +84,30 @@ def gravity_sum(A, column):
 
 @formula
 def add_reaction_work(A, lam, v):
-    """Work of joints' impulses of impacts at velocities v, beyond that of what is prescribed."""
+    """Account for the work of joint impulses at velocities v, beyond that of prescribed rates."""
     for r in range(A.S.rows.law.shape[0]):
         A.real.astray -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.rows.nu[r])
 
 
 @formula
 def save_gravity_work(A, h):
-    """Keep gravity's work over the step at the mean velocities, at which impulses' works are taken too."""
+    """Store gravity's work over the step at the mean velocities, as for the works of impulses."""
     A.real.gravity_work = h * gravity_sum(A, 15)
 
 
 @formula
 def close_energy_account(A):
-    """At the end of the step, where something was hit: what putting onto the joints took."""
+    """Account for the energy taken by the projection onto the joints, at the end of a step with contact impulses."""
     now = -gravity_sum(A, 0)
     if A.real.kinetic >= 0.0:
         A.real.astray += A.real.kinetic - kinetic_energy(A) - (now - A.real.potential) - A.real.gravity_work
     A.real.potential = now
 
 
-MIXED_GUESSES = 5  # evaluations that the next guess is made of
+MIXED_GUESSES = 5  # evaluations that are mixed to the next iterate
 MOST_EVALUATIONS = 40
-VELOCITY_CHANGE_TOLERANCE = 1e-10  # part of the velocities, or of their change, by which the last guess may be off
-# rows of Joined.mixing: of each guess in memory what it missed, and the guess; then what is missed now, and half a way
+VELOCITY_CHANGE_TOLERANCE = 1e-10  # allowed error of the last iterate, relative to the velocities or their change
+# rows of MechanismTables.mixing: residuals of the stored iterates, the iterates; present residual, half the step
 MISSED_ROWS, GUESS_ROWS, RESIDUAL_ROW, HALF_STEP_ROW, MIXING_ROWS = (
     0,
     MIXED_GUESSES,
@@ -112,12 +115,12 @@ MISSED_ROWS, GUESS_ROWS, RESIDUAL_ROW, HALF_STEP_ROW, MIXING_ROWS = (
     2 * MIXED_GUESSES + 1,
     2 * MIXED_GUESSES + 2,
 )
-DEPENDENT_COLUMN = 1e-12  # part of a column that is left of it: it says nothing new
+DEPENDENT_COLUMN = 1e-12  # remainder of a column, relative to it, below which it is linearly dependent
 
 
 @formula
 def free_velocities(A):
-    """Go half a step on, and find there how the velocities change by all but contact. Returns a status."""
+    """Advance half a step, and solve there for the change of velocities without contact. Returns a status."""
     nq, nv = A.S.sizes.coordinates, A.wide.shape[1]
     y, h = A.clock.y, A.real.step
     before, change, half = A.wide[V_BEFORE], A.wide[V_CHANGE], A.mixing[HALF_STEP_ROW]
@@ -150,7 +153,7 @@ def free_velocities(A):
 
 @formula
 def save_evaluation(A, h):
-    """What the evaluation found: h vdot, multipliers, efforts of drivers. Solving for others writes over it."""
+    """Store the results of the evaluation (h vdot, multipliers, driver efforts), which later solves overwrite."""
     nq = A.S.sizes.coordinates
     for d in range(A.wide.shape[1]):
         A.wide[V_SMOOTH, d] = h * A.clock.K[0, nq + d]
@@ -161,7 +164,7 @@ def save_evaluation(A, h):
 
 @formula
 def change_residual(A, h):
-    """By how much the change of velocities is not what it makes of itself."""
+    """Compute the residual of the fixed-point equation for the change of velocities."""
     now, change = A.mixing[RESIDUAL_ROW], A.wide[V_CHANGE]
     for d in range(now.shape[0]):
         now[d] = A.wide[V_SMOOTH, d] - change[d]
@@ -174,7 +177,7 @@ def change_residual(A, h):
 
 @formula
 def change_converged(A):
-    """Whether the change of velocities is what it makes of itself; then it is made so to the last digit."""
+    """Return whether the change of velocities has converged."""
     size = 1e-300
     worst = 0.0
     for d in range(A.wide.shape[1]):
@@ -185,7 +188,7 @@ def change_converged(A):
 
 @formula
 def next_guess(A, n):
-    """The next change of velocities: what the last ones would miss least of, mixed, and what it makes of itself."""
+    """Compute the next change of velocities by Anderson mixing: the combination of iterates with least residual."""
     mixing, C, change = A.mixing, A.weight, A.wide[V_CHANGE]
     now = mixing[RESIDUAL_ROW]
     kept = min(n, MIXED_GUESSES)
@@ -211,7 +214,7 @@ def next_guess(A, n):
 
 @formula
 def solve_weights(C, n):
-    """Solve n normal equations by Cholesky's factor, in place; what says nothing new has no weight."""
+    """Solve n normal equations by Cholesky factorization, in place; linearly dependent columns get weight zero."""
     for i in range(n):
         whole = C[i, i]
         for j in range(i + 1):
@@ -233,12 +236,12 @@ def solve_weights(C, n):
         C[i, MIXED_GUESSES] = s / C[i, i] if C[i, i] > 0.0 else 0.0
 
 
-NO_VELOCITY_CHANGE = 1e-12  # part of the velocities that is no change of them
+NO_VELOCITY_CHANGE = 1e-12  # negligible change of velocities, relative to them
 
 
 @formula
 def run_task(A, M, C, P, X, task):
-    """One task of `mechanism_kernel`."""
+    """Run one task of `mechanism_kernel`."""
     if task == TASK_START:
         return start_mechanism(A, M, X)
     if task == TASK_FREE_VELOCITIES:
@@ -255,7 +258,7 @@ def run_task(A, M, C, P, X, task):
         apply_step_impulses(A, P, X)
         return 0
     if task == TASK_MEAN_VELOCITIES:
-        for i in range(A.S.sizes.coordinates):  # at half the step, from where FINISH goes on
+        for i in range(A.S.sizes.coordinates):  # at half the step, from where TASK_FINISH continues
             A.clock.y[2, i] = A.clock.y[0, i]
         for d in range(A.wide.shape[1]):
             X.wide[d] = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
@@ -290,10 +293,10 @@ def run_task(A, M, C, P, X, task):
 
 @formula
 def make_consistent(A, X):
-    """Velocities before an impact made those that joints allow at half the step, where the rows are.
+    """Make velocities before an impact consistent with the joints at half the step, where the rows are.
 
-    Those of the start of the step are none by what joints turn in half of it. Impulses of contacts along which nothing
-    can move do not end such a part, and where friction jams they would grow without bound.
+    The velocities at the start of the step are inconsistent there, since joints rotate within half the step. Contact
+    impulses along immovable directions would not remove that part, and would grow without bound where friction jams.
     """
     rows = A.output.rows
     for d in range(A.wide.shape[1]):
@@ -311,7 +314,7 @@ def make_consistent(A, X):
 
 @formula
 def start_mechanism(A, M, X):
-    """Evaluate where the motion begins, which must be on the constraints: accelerations, multipliers, efforts."""
+    """Evaluate the start of the motion, which must be on the constraints: accelerations, multipliers, efforts."""
     A.count.begun = 0
     A.clock.real.t = A.real.time
     status = call(A.door[0], A.S, A.W, A.R, A.clock, A.output, MOTION)
@@ -331,7 +334,7 @@ def start_mechanism(A, M, X):
 
 @formula
 def free_step(A, M, X):
-    """Velocities without contact, from those in State.wide; asked once more it begins at the same place again."""
+    """Compute the velocities without contact from those in ``X.wide``; a repeated call restarts at the same state."""
     y, nq = A.clock.y, A.S.sizes.coordinates
     if A.count.begun == 0:
         for i in range(y.shape[1]):
@@ -350,7 +353,7 @@ def free_step(A, M, X):
 
 @formula
 def write_body_states(A, M, poses):
-    """Velocities of the bodies for what looks for contacts, and poses if these are asked for, as last evaluated."""
+    """Write the bodies' velocities, and poses if requested, for the contact search, as last evaluated."""
     for k in range(A.mover.shape[0]):
         b, to = A.mover[k, 0], A.count.first + k
         if poses:
@@ -362,9 +365,10 @@ def write_body_states(A, M, poses):
 
 @formula
 def apply_step_impulses(A, P, X):
-    """Velocities after the step, from the impulses that were found; what these do to joints and drivers.
+    """Compute the velocities after the step from the impulses, and the reactions of joints and drivers.
 
-    They follow from one solve for all impulses: joints are exact to rounding, whatever the cone solver left.
+    They follow from one solve with all impulses: joints are satisfied to rounding, whatever the residual of the cone
+    solver.
     """
     nv, h = A.wide.shape[1], A.real.step
     before, total = A.wide[V_BEFORE], A.wide[GENERALISED_IMPULSE]
@@ -383,7 +387,7 @@ def apply_step_impulses(A, P, X):
     for d in range(nv):
         A.wide[EFFORTS, d] += A.W.velocities.effort[d] / h
         A.wide[V_AFTER, d] = before[d] + A.wide[V_SMOOTH, d] + A.wide[V_IMPULSIVE, d]
-        A.wide[V_IMPULSIVE, d] = A.wide[V_AFTER, d] - before[d] - A.wide[V_CHANGE, d]  # by contact and lines
+        A.wide[V_IMPULSIVE, d] = A.wide[V_AFTER, d] - before[d] - A.wide[V_CHANGE, d]  # by contacts and single rows
     for d in range(nv):
         A.wide[STEP_DISPLACEMENT, d] = 0.5 * (before[d] + A.wide[V_AFTER, d])
     add_reaction_work(A, A.lam[1], A.wide[STEP_DISPLACEMENT])
@@ -396,7 +400,7 @@ def apply_step_impulses(A, P, X):
 
 @formula
 def velocities_changed(A):
-    """Whether contact or lines changed the velocities."""
+    """Return whether contacts or single rows changed the velocities."""
     size, change = 1e-300, 0.0
     for d in range(A.wide.shape[1]):
         size = max(size, abs(A.wide[V_BEFORE, d]) + abs(A.wide[V_AFTER, d]))
@@ -406,7 +410,7 @@ def velocities_changed(A):
 
 @formula
 def evaluate_at_mean(A, part):
-    """Evaluate at half the step once more, at the mean velocities with a part of what impacts changed."""
+    """Evaluate again at half the step, at the mean velocities with a part of the change by impulses."""
     nq = A.S.sizes.coordinates
     for d in range(A.wide.shape[1]):
         mean = A.wide[V_BEFORE, d] + 0.5 * A.wide[V_CHANGE, d]
@@ -416,10 +420,11 @@ def evaluate_at_mean(A, part):
 
 @formula
 def correct_velocity_forces(A, h):
-    """Velocity-dependent forces of the second half of the step at velocities after impacts, in joint coordinates.
+    """Recompute velocity-dependent forces of the second half of the step with velocities after impulses (joint
+    coordinates).
 
-    Coriolis' terms make up for masses that change along the way: with those of the velocities before, impacts would
-    give energy. In absolute coordinates the projection that ends the step does that.
+    Coriolis terms compensate the change of the mass matrix along the motion. With the velocities before, impulses would
+    supply energy. In absolute coordinates the projection at the end of the step has this effect.
     """
     y, z = A.clock.y, A.S.sizes.coordinates + A.wide.shape[1]
     if A.S.sizes.solver == SCHUR or not velocities_changed(A):
@@ -430,7 +435,7 @@ def correct_velocity_forces(A, h):
         for d in range(A.wide.shape[1]):
             vdot = A.clock.K[0, A.S.sizes.coordinates + d]
             A.wide[V_AFTER, d] += 0.5 * (h * vdot - A.wide[V_SMOOTH, d])
-        for i in range(A.count.springs):  # their dampers are taken at the velocities after impacts already
+        for i in range(A.count.springs):  # their dampers use the velocities after impulses already
             s = 0.5 * h * A.spring_x[i, SPRING_C] * dot_rows(A.spring_J[i], A.wide[V_IMPULSIVE])
             for d in range(A.wide.shape[1]):
                 A.wide[V_AFTER, d] += s * A.spring_Y[i, d]
@@ -440,7 +445,7 @@ def correct_velocity_forces(A, h):
 
 @formula
 def contact_impulses(A, P, X, total):
-    """Add the generalised impulses of all contacts and lines."""
+    """Add the generalised impulses of all contacts and single rows."""
     for c in range(P.size[0]):
         for side in range(2):
             at = P.block[c, side]
@@ -461,7 +466,9 @@ def contact_impulses(A, P, X, total):
 
 @formula
 def account_works(A, h):
-    """Rates of the works over the step, in the clock: forces at the mean velocities, drivers with all they gave."""
+    """Compute the mean powers of the step in the integrator state: forces at mean velocities, drivers with all
+    impulses.
+    """
     S, W = A.S, A.W
     if velocities_changed(A):
         evaluate_at_mean(A, 0.5)
@@ -486,7 +493,7 @@ def account_works(A, h):
 
 @formula
 def save_poses(A):
-    """Poses of the movers as evaluated last."""
+    """Store the poses of the movers as evaluated last."""
     for k in range(A.mover.shape[0]):
         store3(A.pose, k, 0, load3(A.W.BK, A.mover[k, 0], 0))
         store9(A.pose, k, 3, load9(A.W.BK, A.mover[k, 0], 3))
@@ -494,7 +501,7 @@ def save_poses(A):
 
 @formula
 def has_displacement(displacements):
-    """Whether there are any."""
+    """Return whether any displacement is nonzero."""
     found = False
     for d in range(displacements.shape[0]):
         found = found or displacements[d] != 0.0
@@ -503,9 +510,9 @@ def has_displacement(displacements):
 
 @formula
 def finish_step(A, M, X):
-    """Go on with the mean velocities and those in State.wide beside them, onto the constraints. Returns a status.
+    """Advance with the mean velocities and the displacements in ``X.wide``, onto the constraints. Returns a status.
 
-    It may be asked again, with others beside them.
+    It may be called again with other displacements.
     """
     S, nq, nv, h = A.S, A.S.sizes.coordinates, A.wide.shape[1], A.real.step
     y, way = A.clock.y, A.wide[STEP_DISPLACEMENT]
@@ -536,8 +543,8 @@ def finish_step(A, M, X):
 
 @kernel
 def mechanism_kernel(A: MechanismTables, M: Movers, C: Contacts, P: ContactProblem, X: ContactState, task: int) -> int:
-    """The mechanism: ``A`` as `MechanismTables`, then movers, contacts, problem and state of the step; see ``joined.py``.
+    """Run a task of the jointed mechanism ``A`` with movers, contacts, problem and state of the step.
 
-    Returns 0, NO_ROOM, or the engine's status.
+    Tasks: see `stepping_tables`. Returns 0, TABLES_FULL, or the engine's status.
     """
     return run_task(A, M, C, P, X, task)

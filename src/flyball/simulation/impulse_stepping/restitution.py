@@ -1,17 +1,17 @@
 """Impacts: restitution by Poisson's, Newton's or Moreau's law, simultaneous or one contact after the other.
 
-Impacts are over before a step begins. Contacts that close within the step, faster than smooth forces make them,
-are hit with the velocities of the start:
+Impacts are completed before a step begins. Contacts that would close within the step, faster than smooth forces cause,
+have an impact with the velocities at the start:
 
-- Poisson: compression (an inelastic impact with impulses p_c), then expansion with normal impulses of at least e
-  p_c and friction for these (Pfeiffer and Glocker, 1996, section 8.3);
+- Poisson: compression (an inelastic impact with impulses p_c), then expansion with normal impulses of at least e p_c
+  and the corresponding friction (Pfeiffer and Glocker, 1996, section 8.3);
 - Newton: u+ >= -e u- normal to the contact; Moreau: the same along all three directions.
 
-No law may add energy: what goes beyond an inelastic impact is done only as far as that leaves energy for it
-(Newton's law with friction would add some: Kane and Levinson, 1985). Impacts are repeated until nothing more is
-hit.
+No law may add energy: the expansion is reduced to what the energy lost in the inelastic impact allows (Newton's law
+with
+friction could add energy: Kane and Levinson, 1985). Impacts are repeated until no contact has an impact.
 
-One after the other, as in Newton's cradle, the contact that closes fastest is hit first, by Poisson's law, until
+Sequential impacts, as in Newton's cradle: the contact that closes fastest has the first impact, by Poisson's law, until
 none closes.
 """
 
@@ -57,16 +57,16 @@ from .stepping_tables import (
     VELOCITY_TOLERANCE,
 )
 
-IMPACTS_PER_CONTACT = 200  # impacts for each contact, after which what still closes is left to the step
-NO_MOBILITY = 1e-13  # part of what an impulse moves along all three directions that is none
-NO_CLOSING = 1e-12  # closing speed that is none, in parts of the fastest
+IMPACTS_PER_CONTACT = 200  # impacts per contact, after which closing contacts are left to the step
+NO_MOBILITY = 1e-13  # negligible mobility along a direction, relative to the sum of all three
+NO_CLOSING = 1e-12  # negligible closing speed, relative to the largest
 
 
 @formula
 def sequential_impacts(R, Z, X, C, pace, now):
-    """Impacts of the contacts that are hit; impulses in ``Z.p``, velocities in ``X``. Returns whether all are over.
+    """Compute sequential impacts; impulses in ``Z.p``, velocities in ``X``. Returns whether all are completed.
 
-    Their restitutions stand in ``R.least``. What closes within the step after others' impacts is hit too.
+    ``R.least`` holds their restitutions. Contacts that close within the step because of other impacts have one too.
     """
     n = C.count[FOUND]
     for c in range(n):
@@ -93,7 +93,7 @@ def sequential_impacts(R, Z, X, C, pace, now):
 
 @formula
 def single_impact(R, Z, X, c, e):
-    """One contact's impact."""
+    """Compute the impact of one contact."""
     D = diagonal_block(R, c)
     n = compression_impulse(R, Z, X, c, D)
     u = contact_velocity(R, X.v, X.wide, c)
@@ -103,15 +103,15 @@ def single_impact(R, Z, X, c, e):
 
 @formula
 def reciprocal_mobility(d, D):
-    """1 / d of a diagonal entry d of D; 0 for a direction along which joints let nothing move."""
+    """Return 1 / d of a diagonal entry d of D; 0 for a direction that joints lock."""
     return 1.0 / d if d > NO_MOBILITY * (D[0] + D[3] + D[5]) else 0.0
 
 
 @formula
 def compression_impulse(R, Z, X, c, D):
-    """Impulses that end the approach; the normal one is returned.
+    """Apply the impulses that end the approach; return the normal one.
 
-    Normal and tangential impulses act on each other's velocities: they are taken in turn until they agree.
+    Normal and tangential impulses affect each other's velocities: they are computed alternately until they converge.
     """
     total = 0.0
     s, t = 0.0, 0.0
@@ -138,7 +138,7 @@ def compression_impulse(R, Z, X, c, D):
 
 @formula
 def expansion_impulse(R, c, D, n, u):
-    """Impulses of expansion: n along the normal, and along the tangents what ends sliding, within the cone."""
+    """Return the impulses of expansion: n along the normal, and tangential ones that stop sliding, within the cone."""
     a, b = -(u[1] + R.bias[c, 1] + D[1] * n), -(u[2] + R.bias[c, 2] + D[2] * n)
     s, t = a * reciprocal_mobility(D[3], D), b * reciprocal_mobility(D[5], D)
     d = D[3] * D[5] - D[4] * D[4]
@@ -152,30 +152,30 @@ def expansion_impulse(R, c, D, n, u):
 
 @formula
 def apply_impulse(R, Z, X, c, p):
-    """An impulse at contact c."""
+    """Apply an impulse at contact c."""
     apply_contact_impulse(R, X.v, X.wide, c, p)
     for i in range(3):
         Z.p[c, i] += p[i]
 
 
-IMPACT_ROUNDS = 1000  # of impacts in one step, after which what still closes comes to rest against what it meets
-NEAR_GAPS = 1e3  # gaps up to so many times what is none are hit at once
-REDUCED_BELOW = 1.0 - 1e-6  # part of an expansion below which it is told that it was reduced
-ITERATION_FACTOR = 4  # times as many iterations as for velocities that are warm started
+IMPACT_ROUNDS = 1000  # rounds of impacts in one step; contacts that still close after them come to rest
+NEAR_GAPS = 1e3  # gaps up to this multiple of the negligible one take part in the same impact
+REDUCED_BELOW = 1.0 - 1e-6  # part of an expansion below which its reduction is reported
+ITERATION_FACTOR = 4  # iterations relative to those of velocity solves, which are warm started
 
 
 @formula
 def restitution_of(G, C, L, c):
-    """Restitution of contact c."""
+    """Return the coefficient of restitution of contact c."""
     return L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL], RESTITUTION]
 
 
 @formula
 def resolve_impacts(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
-    """The impacts that `find_impacts` found; velocities in ``X.v`` and ``X.wide`` are those after them.
+    """Resolve the impacts found by `find_impacts`; ``X.v`` and ``X.wide`` become the velocities after them.
 
-    ``R`` is the problem with biases and least normal impulses of its own, ``Z`` the state of compression, which shares
-    its velocities with ``X``, ``E`` that of expansion.
+    ``R`` is the problem with its own biases and least normal impulses, ``Z`` the state of compression, which shares its
+    velocities with ``X``, ``E`` that of expansion.
     """
     if pace.count[SEQUENTIAL] != 0:
         for c in range(C.count[FOUND]):
@@ -191,7 +191,7 @@ def resolve_impacts(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
 
 @formula
 def clear_impact_impulses(C, now):
-    """Nothing has been hit in this step yet."""
+    """Clear the impact impulses of the step."""
     for c in range(C.count[FOUND]):
         for i in range(3):
             now[c, HISTORY_IMPACT_IMPULSE + i] = 0.0
@@ -199,7 +199,7 @@ def clear_impact_impulses(C, now):
 
 @formula
 def poisson_impacts(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
-    """Poisson's law: an inelastic impact, then expansion."""
+    """Apply Poisson's law: an inelastic impact, then expansion."""
     solve_from_zero(pace.door[ADDRESS_IMPACTS], R, Z, W, O, F, pace)
     for c in range(C.count[FOUND]):
         R.least[c] = restitution_of(G, C, L, c) * Z.p[c, 0] if now[c, HISTORY_HIT] > 0.0 else 0.0
@@ -210,7 +210,7 @@ def poisson_impacts(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
 
 @formula
 def newton_impacts(C, bias, R, Z, E, X, W, O, F, pace, now):
-    """Newton's and Moreau's law; where they make energy, as far as an inelastic impact leaves enough of it."""
+    """Apply Newton's or Moreau's law; where it would add energy, reduced to what an inelastic impact leaves."""
     copy_velocities(X, E)
     solve_from_zero(pace.door[ADDRESS_IMPACTS], R, E, W, O, F, pace)
     if impulse_energy(R, bias, E, E, C, now) <= 0.0:
@@ -229,7 +229,7 @@ def newton_impacts(C, bias, R, Z, E, X, W, O, F, pace, now):
 
 @formula
 def add_impulses(Z, z, E, e, c):
-    """z times the impulse of Z, and e times that of E, into Z."""
+    """Set the impulses of Z to z times those of Z plus e times those of E."""
     store3(Z.p, c, 0, add(scale(z, load3(Z.p, c, 0)), scale(e, load3(E.p, c, 0))))
     if Z.torque.shape[0] > 0:
         store3(Z.torque, c, 0, add(scale(z, load3(Z.torque, c, 0)), scale(e, load3(E.torque, c, 0))))
@@ -237,7 +237,7 @@ def add_impulses(Z, z, E, e, c):
 
 @formula
 def copy_velocities(X, E):
-    """E's velocities become X's."""
+    """Copy the velocities of X to E."""
     for k in range(X.v.shape[0]):
         for i in range(6):
             E.v[k, i] = X.v[k, i]
@@ -247,7 +247,7 @@ def copy_velocities(X, E):
 
 @formula
 def find_impacts(G, C, at, bias, R, X, L, pace, now):
-    """Whether there are impacts; biases of the contacts that are hit, and their velocities before in ``now``."""
+    """Return whether there are impacts; set the biases of their contacts, and store the velocities before in ``now``."""
     if pace.count[RESTITUTION_LAW] == NO_RESTITUTION:
         return False
     h = pace.real[STEP]
@@ -257,7 +257,7 @@ def find_impacts(G, C, at, bias, R, X, L, pace, now):
     for c in range(C.count[FOUND]):
         R.least[c] = 0.0
         gives_way = pace.count[COMPLIANT] != 0 and contact_stiffness(G, C, L, c) > 0.0
-        for i in range(2):  # what gives way has no impulse in no time
+        for i in range(2):  # compliant contacts have no instantaneous impulse
             R.at[c, i] = FIXED_SIDE if gives_way else at[c, i]
         u = contact_velocity(R, X.v, X.wide, c)
         store3(now, c, HISTORY_IMPACT_VELOCITY, u)
@@ -272,7 +272,7 @@ def find_impacts(G, C, at, bias, R, X, L, pace, now):
             continue
         if (e > 0.0 or plain) and C.x[c, GAP] + h * u[0] <= pace.real[
             NO_OVERLAP_BELOW
-        ]:  # what rests against what is hit, too
+        ]:  # also contacts resting against a body that has an impact
             now[c, HISTORY_HIT] = 1.0
             found = found or (e > 0.0 and u[0] < -slowest)
             R.bias[c, 0] = 0.0
@@ -281,14 +281,14 @@ def find_impacts(G, C, at, bias, R, X, L, pace, now):
                 for i in range(1, 3 if law == MOREAU else 1):
                     R.bias[c, i] += e * u[i]
         elif C.x[c, GAP] > NEAR_GAPS * pace.real[NO_OVERLAP_BELOW]:
-            for i in range(2):  # an impact takes no time in which it could close: it has its turn in the next round
+            for i in range(2):  # it cannot close during an impact, which takes no time: it is left to the next round
                 R.at[c, i] = FIXED_SIDE
     return found
 
 
 @formula
 def solve_from_zero(address, R, Z, W, O, F, pace):
-    """Solve from zero impulses."""
+    """Solve starting from zero impulses."""
     for c in range(R.size[0]):
         for i in range(3):
             Z.p[c, i] = 0.0
@@ -305,9 +305,10 @@ def solve_from_zero(address, R, Z, W, O, F, pace):
 
 @formula
 def impulse_energy(R, bias, Z, X, C, now):
-    """Energy that impulses of ``Z`` gave, which led to the velocities of ``X``: p . (u- + u+) / 2 of every contact.
+    """Return the energy supplied by impulses of ``Z`` that led to velocities of ``X``: p . (u- + u+) / 2 over all
+    contacts.
 
-    With the own motion of surfaces, ``bias`` along the tangents, from which they may give energy.
+    It includes moving surfaces (``bias`` along the tangents), which may supply energy.
     """
     total = 0.0
     for c in range(C.count[FOUND]):
@@ -321,7 +322,7 @@ def impulse_energy(R, bias, Z, X, C, now):
 
 @formula
 def torque_impulse_energy(R, Z, X, c, now):
-    """The same of the torque's impulse at contact c."""
+    """Return the energy supplied by the torque impulse at contact c."""
     if R.turn.shape[0] == 0:
         return 0.0
     return 0.5 * dot(
@@ -331,10 +332,10 @@ def torque_impulse_energy(R, Z, X, c, now):
 
 @formula
 def add_expansion(R, bias, Z, E, X, C, pace, now):
-    """The impulses E.p are added to Z.p: X's velocities become those of ``E``, or what energy there is for on the way.
+    """Add the impulses E.p to Z.p and move X's velocities towards those of ``E``, as far as the energy allows.
 
-    On the way s from X to E it grows by a s + b s^2, a = p . u, b = p . (u+ - u) / 2. All of the way is allowed by the
-    constraints, which are convex.
+    At the part s of the way from X to E the energy has grown by a s + b s^2, with a = p . u, b = p . (u+ - u) / 2. All
+    points of the way satisfy the constraints, which are convex.
     """
     there = max(0.0, -impulse_energy(R, bias, Z, X, C, now))
     a, b = 0.0, 0.0
@@ -369,7 +370,7 @@ def add_expansion(R, bias, Z, E, X, C, pace, now):
 
 @formula
 def account_impacts(R, bias, Z, X, C, pace, now):
-    """Impulses of the impacts, and what was lost in them."""
+    """Store the impulses of the impacts, and account for the energy lost."""
     for c in range(C.count[FOUND]):
         u = contact_velocity(R, X.v, X.wide, c)
         worn = -torque_impulse_energy(R, Z, X, c, now)
@@ -377,10 +378,10 @@ def account_impacts(R, bias, Z, X, C, pace, now):
             mean = 0.5 * (u[i] + now[c, HISTORY_IMPACT_VELOCITY + i])
             if i == 0:
                 pace.real[LOST_IMPACT] -= Z.p[c, 0] * mean
-            else:  # of a surface that moves the bias is its own motion
+            else:  # the bias of a moving surface is its own velocity
                 worn -= Z.p[c, i] * (mean + bias[c, i])
                 pace.real[GIVEN_BY_SURFACES] -= Z.p[c, i] * bias[c, i]
-        # the mean of an impact in which the slip reverses: friction gives no energy, the impact's sum is exact
+        # a negative mean, where the slip reverses in the impact, is counted as impact; the sum of both is exact
         pace.real[LOST_FRICTION if worn >= 0.0 else LOST_IMPACT] += worn
         store3(
             now,

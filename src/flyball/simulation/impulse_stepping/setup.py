@@ -1,4 +1,4 @@
-"""Setup of impulse time stepping: free bodies and jointed mechanism, where they start, the stepper."""
+"""Setup of impulse time stepping: free bodies and jointed mechanism, their start, and the stepper."""
 
 from __future__ import annotations
 
@@ -73,12 +73,12 @@ from .stepping_tables import (
 
 @dataclass(frozen=True)
 class BodyPartition:
-    """Names of what moves.
+    """Names of the moving bodies.
 
     Attributes
     ----------
     free : tuple of str
-        Bodies and sets of bodies on which nothing acts but gravity and contact.
+        Bodies and sets of bodies on which only gravity and contact act.
     held : tuple of str
         The other bodies.
     """
@@ -88,7 +88,7 @@ class BodyPartition:
 
 
 def partition_bodies(model: Model, values: Values) -> BodyPartition:
-    """Tell free bodies from those of the mechanism, by what the tables of absolute coordinates say acts on them."""
+    """Separate free bodies from those of the mechanism, by the tables of absolute coordinates."""
     S = values.system
     between = S.forces.family == BETWEEN
     frames = np.concatenate([S.terms.F, S.terms.M, S.forces.F[between], S.forces.M[between]])
@@ -106,18 +106,18 @@ StopBounds = tuple[float, float, float]
 def mechanism_tables(
     start: InitialState, bodies: Sequence[str], first: int, h: float, stops: Mapping[str, StopBounds] | None = None
 ) -> MechanismTables:
-    """The mechanism's tables for steps of h seconds, at its start.
+    """Create the mechanism's tables for steps of h seconds, at its start.
 
     Parameters
     ----------
-    start : Start
+    start : InitialState
         Of the mechanism alone.
     bodies : sequence of str
         Those that are movers, in the order of the movers from number ``first`` on.
     first : int
     h : float [s]
     stops : mapping, optional
-        Forces without any effect that stand for a stop of the coordinate that they act along: name to (lower end, upper
+        Forces without effect that represent stops of the coordinates along which they act: name to (lower end, upper
         end, restitution).
     """
     c = start.assembly.compiled
@@ -153,7 +153,7 @@ def mechanism_tables(
 
 
 def single_rows(s: Structure, S: System, stops: Mapping[str, StopBounds]) -> tuple[np.ndarray, np.ndarray]:
-    """What is a single row of the step: stops, ropes, friction in joints. As forces the tables lose them."""
+    """Return the tables of single rows (stops, ropes, joint friction), and remove these from the forces."""
     line, line_x = [], []
     for k, e in enumerate(s.forces):
         x = np.zeros(8)
@@ -176,15 +176,16 @@ def single_rows(s: Structure, S: System, stops: Mapping[str, StopBounds]) -> tup
 
 
 def force_directions(force) -> int:
-    """How many directions a force changes along: see `equations.slopes`."""
+    """Return the number of directions of a force's stiffness: see `engine.residual.force_slopes`."""
     return 1 if isinstance(force, (CoordinateForce, TwoPointForce)) else 6
 
 
 def velocity_groups(S: System, nv: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which group each row of the body table is in (-1: it cannot move), and where the velocities of each begin.
+    """Return the group of each row of the body table (-1: immovable), and the start of each group's velocities.
 
-    Groups are what rows, measured quantities and forces connect; all is one group where velocities of one are no
-    neighbours.
+    Groups are connected by rows, measured quantities and forces. All velocities form one group if those of some group
+    are
+    not contiguous.
     """
     part = np.arange(nv)
 
@@ -216,7 +217,7 @@ def velocity_groups(S: System, nv: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _moving_velocities(S: System, b: int) -> list[int]:
-    """Velocities that move a body."""
+    """Return the velocities that move a body."""
     out: list[int] = []
     while b >= 0:
         out += range(S.tree.v[b], S.tree.v[b] + S.tree.nv[b])
@@ -225,7 +226,7 @@ def _moving_velocities(S: System, b: int) -> list[int]:
 
 
 def assembled_start(model: Model, t: float, parameters: Mapping[str, float] | None, before: Result | None) -> Assembly:
-    """All single bodies at the start, in absolute coordinates.
+    """Return all single bodies at the start, in absolute coordinates.
 
     Raises
     ------
@@ -238,7 +239,7 @@ def assembled_start(model: Model, t: float, parameters: Mapping[str, float] | No
 
 
 def with_earlier_energy(result: Result, before: Result | None, part: Segment) -> Result:
-    """A result that counts on what an earlier one exchanged, but for that of a part of a motion."""
+    """Add the energy exchanged in an earlier result, unless this is a later segment of one motion."""
     if before is not None and not part.later:
         result.begun.done = energies_at_end(before)
         result.exchanged = cumulative_exchanges(result)
@@ -246,7 +247,7 @@ def with_earlier_energy(result: Result, before: Result | None, part: Segment) ->
 
 
 def start_of_submodel(base: Assembly, model: Model, parameters: Mapping[str, float] | None) -> InitialState:
-    """The start of a model of some of the bodies, where ``base`` has them."""
+    """Return the start of a model of some of the bodies, at their state in ``base``."""
     c, whole = compile_mechanism(model, parameters=parameters), base.compiled.structure
     s = c.structure
     q, v, z = np.zeros(s.nq), np.zeros(s.nv), c.z.copy()
@@ -263,7 +264,7 @@ def start_of_submodel(base: Assembly, model: Model, parameters: Mapping[str, flo
 
 
 def place_body_sets(scene: ContactTables, M: Movers, before: Result) -> None:
-    """Put sets of bodies where the earlier result left them.
+    """Place sets of bodies where the earlier result left them.
 
     Raises
     ------
@@ -282,13 +283,13 @@ def place_body_sets(scene: ContactTables, M: Movers, before: Result) -> None:
 
 @dataclass
 class MechanismMotion:
-    """The mechanism of a motion with contact.
+    """The jointed mechanism of a motion with contact.
 
     Attributes
     ----------
-    start : Start
-        Its own, of a model without the free bodies.
-    joints : Joined
+    start : InitialState
+        Its start, of a model without the free bodies.
+    joints : MechanismTables
         Its tables in the step.
     """
 
@@ -301,7 +302,7 @@ class MechanismMotion:
     slips: list[float] = field(default_factory=list)
 
     def add(self, A: MechanismTables, moved: bool) -> None:
-        """Keep where it is now, and mean accelerations and multipliers of the step that led there, if one did."""
+        """Record the present state, and mean accelerations and multipliers of the last step if there was one."""
         h = float(A.real.step) if moved else 1.0
         self.y.append(A.clock.y[0].copy())
         self.vdot.append((A.wide[V_AFTER] - A.wide[V_BEFORE]) / h)
@@ -313,9 +314,10 @@ class MechanismMotion:
         self.slips.append(float(np.abs(lost).max(initial=0.0)))
 
     def into(self, whole: Values, q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Put its coordinates, velocities and accelerations into the whole's; returns the whole's states, multipliers.
+        """Write its coordinates, velocities and accelerations into those of the whole model; return its states and
+        multipliers.
 
-        All in absolute coordinates.
+        All are in absolute coordinates.
         """
         own, s = self.start.assembly.compiled.structure, whole.structure
         y, lam = np.array(self.y), np.array(self.lam)
@@ -343,9 +345,10 @@ def separate_mechanism(
     first: int,
     base: Assembly | None = None,
 ) -> MechanismMotion | None:
-    """The mechanism of a model, if joints, forces or stops hold any of its bodies; ``first`` is its first mover.
+    """Return the jointed mechanism of a model, if joints, forces or stops act on any bodies; ``first`` is its first
+    mover.
 
-    It begins where ``base`` is, or else as described.
+    It starts at the state ``base``, or as described.
     """
     if not found.held:
         return None
@@ -358,7 +361,7 @@ def separate_mechanism(
 
 
 def values_with_stops(model: Model, values: Values, parameters: Mapping[str, float] | None) -> Values:
-    """Tables in which stops are forces, so that what they stop counts as held."""
+    """Return tables in which stops are forces, so that their bodies count as held."""
     if all(e.acts() for e in model.limits):
         return values
     from ...assembly.compiled_mechanism import compile_mechanism
@@ -366,13 +369,13 @@ def values_with_stops(model: Model, values: Values, parameters: Mapping[str, flo
     return compile_mechanism(stops_as_springs(model), parameters=parameters).values
 
 
-# The mechanism without the free bodies and without contact: a model of its own, whose stops are forces of no effect.
+# The mechanism without the free bodies and without contact is a separate model, whose stops are forces without effect.
 #
-# A stop of a coordinate needs its value and its gradient; a spring of no stiffness along it has them made.
+# A stop needs value and gradient of its coordinate; a spring of zero stiffness along it provides both.
 
 
 def stops_as_springs(model: Model) -> Model:
-    """A copy in which springs of no stiffness stand for stops."""
+    """Return a copy in which springs of zero stiffness replace stops."""
     out = model.copy()
     rigid = [e for e in out.limits if isinstance(e, Limit) and not e.acts()]
     out.limits = [e for e in out.limits if e.acts()]
@@ -383,12 +386,14 @@ def stops_as_springs(model: Model) -> Model:
 
 
 def stop_bounds(model: Model, values: Values) -> dict[str, StopBounds]:
-    """Stops by name."""
+    """Return the bounds and restitution of stops by name."""
     return {s.element.name: (s.lower, s.upper, s.restitution) for s in rigid_stops(model, values.given)}
 
 
 def mechanism_model(model: Model, held: Sequence[str]) -> Model:
-    """What of a model with its stops as springs concerns the bodies ``held``, without shapes that touch."""
+    """Return the part of a model (stops replaced by springs) that concerns the bodies ``held``, without contact
+    shapes.
+    """
     out = model.copy()
     gone = {b.name for b in out.bodies} - set(held)
     gone |= {f.name for f in out.frames if f.body in gone}
@@ -406,36 +411,36 @@ def mechanism_model(model: Model, held: Sequence[str]) -> Model:
 
 
 def _sensor_bodies(sensor) -> list[str]:
-    """Names that a sensor measures something of."""
+    """Return the names of the elements that a sensor measures."""
     texts = [getattr(sensor, k, None) for k in ("of", "frame")]
     return [t.partition(".")[0] for t in texts if isinstance(t, str)]
 
 
-CONTACT_MARGIN = 0.01  # gap up to which what does not approach is a contact, in parts of the smallest shape
-NO_OVERLAP = 1e-9  # overlap that is none, in parts of the smallest shape
+CONTACT_MARGIN = 0.01  # gap up to which non-approaching shapes are in contact, relative to the smallest shape
+NO_OVERLAP = 1e-9  # negligible overlap, relative to the smallest shape
 SLOW_CONTACT = 1e-6  # speed [m/s] below which nothing bounces, whatever gravity is
 DEFAULT_ITERATIONS = {"auto": 30, "newton": 100, "gauss-seidel": 50, "admm": 200}
-"""Most iterations by solver, where nobody says how many; of the others `OTHER_ITERATIONS`."""
+"""Default largest number of iterations by solver; `OTHER_ITERATIONS` for the others."""
 COARSE_FACTOR = (
-    100.0  # times the tolerance that a solve which is cut may leave without a word; or what a body falls faster
+    100.0  # factor of the tolerance up to which the residual of an unconverged solve is not reported
 )
 OTHER_ITERATIONS, DEFAULT_POSITION_ITERATIONS, DEFAULT_SOLVER_STEPS = 150, 25, 100
 
 
 def smallest_radius(scene: ContactTables, values: Values) -> float:
-    """Radius [m] of the smallest shape; the mechanism's length where all are without end."""
+    """Return the radius [m] of the smallest shape; the mechanism's length if all are unbounded."""
     sizes = scene.geometry.shape_x[:, RADIUS]
     bounded = sizes[np.isfinite(sizes)]
     return float(bounded.min() if len(bounded) else values.length)
 
 
 def movers_of_assembly(scene: ContactTables, base: Assembly) -> Movers:
-    """Movers where the assembled mechanism has them; sets of bodies are as described."""
+    """Return the movers at the assembled positions; sets of bodies are as described."""
     return place_movers(scene, base.compiled.moving(base.t, base.q, base.v))
 
 
 def place_movers(scene: ContactTables, bodies: Mapping[str, BodyState]) -> Movers:
-    """Movers where the single bodies are; sets of bodies are as described."""
+    """Return the movers at the poses of the single bodies; sets of bodies are as described."""
     M = Movers(scene.carriers.movers.pose.copy(), scene.carriers.movers.twist.copy())
     for name, b in bodies.items():
         k = scene.carriers.slices[name].start
@@ -447,7 +452,7 @@ def place_movers(scene: ContactTables, bodies: Mapping[str, BodyState]) -> Mover
 def make_stepper(
     scene: ContactTables, M: Movers, values: Values, o: Stepping, held: MechanismMotion | None = None
 ) -> Stepper:
-    """The stepper at the start."""
+    """Create the stepper at the start."""
     planar = values.structure.model.planar
     real, count = np.zeros(REALS), np.zeros(COUNTS, np.int64)
     real[GRAVITY : GRAVITY + 3] = values.system.gravity

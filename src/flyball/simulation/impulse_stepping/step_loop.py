@@ -1,8 +1,7 @@
-"""The compiled loop of steps: search for contacts, impacts, velocities, displacements without overlap.
+"""The compiled step loop: contact search, impacts, velocities, displacements without overlap.
 
-Joints are closed at the end of a step by the smallest change in the metric of the masses. Light links move by
-that, and with them their contacts: displacements are found again with the gaps that this leaves, until none is
-below zero.
+Joints are closed at the end of a step by the smallest displacement in the metric of the masses. This moves light links
+and their contacts. Displacements are then computed again with the resulting gaps, until none is negative.
 """
 
 from __future__ import annotations
@@ -138,7 +137,7 @@ from .stepping_tables import TASK_FINAL_VELOCITIES as VELOCITIES_AFTER
 
 
 class StepSolvers(NamedTuple):
-    """The rooms of each problem's solver."""
+    """Workspaces of the solver of each problem."""
 
     velocities: IslandSolver
     positions: IslandSolver
@@ -153,7 +152,7 @@ def bind_solvers(
     O: SolverSettings,
     pace: RunState,
 ) -> StepSolvers:
-    """A solver for velocities, positions and impacts; its addresses go to ``pace.door``."""
+    """Bind a solver for velocities, positions and impacts; its addresses are stored in ``pace.door``."""
     found = [prepare_solver(name, P, X, W, O) for P in problems]
     for place, one in zip((ADDRESS_VELOCITIES, ADDRESS_POSITIONS, ADDRESS_IMPACTS), found, strict=True):
         pace.door[place] = one.kernel.address
@@ -161,17 +160,17 @@ def bind_solvers(
 
 
 def solver_counts(F: StepSolvers) -> np.ndarray:
-    """What the solver of velocities picked, added up: see ``choose.py``; empty where there was nothing to pick."""
+    """Return the counts of solvers chosen for the velocity problem; empty where the choice is fixed."""
     return F.velocities.told if F.velocities.doors[SMALL_ISLAND_SOLVER] else np.zeros(0, np.int64)
 
 
 LIFT_PASSES = 16
-OVERLAP_FACTOR = 1e3  # times the overlap that is none: what a pass may leave
+OVERLAP_FACTOR = 1e3  # overlap that a pass may leave, relative to the negligible one
 
 
 @formula
 def shift_by_joints(A, M, mover, axis, arm):
-    """How far a point of a mover was moved along an axis by putting onto joints."""
+    """Return the displacement of a point of a mover along an axis by the projection onto the joints."""
     k = mover - A.count.first
     if k < 0:
         return 0.0
@@ -183,7 +182,7 @@ def shift_by_joints(A, M, mover, axis, arm):
 
 @formula
 def change_of_gap(G, A, M, C, P, c):
-    """What putting onto joints did to the gap of contact c."""
+    """Return the change of the gap of contact c by the projection onto the joints."""
     n = load3(P.frame, c, 0)
     a, b = G.shape_i[C.at[c, SHAPE_1], MOVER], G.shape_i[C.at[c, SHAPE_2], MOVER]
     return shift_by_joints(A, M, b, n, load3(P.arm, c, 3)) - shift_by_joints(A, M, a, n, load3(P.arm, c, 0))
@@ -191,9 +190,9 @@ def change_of_gap(G, A, M, C, P, c):
 
 @formula
 def overlaps_after_joints(G, A, M, C, P, Q, Y, aim, pace):
-    """Whether contacts overlap now; then ``Q`` has the gaps to be lifted from, which are ``aim`` and the change.
+    """Return whether contacts overlap now; then set the gaps in ``Q`` to ``aim`` plus the change by the projection.
 
-    ``aim`` has in column 0 the velocity that leaves no gap, by which ``Y`` was found.
+    ``aim`` has in column 0 the velocity that leaves no gap, with which ``Y`` was computed.
     """
     if not A.real.kinetic >= 0.0:
         return False
@@ -212,7 +211,7 @@ def overlaps_after_joints(G, A, M, C, P, Q, Y, aim, pace):
 
 @formula
 def solve_cone_problem(address, P, X, W, O, F, pace, most, enough):
-    """Go through a solver's door; keeps what came of it."""
+    """Call a solver and count its iterations; return its status."""
     O.count.most = most
     O.real.enough = enough
     pace.count[ITERATIONS] += call(address, P, X, W, O, F, 0)
@@ -221,7 +220,7 @@ def solve_cone_problem(address, P, X, W, O, F, pace, most, enough):
 
 @formula
 def call_mechanism(A, M, C, P, X, pace, task):
-    """Ask something of the mechanism, if there is one; see ``joined.py``."""
+    """Run a task of the mechanism, if there is one; see `mechanism_step.run_task`."""
     if pace.door[ADDRESS_MECHANISM] == 0:
         return DONE
     return call(pace.door[ADDRESS_MECHANISM], A, M, C, P, X, task)
@@ -229,7 +228,7 @@ def call_mechanism(A, M, C, P, X, pace, task):
 
 @formula
 def free_velocities_of_all(A, M, C, P, X, N, pace):
-    """Velocities that bodies would have at the end of the step if nothing touched."""
+    """Compute the velocities of all bodies at the end of the step without contact."""
     velocities_without_contact(N, M, P, X, pace)
     A.real.time, A.real.step = pace.real[TIME], pace.real[STEP]
     return call_mechanism(A, M, C, P, X, pace, TASK_FREE_VELOCITIES)
@@ -237,9 +236,9 @@ def free_velocities_of_all(A, M, C, P, X, N, pace):
 
 @formula
 def solve_velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
-    """Velocities at the end of the step: the cone problem, and its residual into the sums.
+    """Solve the cone problem for the velocities at the end of the step, and record its residual.
 
-    Returns DONE, or TOO_LONG for contacts that give way, before anything is solved.
+    Returns DONE, or STEP_TOO_LONG for compliant contacts, before anything is solved.
     """
     warm_start(C, P, X, now, before)
     static_friction_of_sticking(G, C, P, L, X, pace, now)
@@ -290,12 +289,10 @@ def solve_velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
 
 @formula
 def solve_positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
-    """Displacements that leave no overlap, and no gap of what goes on, from those of the mean velocities.
+    """Compute the displacements that leave no overlap, and close the gaps of persistent contacts, from mean velocities.
 
-    See ``motion.displace``.
-
-    min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. On the way
-    impulses are booked, since the mean velocities are at hand.
+    min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. The works of
+    impulses are accounted for here, since the mean velocities are available.
     """
     h = pace.real[STEP]
     mean_velocities(N, X, Y)
@@ -338,7 +335,9 @@ def solve_positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
 
 @formula
 def preload_displacements(C, P, X, Y, now):
-    """Let displacements close gaps of the contacts that go on: as far as these press, which is what they start from."""
+    """Start displacements of persistent contacts from their impulses, so that gaps close as far as these contacts
+    press.
+    """
     for c in range(C.count[FOUND]):
         if now[c, HISTORY_PERSISTS] == MIDDLE_FOUND:
             apply_contact_impulse(P, Y.v, Y.wide, c, (-X.p[c, 0], 0.0, 0.0))
@@ -347,7 +346,9 @@ def preload_displacements(C, P, X, Y, now):
 
 @formula
 def finish_on_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, pace, now):
-    """End the mechanism's step on its joints, and lift again where that made contacts overlap. Returns a status."""
+    """End the mechanism's step on its joints, and repeat displacements where that made contacts overlap. Returns a
+    status.
+    """
     for n in range(LIFT_PASSES + 1):
         if call_mechanism(A, M, C, P, Y, pace, TASK_FINISH) != DONE:
             return NO_SOLUTION
@@ -373,7 +374,7 @@ def finish_on_joints(G, A, M, C, P, Q, R, X, Y, W, O, F, pace, now):
 
 @formula
 def energies_and_counts(A, pace):
-    """Energies that contacts, stops and joints exchanged so far, and those that the method took; counts of impacts."""
+    """Return the energies exchanged by contacts, stops and joints so far, numerical losses, and counts of impacts."""
     real, count = pace.real, pace.count
     energies = (
         real[LOST_IMPACT],
@@ -388,7 +389,7 @@ def energies_and_counts(A, pace):
 
 @formula
 def restore_start(N, M, A, X, pace, sums):
-    """Poses, velocities, energies and counts of the start of the step again, before its impacts."""
+    """Restore poses, velocities, energies and counts at the start of the step, before its impacts."""
     restore_poses(N, M)
     for k in range(N.body.shape[0]):
         for i in range(6):
@@ -407,9 +408,10 @@ def restore_start(N, M, A, X, pace, sums):
 
 @formula
 def search_again(G, M, C, H, B, Z, pace, now):
-    """Contacts with the velocities after impacts, which may meet what nothing moved towards before. Returns a status.
+    """Search for contacts with the velocities after impacts. Returns a status.
 
-    What was hit, and is none any more or has another normal or place, stays a contact: its impulse acts where it did.
+    A contact that had an impact and has disappeared, or has another normal or point, is kept: its impulse acts where it
+    did.
     """
     status, most = call(pace.door[ADDRESS_SEARCH], G, M, H, C, B, NEW_VELOCITIES), H.at.shape[0]
     n = H.count[FOUND]
@@ -444,13 +446,13 @@ def search_again(G, M, C, H, B, Z, pace, now):
 
 @formula
 def contact_moved(C, o, H, k):
-    """Whether contact k of H has another normal or place than contact o of C."""
+    """Return whether contact k of H has another normal or point than contact o of C."""
     return load3(C.x, o, NORMAL) != load3(H.x, k, NORMAL) or load3(C.x, o, POINT) != load3(H.x, k, POINT)
 
 
 @formula
 def copy_contact(C, c, H, k):
-    """Contact c of C becomes contact k of H."""
+    """Copy contact c of C to contact k of H."""
     for i in range(C.at.shape[1]):
         H.at[k, i] = C.at[c, i]
     for i in range(C.x.shape[1]):
@@ -459,7 +461,7 @@ def copy_contact(C, c, H, k):
 
 @formula
 def resolve_all_impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, pace, now):
-    """Impacts until nothing more is hit: what is hit may hit what is near. Returns a status."""
+    """Resolve impacts repeatedly, since one impact may cause others nearby. Returns a status."""
     clear_impact_impulses(C, now)
     for _ in range(IMPACT_ROUNDS):
         if not find_impacts(G, C, P.at, P.bias, R, X, L, pace, now):
@@ -483,7 +485,7 @@ def resolve_all_impacts(G, A, M, C, H, B, P, R, X, Z, E, W, O, F, N, L, pace, no
 
 @formula
 def continue_contacts(G, A, M, C, D, H, B, N, P, X, L, pace, now, before, hit):
-    """Contacts that go on, with their rows in the middle of the step; see ``onward.py``. Returns a status.
+    """Set the rows of persistent contacts in the middle of the step; see `contact_constraints`. Returns a status.
 
     hit: whether there were impacts.
     """
@@ -507,7 +509,7 @@ def continue_contacts(G, A, M, C, D, H, B, N, P, X, L, pace, now, before, hit):
 
 @formula
 def take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
-    """One step of time; where it cannot be taken, for what is returned, everything is as it was at its start."""
+    """Take one time step; if it fails, the state at its start is restored. Returns a status."""
     save_start(N, M, X)
     sums = energies_and_counts(A, pace)
     status = attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before)
@@ -518,7 +520,7 @@ def take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now
 
 @formula
 def attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
-    """Impacts, velocities, and the way, for `take_step`; a status."""
+    """Compute impacts, velocities and displacements for `take_step`. Returns a status."""
     if free_velocities_of_all(A, M, C, P, X, N, pace) != DONE:
         return NO_SOLUTION
     B.real[AHEAD] = pace.real[STEP]
@@ -553,7 +555,7 @@ def attempt_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, 
 
 @formula
 def run_steps(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
-    """See `step_loop_kernel`."""
+    """Run the steps; see `step_loop_kernel`."""
     while pace.count[STEPS_LEFT] > 0:
         if pace.count[STEPS_TAKEN] % 2 == 0:
             status = take_step(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T.kept, U.kept)
@@ -589,5 +591,7 @@ def step_loop_kernel(
     T: ContactHistory,
     U: ContactHistory,
 ) -> int:
-    """Take ``pace.count[LEFT]`` steps. Returns what the search said last, NO_ROOM, NO_WAY, or TOO_LONG."""
+    """Take ``pace.count[STEPS_LEFT]`` steps. Returns a status: of the contact search, TABLES_FULL, NO_SOLUTION or
+    STEP_TOO_LONG.
+    """
     return run_steps(G, A, M, C, D, H, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U)

@@ -1,4 +1,4 @@
-"""The stepper: calls the compiled loop of steps, and makes, enlarges and keeps its tables."""
+"""The stepper: calls the compiled step loop, and creates and enlarges its tables."""
 
 from __future__ import annotations
 
@@ -49,27 +49,27 @@ from .stepping_tables import (
     no_mechanism,
 )
 
-CALL_SECONDS = 0.05  # seconds that a call of the loop should take
+CALL_SECONDS = 0.05  # intended duration of one call of the loop [s]
 
 
-MOST_STEPS_PER_CALL = 100_000  # steps of a call at most
-MOST_HALVINGS = 6  # of a step that cannot be taken whole
-MOST_IMPACT_HALVINGS = 12  # halvings of a step that is too long for the impacts of contacts that give way
-REST_SHARE = 1e-2  # of the velocity that gravity makes in a step: a larger residual is not enough
-GROWTH_FACTOR = 1.5  # times as much room as was needed, when there is none
+MOST_STEPS_PER_CALL = 100_000  # largest number of steps in a call
+MOST_HALVINGS = 6  # of a step that has no solution
+MOST_IMPACT_HALVINGS = 12  # halvings of a step that is too long for the impacts of compliant contacts
+REST_SHARE = 1e-2  # largest residual, relative to the velocity that gravity causes in a step
+GROWTH_FACTOR = 1.5  # size of enlarged tables, relative to the size needed
 
 
 class NoSolution(Exception):
-    """The mechanism cannot go on: its equations have no solution, or its joints cannot be closed."""
+    """The step of the mechanism has no solution, or its joints cannot be closed."""
 
 
 class StepTooLong(Exception):
-    """The step does not resolve an impact of contacts that give way."""
+    """The step is too long to resolve an impact of compliant contacts."""
 
 
 @dataclass
 class StepWorkspaces:
-    """What is as large as the number of contacts."""
+    """Workspaces whose size is the number of contacts."""
 
     P: ContactProblem
     Q: ContactProblem
@@ -94,7 +94,7 @@ def make_workspaces(
     solver: str,
     old: StepWorkspaces | None = None,
 ) -> StepWorkspaces:
-    """Rooms for as many contacts; what is remembered of contacts, and velocities, are taken over from ``old``."""
+    """Create workspaces for this number of contacts; contact history and velocities are taken from ``old``."""
     groups, lines = len(A.group) - 1, len(A.active)
     P = empty_problem(contacts, len(node), groups, lines, int(A.count.needed), turning)._replace(node=node)
     P.group[:] = A.group
@@ -117,7 +117,7 @@ def make_workspaces(
 
 
 def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar: bool) -> FreeBodies:
-    """Tables of free bodies.
+    """Create the tables of free bodies.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar:
     n = len(mass)
     body = np.zeros((n, 16))
     body[:, FREE_MASS], body[:, FREE_PER_MASS] = mass, 1.0 / mass
-    if planar:  # torques are about z only: as if it were round
+    if planar:  # torques act about z only: an isotropic inertia is equivalent
         inertia = inertia[:, 2, 2, None, None] * np.eye(3)
     inverse = np.linalg.inv(inertia)
     for first, J in ((FREE_INERTIA, inertia), (FREE_INVERSE, inverse)):
@@ -144,7 +144,7 @@ def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar:
 
 
 def problem_nodes(free: FreeBodies) -> np.ndarray:
-    """Nodes of the cone problem; those of bodies that are not round are filled in every step."""
+    """Return the nodes of the cone problem; those of bodies with anisotropic inertia are filled in every step."""
     out = np.zeros((len(free.body), 8))
     out[:, 0] = free.body[:, FREE_PER_MASS]
     out[:, 1:7] = free.body[:, FREE_INVERSE : FREE_INVERSE + 6]
@@ -153,26 +153,26 @@ def problem_nodes(free: FreeBodies) -> np.ndarray:
 
 
 class Stepper:
-    """Free bodies, shapes and laws on the way through time.
+    """Time stepping of free bodies, shapes, contact laws and the jointed mechanism.
 
     Parameters
     ----------
     geometry : Geometry
-    free : Free
+    free : FreeBodies
         Movers 0 to n - 1.
     position : (n, 3) [m]
         Of the mass centres.
     velocity : (n, 6) [m/s, rad/s]
-        Of the mass centres, and angular velocities, along the world's axes.
+        Of the mass centres, and angular velocities, in world axes.
     laws : Surfaces
-    pace : Pace
-        With time, choices and the solvers' addresses; that of the search is put in here.
+    pace : RunState
+        With time, options and the solvers' addresses; the address of the contact search is set here.
     margin : float [m]
-        Gap up to which what does not approach is a contact.
+        Gap up to which non-approaching shapes are in contact.
     solver : str
         Of the cone problems, by its name in ``numerics/complementarity/solver_choice.py``.
-    joints : Joined, optional
-        What joints hold together: the movers behind the free bodies.
+    joints : MechanismTables, optional
+        The jointed mechanism: the movers after the free bodies.
     """
 
     def __init__(
@@ -207,13 +207,13 @@ class Stepper:
         self.quota = 1
         self.enough = float(
             pace.real[VELOCITY_TOLERANCE]
-        )  # residual of velocities [m/s] in a step that is not very short
-        self.halved = 0  # steps that were taken in shorter ones
+        )  # allowed residual of velocities [m/s] in a step that is not very short
+        self.halved = 0  # steps that were divided
         if joints is not None:
             self._start_joints()
 
     def _start_joints(self) -> None:
-        """The mechanism at its start."""
+        """Evaluate the mechanism at its start."""
         self.joints.door[0] = engine.address
         self.pace.door[ADDRESS_MECHANISM] = mechanism_kernel.address
         if (
@@ -225,16 +225,16 @@ class Stepper:
             raise NoSolution
 
     def run(self, steps: int, h: float) -> None:
-        """Take as many steps of h seconds, in calls that take so long that an interrupt comes through.
+        """Take as many steps of h seconds, in calls short enough for keyboard interrupts.
 
-        A step that the mechanism cannot take is taken in shorter ones; ``pace.real[STEP]`` is the last one's length.
+        A step without solution is divided; ``pace.real[STEP]`` is the length of the last one.
 
         Raises
         ------
         ModelError
-            What the search cannot go on with.
-        NoWay
-            If no shorter steps can be taken either.
+            If the contact search fails.
+        NoSolution
+            If shorter steps have no solution either.
         """
         count = self.pace.count
         while steps > 0:
@@ -255,16 +255,16 @@ class Stepper:
             self.quota = int(max(1, min(4 * self.quota, self.quota * CALL_SECONDS / took, MOST_STEPS_PER_CALL)))
 
     def _next(self, h: float) -> None:
-        """Length of the steps that follow, and the residual of their velocities that is enough.
+        """Set the length of the next steps, and the allowed residual of their velocities.
 
-        In a step so short that gravity makes no more velocity than that, what rests would not be held.
+        In a step so short that gravity causes less velocity than that residual, resting bodies would not be supported.
         """
         real = self.pace.real
         falls = REST_SHARE * h * float(np.linalg.norm(real[GRAVITY : GRAVITY + 3]))
         real[STEP], real[VELOCITY_TOLERANCE] = h, min(self.enough, falls) if falls > 0.0 else self.enough
 
     def _in_halves(self, h: float, depth: int) -> None:
-        """Take a step of h, which cannot be taken, as two; at the last depth as best as it can be."""
+        """Take a step of h, which has no solution, as two; at the last depth without requiring convergence."""
         if depth == 0:
             raise NoSolution
         divides = int(self.pace.count[DIVIDES_STEPS])
@@ -281,7 +281,7 @@ class Stepper:
         self.pace.count[DIVIDES_STEPS] = divides
 
     def _call_loop(self) -> None:
-        """Take ``pace.count[LEFT]`` steps, enlarging tables that are full."""
+        """Take ``pace.count[STEPS_LEFT]`` steps, enlarging tables that are full."""
         self.pace.door[ADDRESS_SEARCH] = self.finder.address
         while True:
             r, f = self.workspaces, self.finder
@@ -304,19 +304,19 @@ class Stepper:
                 self.workspaces = self._enlarged_workspaces(len(f.now.at))
 
     def _enlarge_row_tables(self) -> None:
-        """More room for rows of contacts on the mechanism."""
+        """Enlarge the tables for rows of contacts on the mechanism."""
         A = self.joints
         A.count.needed = int(GROWTH_FACTOR * A.count.needed)
         self.joints = A._replace(job=np.zeros((int(GROWTH_FACTOR * A.count.jobs) + 1, 3), np.int64))
         self.workspaces = self._enlarged_workspaces(len(self.workspaces.P.mu))
 
     def _enlarged_workspaces(self, contacts: int) -> StepWorkspaces:
-        """Rooms for as many contacts, which go on from those that are there."""
+        """Return workspaces for this number of contacts that continue from the present ones."""
         r = self.workspaces
         return make_workspaces(contacts, r.P.node, self.turning, self.joints, self.pace, self.solver, r)
 
     def last(self) -> tuple[Contacts, np.ndarray]:
-        """Contacts of the last step, and what is remembered of them."""
+        """Return the contacts of the last step, and their history."""
         if self.pace.count[STEPS_TAKEN] % 2 == 1:
             return self.finder.now, self.workspaces.T.kept
         return self.finder.before, self.workspaces.U.kept
