@@ -281,7 +281,9 @@ class _SignalGraph:
         self.way.pop()
         if told in self.rings:
             tree = solve_loop(tree, told, e.title, self.rings[told])
-        if all(n.kind != "name" or n.value not in self.way for n in tree.walk()):  # in a loop it is known together with the others
+        if all(
+            n.kind != "name" or n.value not in self.way for n in tree.walk()
+        ):  # in a loop it is known together with the others
             self.known[key] = tree
         return tree
 

@@ -80,7 +80,9 @@ class Joint(Element):
     needs_axis: ClassVar[bool] = False
     axisless: ClassVar[bool] = False  # value for axes that have no name of their own
     drawn: ClassVar[str] = "fixed"  # symbol in pictures
-    replaceable: ClassVar[bool] = False  # whether a joint with fewer constraints may replace it as a remedy for redundancy
+    replaceable: ClassVar[bool] = (
+        False  # whether a joint with fewer constraints may replace it as a remedy for redundancy
+    )
     stand_in: ClassVar[float] = 0.0  # cost of using it as a replacement; 0: it is never proposed
     omission: ClassVar[float] = 3.5  # cost of leaving it out
     called: ClassVar[str] = ""  # its name in proposals, if not its kind

@@ -271,9 +271,7 @@ LOOKAHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law is e
 LOCKED_RESIDUAL = 1e-3  # relative residual of the accelerations above which the mechanism is locked
 DISAGREEMENT = 1e-6  # relative difference of derivatives above which two laws of one coordinate disagree
 DERIVATIVE_NAMES = ("value", "rate", "second derivative")
-GROWTH_FACTOR = (
-    1.2  # growth of an unbounded derivative when the distance from the instant is divided by a hundred
-)
+GROWTH_FACTOR = 1.2  # growth of an unbounded derivative when the distance from the instant is divided by a hundred
 JUMP_FACTOR = 10.0  # ratio of a law's change to that by its slope above which it has jumped
 
 

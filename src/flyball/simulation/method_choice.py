@@ -109,9 +109,7 @@ IMPLICIT_METHODS = (RADAU, GENERALISED_ALPHA, VARIATIONAL)
 FIXED_STEP_METHODS = (GENERALISED_ALPHA, VARIATIONAL)
 """Implicit integrators with steps of fixed width, which has to be given."""
 DEFAULT_RHO_INF = 0.8  # default spectral radius at infinity of generalised-alpha
-MOST_JOINT_GROUPS = (
-    40  # column groups of the Jacobian up to which joint coordinates cost less than absolute ones
-)
+MOST_JOINT_GROUPS = 40  # column groups of the Jacobian up to which joint coordinates cost less than absolute ones
 
 
 def explicit_substitute(method: str) -> str:

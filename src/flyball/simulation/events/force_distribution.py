@@ -129,9 +129,7 @@ def _minimise(b: np.ndarray, B: np.ndarray, of: tuple, friction: tuple, z: np.nd
 
 
 SINGULAR = 1e-9  # relative eigenvalue below which rows are linearly dependent
-LOAD_ROUNDING = (
-    1e-13 / IMPULSE_STEP
-)  # relative rounding of the finite differences of the friction limit by forces
+LOAD_ROUNDING = 1e-13 / IMPULSE_STEP  # relative rounding of the finite differences of the friction limit by forces
 NULL_TOLERANCE = 1e-9  # entry of a null vector, relative to its largest, that is rounding
 FRICTION_REDUCTION = 1e-6  # part by which friction limits are reduced to find which rows slide
 CLEAR_ACCELERATION = 1e-3  # part of the resulting accelerations below which a row does not slide

@@ -270,7 +270,13 @@ def jump_without_collision(n: InstantProblem, parts: list[ProblemRow], held: flo
 
 MOST_ROUNDS = 100
 MOST_REPEATS = 5  # repeated decisions of sliding directions for the same modes
-RATE_GUARDS = (G_SLIDES, G_BACK, G_TURNS, G_PRESS_LOWER, G_PRESS_UPPER)  # guards of rates, or whose meaning depends on rates
+RATE_GUARDS = (
+    G_SLIDES,
+    G_BACK,
+    G_TURNS,
+    G_PRESS_LOWER,
+    G_PRESS_UPPER,
+)  # guards of rates, or whose meaning depends on rates
 HOLDING_GUARDS = (G_PULL, G_HOLDS, G_CONE)  # guards of active rows, by the forces that they carry
 BROKEN_FORCE = 1e-8  # part of its terms beyond which a force violates its bound
 VIOLATED_START = 1e-9  # violation that is refused at the start, relative to length or a radian (rates: times the rate)

@@ -421,9 +421,7 @@ NO_OVERLAP = 1e-9  # negligible overlap, relative to the smallest shape
 SLOW_CONTACT = 1e-6  # speed [m/s] below which nothing bounces, whatever gravity is
 DEFAULT_ITERATIONS = {"auto": 30, "newton": 100, "gauss-seidel": 50, "admm": 200}
 """Default largest number of iterations by solver; `OTHER_ITERATIONS` for the others."""
-COARSE_FACTOR = (
-    100.0  # factor of the tolerance up to which the residual of an unconverged solve is not reported
-)
+COARSE_FACTOR = 100.0  # factor of the tolerance up to which the residual of an unconverged solve is not reported
 OTHER_ITERATIONS, DEFAULT_POSITION_ITERATIONS, DEFAULT_SOLVER_STEPS = 150, 25, 100
 
 
