@@ -91,7 +91,9 @@ def _motion(m: fb.Mechanism, t_end: float, options: dict[str, Any]) -> Answer:
 def difference(name: str, old: Answer, new: Answer) -> str:
     """What is said of an answer: ``bits``, ``close``, or how it differs."""
     a, b = old[name], new.get(name)
-    if isinstance(a, str | list) or b is None or isinstance(b, str | list):
+    if b is None:
+        return f"{name}: is missing now"
+    if isinstance(a, str | list) or isinstance(b, str | list):
         return "bits" if a == b else f"{name}: {a!r:.80} is {b!r:.80} now"
     if a.shape != b.shape:
         return f"{name}: shape {a.shape} is {b.shape} now"

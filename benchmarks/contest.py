@@ -243,7 +243,7 @@ def time_in_turn(contest: Contest, rows: Sequence[dict[str, Any]]) -> None:
     repeats = int(np.clip(TIMED / max(sum(first.values()), 1e-6), 3 if sum(first.values()) < TIMED else 1, 25))
     seconds = timing.interleaved(all_clocks, repeats)
     for i, row in enumerate(rows):
-        row |= {NAMED[key]: 1e3 * seconds[i, key] / contest.per_time for key in row["clocks"]}
+        row |= {NAMED[key]: 1e3 * seconds[i, key] / contest.per for key in row["clocks"]}
     for key, ratio in RATIOS.items():
         ours = min((row[key] for row in rows if row["engine"] == "flyball" and key in row), default=None)
         for row in rows:

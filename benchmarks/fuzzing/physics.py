@@ -31,7 +31,7 @@ class Finding:
     allowed: float
 
     def __str__(self) -> str:
-        return f"{self.relation}: {self.what}: {self.found:.3g} where {self.allowed_velocities:.3g} is allowed"
+        return f"{self.relation}: {self.what}: {self.found:.3g} where {self.allowed:.3g} is allowed"
 
 
 @dataclass
