@@ -48,7 +48,8 @@ MAX_OPERATIONS = 40_000
 LOOKUP_COST, LOAD_COST, OPERATION_COST, GROWTH_COST = 50e3, 3e6, 20e3, 3.5
 """Cost [ns] of finding code in memory, of loading it from disk, of compiling an operation, and its growth.
 
-The cost of an operation grows with the number of operations. Compiling takes 0.2 s for Andrews' mechanism, 1.8 s for the Stewart platform.
+The cost of an operation grows with the number of operations. Compiling
+takes 0.2 s for Andrews' mechanism, 1.8 s for the Stewart platform.
 """
 
 

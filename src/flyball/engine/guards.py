@@ -84,7 +84,7 @@ MODE_GUARDS = (
     G_CONE,
     G_SHARED,
 )  # guards that are positive as long as the modes are right
-GRAZING_DEPTH = 1e-12  # times the mechanism's length, or a radian: depth at which an undecided elastic stop counts as closed
+GRAZING_DEPTH = 1e-12  # depth at which an undecided elastic stop counts as closed, in mechanism lengths or radians
 RESTING_RATE = 1e-9  # times the characteristic rate of a quantity: a slower approach counts as none
 CREEP_RATE = 1e-13  # times the characteristic rate of a quantity: a smaller rate counts as zero
 WRONG_SIDE = 1e-9  # relative to the terms of a corner function: beyond this the law is on the other side

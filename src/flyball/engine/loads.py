@@ -45,9 +45,9 @@ from .kinematics import load_record, project_wrench
 from .rows import characteristic_speed, controller_column, count_measured, direction_column, wrench_on_second
 
 SLOW_SLIDING = 1e-10  # relative to the characteristic speed: slower sliding in space takes the direction of its switch
-ONSET_LENGTH = 2.0  # length of the stored direction at the onset of sliding in space, which follows that direction first
-# relative to the characteristic speed: at this speed the direction mostly follows the velocity, at ONSET_END times it
-# wholly
+ONSET_LENGTH = 2.0  # length of the stored direction at the onset of sliding in space; sliding follows it at first
+# relative to the characteristic speed: at this speed the direction mostly follows the velocity, at ONSET_END
+# times it wholly
 ONSET_SPEED = 3e-5
 ONSET_END = 8.0
 # relative to the characteristic speed: backward speed that counts as reversal; at the onset it may be rounding
