@@ -306,7 +306,7 @@ def _refuse_inconsistent(d: ParameterDirection, x: MechanismState, before: np.nd
 def consistent_derivative(
     d: ParameterDirection, x: MechanismState, lin: ConstrainedSystem, dq: np.ndarray, dv: np.ndarray
 ) -> StateDerivative:
-    """State derivative with the changes of positions and velocities nearest to the given ones that keep the constraints."""
+    """State derivative whose position and velocity changes are nearest to the given ones and keep the constraints."""
     at = d.e.at
     dq, dv = consistent_changes(d, x, lin, dq, dv)
     left = d.along(x, dq, dv)
