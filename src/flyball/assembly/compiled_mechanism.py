@@ -41,7 +41,7 @@ class CompiledMechanism:
     z: np.ndarray  # controller states, angles and curve positions as last evaluated; work states are zero
     parameters: dict[str, Any] = field(default_factory=dict)  # values that replace the model's own
     system: System = field(init=False, repr=False, compare=False)  # tables of `values`, or with addresses of `made`
-    made: Any = field(default=None, init=False, repr=False, compare=False)  # generated code in use; None: general engine
+    made: Any = field(default=None, init=False, repr=False, compare=False)  # generated code; None: general engine
 
     def __post_init__(self) -> None:
         self.system = self.values.system

@@ -223,7 +223,7 @@ class CheckpointFile:
         self.path, self.mark, self.times = path, mark, times
         self.parts: list[Result] = []
         self.by = ""
-        self._run, self._count, self._written = uuid.uuid4().hex, 0, 0  # number of segments, and of those already written
+        self._run, self._count, self._written = uuid.uuid4().hex, 0, 0  # number of segments, and of those in files
         self._first = self._rows_beside = 0  # output times in the first file, and in the segment files
         self._files: list[Path] = []
         self._last = time.monotonic()
@@ -330,7 +330,7 @@ def with_joined_health(result: Result, parts: Sequence[Result]) -> Result:
         return result
     health = result.health
     health.late = {"mobility": parts[0].health.late["mobility"], "energy_drift": lambda: result.energy.drift}
-    if isinstance(health.options.get("method"), Mapping):  # accelerations of impulse time stepping are mean values over steps
+    if isinstance(health.options.get("method"), Mapping):  # impulse stepping: accelerations are means
         health.late |= {
             "doubtful": partial(diagnostics.impulse_stepping_doubts, result),
             "warnings": partial(diagnostics.impulse_stepping_warnings, result),

@@ -153,7 +153,8 @@ def _sound_forest(
             return c, ""
         if bad not in c.structure.tree_joints:
             return None, (
-                f"{bad} has no inertia, or less than {THIN_INERTIA:g} of that of the whole mass at the mechanism's length, "
+                f"{bad} has no inertia, or less than {THIN_INERTIA:g} of that of the whole mass at the "
+                "mechanism's length, "
                 f"and no joint that could be a tree joint"
             )
         avoided.append(bad)

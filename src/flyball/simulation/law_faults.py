@@ -260,7 +260,8 @@ def finite_time_escape(a: Assembly, clock: ex.StepState, named: ComponentNames) 
         return ""
     i = first + int(np.argmax(part))
     return (
-        f"at t = {t:.6g} s {_component_in_words(a, i, float(y[i]), named)} and changes by {rate[i]:.3g} in a second, faster and "
+        f"at t = {t:.6g} s {_component_in_words(a, i, float(y[i]), named)} and changes by {rate[i]:.3g} in a "
+        "second, faster and "
         f"faster: it has no value from there on. {_likely_cause(a, i)}"
     )
 

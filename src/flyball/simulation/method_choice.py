@@ -109,9 +109,7 @@ IMPLICIT_METHODS = (RADAU, GENERALISED_ALPHA, VARIATIONAL)
 FIXED_STEP_METHODS = (GENERALISED_ALPHA, VARIATIONAL)
 """Implicit integrators with steps of fixed width, which has to be given."""
 DEFAULT_RHO_INF = 0.8  # default spectral radius at infinity of generalised-alpha
-MOST_JOINT_GROUPS = (
-    40  # column groups of the Jacobian up to which joint coordinates cost less than absolute ones
-)
+MOST_JOINT_GROUPS = 40  # column groups of the Jacobian up to which joint coordinates cost less than absolute ones
 
 
 def explicit_substitute(method: str) -> str:
@@ -346,7 +344,8 @@ def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
     given = [f"{name}={getattr(o, name)!r}" for name in _given_options(o)]
     if unknown := _unknown_to_impulse_stepping(model):
         raise ModelError(
-            f"{IMPULSE_STEPPING} do not know {', '.join(unknown)}; the adaptive integrators do: leave method out, or give "
+            f"{IMPULSE_STEPPING} do not know {', '.join(unknown)}; the adaptive integrators do: leave method "
+            "out, or give "
             f"method={DEFAULT_INTEGRATOR!r}"
         )
     if given:
@@ -354,7 +353,8 @@ def choose_method(model: Model, o: SimulateOptions) -> MethodChoice:
         raise ModelError(f"{given[0]} does nothing with {IMPULSE_STEPPING}; leave it out{instead}")
     if o.coordinates == "joint":
         raise ModelError(
-            f"{IMPULSE_STEPPING} are taken in absolute coordinates, where joints close to rounding; leave coordinates out"
+            f"{IMPULSE_STEPPING} are taken in absolute coordinates, where joints close to rounding; leave "
+            "coordinates out"
         )
     return MethodChoice(_impulse_options(o), f"{IMPULSE_STEPPING}, as asked")
 

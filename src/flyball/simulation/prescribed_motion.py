@@ -131,7 +131,7 @@ def _largest_errors(error: np.ndarray, allowed: float) -> np.ndarray:
 
 
 def _interval_integrals(t: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the integrals over every interval, (n - 1, accounts), and their differences from those with fewer nodes."""
+    """Return the integrals over every interval, (n - 1, accounts), and their change with fewer nodes."""
     if len(t) < 2:
         return np.zeros((0, P.shape[1])), np.zeros(0)
     best = _quadrature(t, P, min(NODES, len(t)))

@@ -40,9 +40,7 @@ FIRST_DECISION, DECISION_FACTOR = 8, 4  # steps until auto decides first, and th
 GAIN = 3.0  # assumed speed-up by generated code
 PRICE_MARGIN = 1.25  # generated code must save this many times the cost of generating or loading it
 HISTORY_WEIGHT = 3.0  # divisor of the cost of earlier motions in the estimate of future use
-LOAD_COST = (
-    1.5e5  # cost of code on disk [ns] that one motion must save; later motions reuse the loaded code.
-)
+LOAD_COST = 1.5e5  # cost of code on disk [ns] that one motion must save; later motions reuse the loaded code.
 # (Loading takes 3 ms, and computing the key of the code 10 ms, once per process)
 MOST_STEPS_PER_CALL = 100_000  # steps in one call of the compiled loop
 FAILED_STATUS = (ex.STEP_FAILED, ex.NOT_FINITE, ex.OUTPUT_FAILED)
@@ -78,7 +76,7 @@ SPENT = CostAccount()
 """Cost of the general engine."""
 
 
-EVALUATION_COST, COST_SHARE = 150.0, 0.6  # fixed cost of an evaluation [ns], and factor of the estimated cost of the right-hand side
+EVALUATION_COST, COST_SHARE = 150.0, 0.6  # of an evaluation: fixed cost [ns], factor of the right-hand side's
 
 
 def mechanism_kind(s: Structure) -> tuple[str, float]:
@@ -266,9 +264,7 @@ CHECK_COST, CHECK_SHARE = (
 )  # cost of a stiffness check [ns], and the part of the computing time that unsuccessful checks may take
 IMPLICIT_CHECK_INTERVAL = 60  # implicit steps between two checks
 CHECKS_IN_A_ROW = 2  # agreeing checks before the method changes
-IMPLICIT_LOAD_COST = (
-    4e8  # least remaining cost of the explicit method [ns] for which loading the implicit one pays
-)
+IMPLICIT_LOAD_COST = 4e8  # least remaining cost of the explicit method [ns] for which loading the implicit one pays
 LEAST_EVALUATION_COST = 270.0  # least cost of an evaluation, loop included [ns]
 STABILITY_EDGE = 3.5  # h rho from which on steps are near the limit of stability
 LARGE_AMPLITUDE = 0.3  # amplitude relative to the state; larger oscillations belong to the motion at any tolerance
@@ -498,7 +494,7 @@ def largest_eigenvalue(c: CompiledMechanism, clock: ex.StepState, pace: float) -
 
     def product(x: np.ndarray) -> np.ndarray:
         way, out = x * unit, np.zeros(n)
-        for part in parts:  # one block at a time: with rates of 1e6/s and more, one block would be lost in the rounding of another
+        for part in parts:  # separately: with rates of 1e6/s one would be lost in the rounding of another
             most = np.max(np.abs(way[part]) / size[part], initial=0.0)
             if most > 0.0:
                 moved = y.copy()

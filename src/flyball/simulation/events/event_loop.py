@@ -347,7 +347,7 @@ class EventDrivenMotion:
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
-        self.end = float(clock.real.t_end)  # of the motion; that in the integrator state is the end of the present interval
+        self.end = float(clock.real.t_end)  # of the motion; that of the integrator is the end of an interval
         self.first, self.span = here.t, self.end - here.t or 1.0
         self.part, self.quota = here.start.part, int(clock.count.quota)
         self.segment_end_finder = SegmentEnd(self.part, clock)
@@ -411,7 +411,8 @@ class EventDrivenMotion:
             self.begin()
             engine.begin(here.clock)
             self.intervals = SmoothIntervals(here.clock, known, self._until)
-            if here.start.before is not None and self.sampled():  # sampling was still due at the end of the earlier motion: it may cause events
+            # a sampling that was still due at the end of the earlier motion may cause events
+            if here.start.before is not None and self.sampled():
                 here.clock.count.status = ex.RUNNING
                 self.turned()
             while not here.stopped:

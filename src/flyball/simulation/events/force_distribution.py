@@ -129,9 +129,7 @@ def _minimise(b: np.ndarray, B: np.ndarray, of: tuple, friction: tuple, z: np.nd
 
 
 SINGULAR = 1e-9  # relative eigenvalue below which rows are linearly dependent
-LOAD_ROUNDING = (
-    1e-13 / IMPULSE_STEP
-)  # relative rounding of the finite differences of the friction limit by forces
+LOAD_ROUNDING = 1e-13 / IMPULSE_STEP  # relative rounding of the finite differences of the friction limit by forces
 NULL_TOLERANCE = 1e-9  # entry of a null vector, relative to its largest, that is rounding
 FRICTION_REDUCTION = 1e-6  # part by which friction limits are reduced to find which rows slide
 CLEAR_ACCELERATION = 1e-3  # part of the resulting accelerations below which a row does not slide
@@ -242,7 +240,7 @@ def held_at_rest(n: InstantProblem, parts: list[ProblemRow], P: DenseProblem, en
 
 
 def admissible_distribution(P: DenseProblem, rows: np.ndarray, Z: np.ndarray) -> Distribution | None:
-    """Return the distribution with the largest margin that holds these rows; None if they cannot be at rest together."""
+    """Return the distribution of largest margin that holds these rows; None if they cannot be at rest together."""
     n, d = len(P.b), force_scales(P.A)
     driven = np.flatnonzero(P.rule == SLIDING)
     M, r, s = np.zeros((n, n)), np.zeros(n), 1.0 / d

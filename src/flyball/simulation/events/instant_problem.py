@@ -83,7 +83,7 @@ class ProblemRow(NamedTuple):
     switch: int
     rule: int
     sign: float = 1.0
-    way: float = 0.0  # direction (or STATIC) at which the friction law is evaluated; 0: limit is const + gain on row ``of``
+    way: float = 0.0  # direction (or STATIC) of the friction law; 0: the limit is const + gain on row ``of``
     rate: float = 0.0
     lean: float = 0.0
     const: float = 0.0
@@ -338,7 +338,7 @@ def reference_rate(here: EventContext) -> float:
 
 
 def instant_problem(here: EventContext) -> InstantProblem:
-    """Return the `InstantProblem` of a motion at the present instant; reused while tables and workspace are the same."""
+    """Return the `InstantProblem` of a motion at the present instant, reused with the same tables and workspace."""
     n = here.instant_problem
     if n is None or n.S is not here.c.system or n.W is not here.c.work:
         here.instant_problem = n = InstantProblem(here)
@@ -492,7 +492,7 @@ def write_slips(n: InstantProblem, parts: Sequence[ProblemRow], found: tuple[np.
             W.modes.mode[own], ways[own] = HELD, 0.0
             continue
         d = lean[rows]
-        if state[i] == DISC_SLIPS:  # in the direction of the acceleration; opposite to the friction force if that is zero
+        if state[i] == DISC_SLIPS:  # along the acceleration; opposite to the friction force if that is zero
             d = u[rows] if np.linalg.norm(u[rows]) > 0.0 else -x[rows]
             d = d / np.linalg.norm(d)
         if n.mode[own[0]] == OFF and _slip_continues(n, own):

@@ -45,9 +45,7 @@ LAW_ITERATIONS = 20  # Newton iterations; three or four are usual
 FEW_LAW_ITERATIONS = 3  # iterations where the cone solver does not converge
 LAW_TOLERANCE = 1e-2  # allowed difference of law and tangent, relative to the velocity tolerance
 RESIDUAL_SHARE = 0.1  # the same relative to the residual of the solve
-SMALL_CHANGE = (
-    1e-3  # relative change of the overlap below which the mean force is a series at the middle
-)
+SMALL_CHANGE = 1e-3  # relative change of the overlap below which the mean force is a series at the middle
 LARGEST_COMPLIANCE = 1e6  # compliance of open contacts, relative to the mobility
 RESOLVED_STIFFNESS = 0.01  # largest h^2 k' / 4 m that resolves an impact: 20 steps for one by Hertz's law
 
@@ -67,7 +65,7 @@ def contact_law(G, C, L, c):
 
 @formula
 def contact_stiffness(G, C, L, c):
-    """Return the stiffness of contact c, 0 if it is rigid; of spheres by E*: k = 4/3 E* sqrt(R), 1/R = 1/R_1 + 1/R_2."""
+    """Return the stiffness of contact c, 0 if rigid; of spheres by E*: k = 4/3 E* sqrt(R), 1/R = 1/R_1 + 1/R_2."""
     _, _, _, k, modulus = contact_law(G, C, L, c)
     if modulus > 0.0:
         s = 0.0

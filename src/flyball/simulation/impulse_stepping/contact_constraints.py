@@ -198,9 +198,7 @@ def static_friction_of_sticking(G, C, P, L, X, pace, now):
                 P.mu[c] = law[STATIC]
 
 
-SAME_NORMAL = (
-    0.95  # least cosine between the normals at start and middle of the step of a persistent contact
-)
+SAME_NORMAL = 0.95  # least cosine between the normals at start and middle of the step of a persistent contact
 LARGEST_JUMP = (
     0.3  # largest relative change of velocities by the change of rows in half a step, for a persistent contact
 )
@@ -369,7 +367,7 @@ def restore_poses(N, M):
 
 @formula
 def middle_rows(G, M, C, H, P, L, now):
-    """Set the rows of persistent contacts from poses and contacts ``H`` in the middle. Returns whether there are any."""
+    """Set the rows of persistent contacts from poses and contacts ``H`` in the middle; return whether there are any."""
     found = False
     for k in range(H.count[FOUND]):
         c = H.at[k, BEFORE]

@@ -247,7 +247,7 @@ def copy_velocities(X, E):
 
 @formula
 def find_impacts(G, C, at, bias, R, X, L, pace, now):
-    """Return whether there are impacts; set the biases of their contacts, and store the velocities before in ``now``."""
+    """Return whether there are impacts; set the biases of their contacts, and store their velocities in ``now``."""
     if pace.count[RESTITUTION_LAW] == NO_RESTITUTION:
         return False
     h = pace.real[STEP]

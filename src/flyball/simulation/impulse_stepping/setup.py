@@ -137,12 +137,14 @@ def mechanism_tables(
     S = S._replace(force_parameters=S.force_parameters.copy())
     line, line_x = single_rows(s, S, stops or {})
     A = MechanismTables(
-        S, c.work, tableau("rk45"), clock, OutputBuffer(np.zeros((4, width))), OutputBuffer(slopes), np.zeros(1, np.int64),
+        S, c.work, tableau("rk45"), clock, OutputBuffer(np.zeros((4, width))), OutputBuffer(slopes),
+        np.zeros(1, np.int64),
         real=MechanismReals.blank(), count=MechanismCounts.blank(),
         mover=np.array([(b, of[b]) for b in rows], np.int64).reshape(-1, 2),
         group=group, wide=np.zeros((8, s.nv)), lam=np.zeros((3, len(S.rows.law))),
         spring_x=np.zeros((springs, 10)), spring_J=np.zeros((springs, s.nv)), spring_Y=np.zeros((springs, s.nv)),
-        stiff=np.zeros((springs, springs)), mixing=np.zeros((MIXING_ROWS, s.nv)), weight=np.zeros((MIXED_GUESSES + 1, MIXED_GUESSES + 1)),
+        stiff=np.zeros((springs, springs)), mixing=np.zeros((MIXING_ROWS, s.nv)),
+        weight=np.zeros((MIXED_GUESSES + 1, MIXED_GUESSES + 1)),
         line=line, line_x=line_x, active=np.zeros((2 * len(line), 3), np.int64),
         job=np.zeros((0, 3), np.int64), queue=np.zeros(len(group) - 1, np.int64),
         pose=np.zeros((len(rows), 12)),
@@ -421,9 +423,7 @@ NO_OVERLAP = 1e-9  # negligible overlap, relative to the smallest shape
 SLOW_CONTACT = 1e-6  # speed [m/s] below which nothing bounces, whatever gravity is
 DEFAULT_ITERATIONS = {"auto": 30, "newton": 100, "gauss-seidel": 50, "admm": 200}
 """Default largest number of iterations by solver; `OTHER_ITERATIONS` for the others."""
-COARSE_FACTOR = (
-    100.0  # factor of the tolerance up to which the residual of an unconverged solve is not reported
-)
+COARSE_FACTOR = 100.0  # factor of the tolerance up to which the residual of an unconverged solve is not reported
 OTHER_ITERATIONS, DEFAULT_POSITION_ITERATIONS, DEFAULT_SOLVER_STEPS = 150, 25, 100
 
 
