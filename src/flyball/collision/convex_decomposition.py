@@ -23,7 +23,7 @@ SMALLEST_VOLUME = 1e-9  # relative to the size cubed; smaller volumes count as z
 
 
 def triangle_normals(triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (m, 3); nan for triangles without area."""
+    """Return unit normals (m, 3); nan for triangles without area."""
     n = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     with np.errstate(invalid="ignore"):
         return n / np.linalg.norm(n, axis=1, keepdims=True)
@@ -118,7 +118,7 @@ class Hull:
         return np.concatenate([self.vertices, self.normals])
 
     def table(self, at: int) -> tuple[np.ndarray, int]:
-        """Data for `Geometry.face` from place ``at`` on (sides, then edges), and first place of the edges or -1."""
+        """Return data for `Geometry.face` from place ``at`` on (sides, then edges), first place of the edges or -1."""
         sides = [x for s in self.sides for x in (len(s), *s)]
         if len(self.vertices) < EDGE_SEARCH_VERTICES:
             return np.array(sides, dtype=np.int64), -1
@@ -175,7 +175,7 @@ def convex_hull(points: Any) -> Hull:
 
 
 def _merged_faces(found: Any, points: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, list[list[int]]]:
-    """Unit normals and corners of the sides: neighbouring triangles in one plane are merged."""
+    """Return unit normals and corners of the sides: neighbouring triangles in one plane are merged."""
     planes, member = found.equations, np.full(len(found.equations), -1)
     normals: list[np.ndarray] = []
     sides: list[list[int]] = []

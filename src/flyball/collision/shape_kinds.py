@@ -11,9 +11,9 @@ kind  name        parameters, in the shape's axes
 1     PLANE       none: the half-space z <= 0; its normal is +z
 2     BOX         three half edges
 3     CAPSULE     radius, half length of the segment between its two centres, which lies along z
+4     CYLINDER    radius, half length along z
 5     CONE        radius, height: centre of the base at the origin, tip at +z
 6     HULL        rounding radius; vertices and faces are in `Geometry.vertex` and `Geometry.face`
-6     HULL        rounding radius; vertices and faces stand in `Geometry.vertex` and `Geometry.face`
 7     FIELD       a height field (`shapes/height_field.py`)
 8     POLYGON     rounding radius; a convex polygon in z = 0, counter-clockwise about z; of two vertices: a segment
 9     ELLIPSOID   three half axes

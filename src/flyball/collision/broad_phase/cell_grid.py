@@ -52,7 +52,7 @@ KEY_BITS, KEY_MASK = 21, (1 << 21) - 1
 
 @formula
 def cell_index(B, l, c, x):
-    """Number of the cell along axis c at level l."""
+    """Return the number of the cell along axis c at level l."""
     k = (x - B.level_x[l, GRID_CORNER + c]) * B.level_x[l, INVERSE_EDGE]
     k = min(FARTHEST_CELL, max(-FARTHEST_CELL, k))
     whole = int(k)
@@ -83,7 +83,7 @@ def size_level(largest, whole):
 
 @formula
 def group_extent(sums, g, c, edge):
-    """Number of cells that a group covers along axis c (without distant shapes), and their start."""
+    """Return the number of cells that a group covers along axis c (without distant shapes), and their start."""
     n = sums[g, 0]
     mean = sums[g, 2 + c] / n
     spread = 6.0 * sqrt(max(0.0, sums[g, 5 + c] / n - mean * mean)) / edge

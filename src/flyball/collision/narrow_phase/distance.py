@@ -26,7 +26,7 @@ from .primitives import SIMPLEX
 
 @formula
 def edge_normal(G, a, b):
-    """Unit normal of the side from vertex a to vertex b, and its length; 0 if both coincide."""
+    """Return the unit normal of the side from vertex a to vertex b, and its length; 0 if both coincide."""
     x, y = G.vertex[b, 0] - G.vertex[a, 0], G.vertex[b, 1] - G.vertex[a, 1]
     length = sqrt(x * x + y * y)
     if not length > 0.0:

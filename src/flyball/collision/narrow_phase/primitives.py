@@ -32,7 +32,7 @@ def write_point(p, n, gap, name, scratch, k):
 
 @formula
 def unit_vector_between(a, b):
-    """Unit vector from a to b, and their distance; the x axis if they coincide or nearly so."""
+    """Return the unit vector from a to b, and their distance; the x axis if they coincide or nearly so."""
     d = sub(b, a)
     length = sqrt(dot(d, d))
     if length < 1e-150:
@@ -91,7 +91,7 @@ SQRT_HALF = sqrt(0.5)
 
 @formula
 def lateral_direction(d):
-    """Unit vector (x, y) of the lateral part of d, and its length; the x axis if it is zero."""
+    """Return the unit vector (x, y) of the lateral part of d, and its length; the x axis if it is zero."""
     s = sqrt(d[0] * d[0] + d[1] * d[1])
     return ((d[0] / s, d[1] / s) if s > 0.0 else (1.0, 0.0)), s
 

@@ -33,7 +33,7 @@ def grid(G, i):
 
 @formula
 def grid_point(G, f, i, j):
-    """The point of the surface over grid point (i, j)."""
+    """Return the point of the surface over grid point (i, j)."""
     k = i * int(G.shape_x[f, PAR + 1]) + j
     z = G.vertex[G.shape_i[f, FIRST] + k // 3, k % 3]
     return (i * G.shape_x[f, PAR + 2], j * G.shape_x[f, PAR + 3], z)

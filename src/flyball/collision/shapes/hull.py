@@ -23,7 +23,7 @@ IN_PLANE = 1e-7  # relative to the distance; largest offset of a vertex from the
 
 @formula
 def radius(G, i):
-    """Rounding radius."""
+    """Return the rounding radius."""
     return G.shape_x[i, PAR]
 
 
@@ -69,7 +69,7 @@ def support(G, i, d):
 
 @formula
 def facing_side(G, i, d, top):
-    """Number and place of the face that faces d best, among those with the vertex ``top``."""
+    """Return the number and place of the face that faces d best, among those with the vertex ``top``."""
     first, normals = G.shape_i[i, FIRST], G.shape_i[i, FIRST] + G.shape_i[i, COUNT]
     at = G.shape_i[i, FACE_FIRST]
     number, place, best = 0, at, -2.0

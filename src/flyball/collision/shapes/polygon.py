@@ -51,5 +51,5 @@ def face(G, i, d, scratch, at):
 
 @formula
 def radius(G, i):
-    """Rounding radius."""
+    """Return the rounding radius."""
     return G.shape_x[i, PAR]

@@ -58,7 +58,7 @@ def edge_separation(best, C, c, a, b, prefer):
 
 @formula
 def axis_vector(axis, C, c):
-    """Unit vector of an axis in the first box's axes, towards the second box."""
+    """Return the unit vector of an axis in the first box's axes, towards the second box."""
     if axis < 3:
         n = (1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0)
     elif axis < 6:

@@ -27,7 +27,7 @@ def axis_segment(G, i, P):
 
 @formula
 def perpendicular(u, v):
-    """Unit vector perpendicular to u and v; if they are parallel, to the longer one; the x axis if both vanish."""
+    """Return a unit vector perpendicular to u and v; to the longer one if parallel; the x axis if both vanish."""
     w = cross(u, v)
     uu, vv = dot(u, u), dot(v, v)
     if not dot(w, w) > 1e-18 * uu * vv:
