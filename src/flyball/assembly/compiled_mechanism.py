@@ -372,8 +372,7 @@ def tangent_step(c: CompiledMechanism, q: np.ndarray, other: np.ndarray) -> np.n
     """Return the step along the velocities from one position to another, (nv,), as ``retract`` takes it.
 
     Rotations of bodies in space are Cayley steps, 2 tan(angle / 2) about the axis, bounded near half a turn. Planar
-    angles
-    include whole turns.
+    angles include whole turns.
     """
     S = c.values.system
     out = np.zeros(c.structure.nv)

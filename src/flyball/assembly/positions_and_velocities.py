@@ -317,8 +317,8 @@ def _damped_step(
     """Return the least damped step with diag(scale) G d = r, in the metric of the inverse weights root^2.
 
     Near a singular position a motion may appear in a combination of rows with a factor of only 1e-8. Where the size
-    allows
-    it the singular values of G diag(root) are therefore used, not their squares, which would be lost in rounding.
+    allows it the singular values of G diag(root) are therefore used, not their squares, which would be lost in
+    rounding.
     """
     if len(r) <= DENSE_ROWS:
         G = c.jacobian()
@@ -445,10 +445,8 @@ class VelocityEquations:
     position.
 
     ``root``: R with R R^T the inverse mass matrix, zero for bodies whose motion is given and must not change. Soft rows
-    are
-    weighted so that the sum of their squares is twice the kinetic energy of the difference. Hard rows times ``scale``
-    are
-    rates in 1/s, so that thresholds do not depend on the unit of length.
+    are weighted so that the sum of their squares is twice the kinetic energy of the difference. Hard rows times
+    ``scale`` are rates in 1/s, so that thresholds do not depend on the unit of length.
     """
 
     c: CompiledMechanism

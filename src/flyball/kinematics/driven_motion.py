@@ -35,7 +35,7 @@ from ..simulation.simulate import integrate_motion
 from ..simulation.solver_switching import CodeSelection, check_specialize
 
 SINGULAR_RATIO = 1e-3  # relative smallest singular value at the end of the motion below which the position is singular
-LEAST_SHARE = 1e-2  # elements with less than this part of the largest share in a dependency are not named
+LEAST_SHARE = 1e-2  # relative share in a dependency from which on an element is named
 MAX_NAMED = 8
 
 Times = int | Sequence[float]
@@ -186,7 +186,7 @@ def _contradiction_error(model: Model, t: float, error: AssemblyError) -> Mobili
     if any(s.contradiction == "velocity" for s in sets) and (singular := _singular_start_error(found)) is not None:
         return singular
     if not drivers or (len(drivers) == 1 and sets[0].contradiction == "position"):
-        return None  # a single driver that asks for a position out of reach
+        return None  # a single driver that prescribes a position out of reach
     return MobilityError(
         f"{model.name!r} is over-driven: drivers {', '.join(drivers)} contradict one another at t = {t:g} s: "
         f"{'; '.join(s.text for s in sets)}. Leave out one of them, or make their laws agree",

@@ -6,8 +6,7 @@ every position, and thus the reactions that all solutions have in common.
 
 A fully driven mechanism has as many redundant constraints as it has more constraints than velocities, except at
 singular positions. Dependencies are found by inverse iteration with one sparse factorization per position, in a
-compiled
-loop. Where there are more or fewer, or the decision is close, singular values are used.
+compiled loop. Where there are more or fewer, or the decision is close, singular values are used.
 """
 
 from __future__ import annotations
@@ -182,8 +181,7 @@ def absolute_states(result: Result, original: CompiledMechanism, base: CompiledM
     """Return times and states (n, 1 + ny) of a motion in the coordinates of ``base``.
 
     nan stands for angles and curve positions that ``original``, the mechanism in the motion's coordinates, does not
-    count;
-    works are zero.
+    count; works are zero.
     """
     s, n = base.structure, len(result.t)
     if base is original:

@@ -36,12 +36,9 @@ class Prepared:
     """A mechanism in one kind of coordinates, at one set of parameter values. It is immutable.
 
     Threads may share it. Results depend on the arguments only. Whole turns of angles count as far as q contains them:
-    for
-    tree joints that rotate about one axis, and for everything in the plane. In space other angles (all of them in
-    absolute
-    coordinates, where a quaternion is the same after a turn) are those within half a turn of the start's. Cam followers
-    are
-    where the profile is nearest.
+    for tree joints that rotate about one axis, and for everything in the plane. In space other angles (all of them in
+    absolute coordinates, where a quaternion is the same after a turn) are those within half a turn of the start's. Cam
+    followers are where the profile is nearest.
 
     Attributes
     ----------
@@ -284,8 +281,7 @@ class Prepared:
         """Derivatives of the angle states by the coordinates, (angles, nq); computed on first access.
 
         Angles that are tree-joint coordinates equal these; in the plane all others follow from the rotations of bodies.
-        In
-        space the pose of a free body is the same after a whole turn.
+        In space the pose of a free body is the same after a whole turn.
         """
         if "_turning" not in vars(self):
             c = self._start.compiled.again()
@@ -308,7 +304,7 @@ class Prepared:
         )
 
     def _state(self, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return copies as floats; refuse arrays of the wrong shape."""
+        """Return copies as floats; refuse numbers that are not real and finite, and wrong shapes."""
         out = []
         for name, x, known in (("q", q, self.q), ("v", v, self.v)):
             found = np.array(x)

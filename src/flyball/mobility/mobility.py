@@ -288,9 +288,7 @@ CONTRADICTION_TOLERANCE = (
     1e-8  # residual of a dependency of unit size, relative to the mechanism's length, above which it is contradictory
 )
 
-MAX_DEPENDENCIES = (
-    64  # largest number of connected redundant constraints for which a large mechanism is searched for sets
-)
+MAX_DEPENDENCIES = 64  # redundant constraints of a connected part that are searched for sets in a large mechanism
 LEAST_DRIVER_SHARE = 1e-3  # relative share in a dependency from which on the disagreement is reported at a driver
 
 
@@ -302,8 +300,7 @@ def redundant_sets(
 
     ``infinitesimal``: the mechanism has an infinitesimal motion only, so that the dependencies exist only here.
     ``redundancy``: number of redundant constraints. For a large mechanism with more than `MAX_DEPENDENCIES` connected
-    ones,
-    the sets found are not complete.
+    ones, the sets found are not complete.
     """
     lam, a = spaces.dependencies, spaces.assembly
     if not lam.shape[1]:

@@ -29,13 +29,13 @@ class ConstraintNullSpaces:
     """The position at which a mechanism was examined, and the null spaces of its Jacobian there."""
 
     assembly: Assembly
-    dependencies: np.ndarray  # multipliers (nr, k) without effect; their number is limited
+    dependencies: np.ndarray  # multipliers (nr, k) without effect; as many as `ROOM` allows
     allowed_velocities: np.ndarray | None  # velocities (nv, f) that the rows allow; None: computed on access
     gap: str = ""  # why it cannot be assembled, if it cannot
 
     @property
     def velocities(self) -> np.ndarray:
-        """Velocities (nv, f) that the rows allow; their number is limited."""
+        """Velocities (nv, f) that the rows allow; as many as `ROOM` (in `numerics.sparse_rank`) allows."""
         if self.allowed_velocities is not None:
             return self.allowed_velocities
         a = self.assembly
@@ -93,8 +93,7 @@ def self_stresses(
     """Return the wrenches (..., 6, k) on ``body_j`` at the joint's point there caused by each of the self-stresses.
 
     World axes, torques divided by the mechanism's length. At one position, or at many: then the entries of frame
-    records
-    are arrays (n,).
+    records are arrays (n,).
 
     Parameters
     ----------

@@ -1,11 +1,10 @@
 """Remedies for redundant constraints: which joints to replace by weaker ones without adding a freedom.
 
 Let the columns of N be the multipliers without effect. An element's rows R are replaced by weaker ones, T R, and T
-drops
-the directions Z (T Z = 0): of N the combinations z with Z^T N_e z = 0 remain. So a choice of changes is a remedy where
-the blocks Z^T N_e of its elements, stacked, are square and regular: as many rows are dropped as there are vectors, and
-no vector remains. Since all new rows lie in the span of the old ones, the same motions are allowed as before. All this
-must hold here and in nearby positions.
+drops the directions Z (T Z = 0): of N the combinations z with Z^T N_e z = 0 remain. So a choice of changes is a remedy
+where the blocks Z^T N_e of its elements, stacked, are square and regular: as many rows are dropped as there are
+vectors, and no vector remains. Since all new rows lie in the span of the old ones, the same motions are allowed as
+before. All this must hold here and in nearby positions.
 
 Sets that share elements are treated one after the other, each together with those before. The cheapest choice is found
 by branch and bound. Which kinds of joints can be replacements, and at what cost, is given by class attributes
@@ -356,8 +355,7 @@ class CoupledSets:
     """Sets that share elements: their rows after the changes chosen so far, and the rows released by these.
 
     In every position the multipliers without effect are combinations z of the columns of N; after the changes those
-    with
-    ``dropped_rows`` z = 0 remain.
+    with ``dropped_rows`` z = 0 remain.
     """
 
     def __init__(self, rows: dict[str, ElementRows], tried: dict[str, list[Replacement]]) -> None:

@@ -168,8 +168,7 @@ def deferred_interrupt(part: Segment) -> Iterator[None]:
     """Let a keyboard interrupt end a long segment in order, at its present time.
 
     A second interrupt, or one of a segment that has run only briefly, raises at once. Where another handler is
-    installed,
-    or outside the main thread, nothing is changed.
+    installed, or outside the main thread, nothing is changed.
     """
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:

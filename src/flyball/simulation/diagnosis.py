@@ -233,8 +233,7 @@ def acceleration_residual(
     own.
 
     Rows in metres are divided by the mechanism's length. The state (velocities v) is the one in c's workspace,
-    evaluated
-    with forces; ``sizes`` are c's, ``o`` the options of the motion.
+    evaluated with forces; ``sizes`` are c's, ``o`` the options of the motion.
     """
     S, n = c.values.system, len(c.structure.rows)
     row_p = S.row_start[: n + 1]

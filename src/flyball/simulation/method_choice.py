@@ -146,8 +146,7 @@ def in_suitable_coordinates(
     """Return the start in coordinates that suit implicit integrators.
 
     Joint coordinates of long chains have full matrices, and drivers prescribe some of them; such mechanisms use
-    absolute
-    coordinates.
+    absolute coordinates.
 
     Raises
     ------

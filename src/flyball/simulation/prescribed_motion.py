@@ -122,7 +122,9 @@ def cumulative_integrals(t: np.ndarray, P: np.ndarray) -> np.ndarray:
 
 
 def _largest_errors(error: np.ndarray, allowed: float) -> np.ndarray:
-    """Return the fewest intervals whose removal halves the allowed error; none if the error is allowed."""
+    """Return the fewest intervals without whose errors at most half of the allowed error is left; none if it is
+    allowed.
+    """
     if error.sum() <= allowed:
         return np.zeros(0, np.int64)
     order = np.argsort(-error)

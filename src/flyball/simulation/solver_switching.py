@@ -472,8 +472,8 @@ def largest_eigenvalue(c: CompiledMechanism, clock: ex.StepState, pace: float) -
     """Return the largest eigenvalue [1/s] of the Jacobian of (q, v, x)' at the present state of a motion.
 
     x are states of controllers; modes are held fixed. Where steps are as wide as stability allows, their last two
-    stages
-    differ by the fast modes, so that a few products find the eigenvalue. The workspace of the motion is not changed.
+    stages differ by the fast modes, so that a few products find the eigenvalue. The workspace of the motion is not
+    changed.
 
     Parameters
     ----------

@@ -286,8 +286,7 @@ def released_by_group(n: InstantProblem, parts: list[ProblemRow], fired: np.ndar
     """Return the rows that slide or open where no distribution within the bounds is left, with their new rules.
 
     Friction limits are reduced slightly. Rows that then move slide in the direction of that motion. If none does, rows
-    that
-    carry no force in any distribution open.
+    that carry no force in any distribution open.
     """
     if not n.fired(fired, G_SHARED):
         return {}

@@ -331,8 +331,8 @@ def reference_rate(here: EventContext) -> float:
     """Return a reference rate [1/s], to which velocities (per length) and accelerations (squared) are compared.
 
     It is the characteristic rate of the mechanism, or the inverse of the motion's duration where that is slower. A
-    short
-    duration does not raise it: a force of the weight of a body at rest counts, however little it would move the body.
+    short duration does not raise it: a force of the weight of a body at rest counts, however little it would move the
+    body.
     """
     return min(float(here.c.system.scales.rate.real), 1.0 / float(here.clock.real.span))
 
@@ -417,8 +417,7 @@ def slip_rows(n: InstantProblem, gap: int, at: int, still: np.ndarray, *, known_
     """Return the rows of the slips of a gap, which is row ``at``.
 
     With ``known_direction`` a sliding contact slides in its present direction; else the direction is solved for, as in
-    an
-    impact.
+    an impact.
     """
     own = slips_at_gap(n, gap)
     if not own:

@@ -161,7 +161,7 @@ def elastic_overlap(share, overlap, target):
 
 @formula
 def start_overlap(now, c, k, n, new):
-    """Set the overlap of contact c at the start of the step; return the energy not accounted for by its spring.
+    """Set the overlap of contact c at the start of the step; return the elastic energy that this adds without work.
 
     A contact too stiff for the step has the overlap with which its law ended. Rotation of the surfaces increases the
     overlap, which displacements remove. Appearing contact points take over the energy of disappearing ones.

@@ -186,8 +186,7 @@ def velocity_groups(S: System, nv: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the group of each row of the body table (-1: immovable), and the start of each group's velocities.
 
     Groups are connected by rows, measured quantities and forces. All velocities form one group if those of some group
-    are
-    not contiguous.
+    are not contiguous.
     """
     part = np.arange(nv)
 

@@ -70,7 +70,7 @@ TIME, STEP, GRAVITY, NO_BOUNCE_BELOW, NO_OVERLAP_BELOW, VELOCITY_TOLERANCE, POSI
 STORED_ENERGY, STORED_AT_START = 18, 19  # energy in compliant contacts: now, and at the start
 LAST_STEP = 20  # the step before, 0 if there was none
 NUMERICAL = 21  # energy lost numerically: rows that change within a step, displacements out of overlaps, damping
-LONGEST_STEP = 22  # the step before it is divided
+LONGEST_STEP = 22  # the undivided step
 LAST_RESIDUAL = 23  # residual [m/s] of the last solve for velocities
 REALS = 24
 # entries of RunState.count: steps still to take, steps taken; largest number of iterations for velocities and
@@ -105,7 +105,7 @@ class FreeBodies(NamedTuple):
     body: Float2  # (n, 16)
     turn: Float2  # (n, 4): unit quaternion, body axes to the world
     before: Float2  # (n, 8): velocities at the start of the step
-    move: Float2  # (n, 8): velocities that bodies are displaced with
+    move: Float2  # (n, 8): displacement velocities
     start: Float2  # (movers, 18): poses of all movers at the start of the step, and twists
 
 
