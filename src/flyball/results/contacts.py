@@ -101,8 +101,7 @@ class ContactBodies:
         return self.names[owner] if self.counts[owner] < 0 else f"{self.names[owner]}[{k - self.first[owner]}]"
 
     def span(self, name: str) -> tuple[int, int]:
-        """Return the first side of a name, and the one after its last: of a body, a set, or a member such as
-        ``"balls[17]"``.
+        """The first side of a name, and the one after its last: of a body, a set, or a member such as ``"balls[17]"``.
 
         Raises
         ------
@@ -155,7 +154,7 @@ class Contacts:
     Attributes
     ----------
     t : ndarray (n,) [s]
-    sides : Sides
+    sides : ContactBodies
         The sides.
     begin : ndarray (n + 1,) of int
     pair : ndarray (k, 2) of int
@@ -283,9 +282,7 @@ class Contacts:
         return self._known[on, by]
 
     def force_on(self, low: int, high: int) -> np.ndarray:
-        """Return the summed contact forces on the sides ``low`` to ``high`` (excluded), (n, high - low, 3) [N], world
-        axes.
-        """
+        """The summed contact forces on the sides ``low`` to ``high`` (excluded), (n, high - low, 3) [N], world axes."""
         n, m = len(self.t), high - low
         out = np.zeros((n * m, 3))
         for side, sign in ((0, -1.0), (1, 1.0)):

@@ -95,8 +95,7 @@ MIN_TURN = 1.0  # the same for an angle whose slip is unknown, since no radius i
 
 
 def transverse_slip_warnings(result: Result) -> list[str]:
-    """Return warnings on frictions on `Cylindrical`, `Planar` and `PointInPlane` joints that slip across their
-    coordinate.
+    """Warnings on frictions on `Cylindrical`, `Planar` and `PointInPlane` joints that slip across their coordinate.
 
     A surface has one friction force, mu N against its total slip. Friction in a joint uses the slip along its own
     coordinate only: along it the friction is too large by the factor |v| / v, so that it may stick while the surface
@@ -136,7 +135,7 @@ def _slip_distance(result: Result, f: Any, what: str) -> tuple[float, str]:
 
 
 MAX_ORIENTATION_ERROR = 0.02  # reported orientation error of a body [rad]
-MAX_TURN, TURN_STEP = 12.0, 0.01  # rotation per step [rad] up to which its error is tabulated; two of these limit the interpolation
+MAX_TURN, TURN_STEP = 12.0, 0.01  # [rad] per step: range and spacing of the table of errors
 MAX_TURN_RADAU = 2.0 * np.arctan(3.0**0.5)  # the same for `radau`, which takes no larger steps
 NEWTON_ITERATIONS = 20  # iterations of Newton's method
 
@@ -242,8 +241,7 @@ def acceleration_defect_warning(result: Result) -> str:
 
 
 def _worst_defect(r: Result, angular: bool) -> tuple[float, str, float, float, str]:
-    """Return the fraction of output times with a defect of a body, its name, the defect, the reference, and the unit.
-    """
+    """The fraction of output times with a defect of a body, its name, the defect, the reference, and the unit."""
     S, length, inner = r.values.system, r.values.length, slice(2, -2)
     rows = np.flatnonzero(np.r_[True, np.diff(r.t) > 0.0])
     t, unit = r.t[rows], "rad/s^2" if angular else "m/s^2"
@@ -280,16 +278,12 @@ def _parabola_rate(t: np.ndarray, v: np.ndarray, k: int) -> np.ndarray:
     return out
 
 
-DEFAULT_IMBALANCE = (
-    1e-4  # relative to the energy moved: larger imbalances are reported if no tolerance was given
-)
+DEFAULT_IMBALANCE = 1e-4  # relative to the energy moved: larger imbalances are reported if no tolerance was given
 RTOL_FACTOR, RTOL_FACTOR_PER_STEP = (
     10.0,
     0.1,
 )  # times rtol: accepted imbalance of a short motion; it grows with each step
-FINE_RTOL_FACTOR = (
-    3e-2  # times the root of rtol: the same for rtol so small that a digit more or less does not matter
-)
+FINE_RTOL_FACTOR = 3e-2  # times the root of rtol: the same for rtol so small that a digit more or less does not matter
 MAX_IMBALANCE, ROUGH_RTOL_FACTOR = (
     1e-2,
     5.0,
@@ -298,9 +292,7 @@ MAX_ROUGH_IMBALANCE = 2e-2  # relative to the energy moved: limit for any tolera
 DISSIPATED_PART = (
     0.1  # relative to the dissipation of impacts and friction: smaller numerical losses hardly change a motion
 )
-LIFTING_PART = (
-    1e-6  # relative to the energy that lifts all bodies by one's size: possible residuals of solves at rest
-)
+LIFTING_PART = 1e-6  # relative to the energy that lifts all bodies by one's size: possible residuals of solves at rest
 MAX_INTERVALS, MIN_OUTPUTS_PER_INTERVAL = (
     64,
     4,
@@ -366,9 +358,7 @@ def impulse_stepping_doubts(result: Result) -> tuple[str, ...]:
 
 
 def _lifting_energy(result: Result) -> float:
-    """Return the energy [J] that lifts all bodies by the size of the smallest body in contact, independent of the
-    origin.
-    """
+    """The energy [J] that lifts all bodies by the size of the smallest body in contact, independent of the origin."""
     if result.health.contact is None:
         return 0.0
     mass = float(sum(total_budget(result).mass)) + sum(float(b.mass.sum()) for b in result.bulk.values())
@@ -500,8 +490,7 @@ def _kinetic_between_outputs(x: EnergyBudget) -> np.ndarray:
 
 
 def _rest_energy(x: EnergyBudget) -> float:
-    """Return the energy [J] below which bodies count as at rest: rounding of the potential energy, and creep of all
-    bodies.
+    """The energy [J] below which bodies count as at rest: rounding of the potential energy, and creep of all bodies.
 
     The potential energy is that stored in springs and that of the weight at the mechanism's length, since its zero is
     arbitrary.

@@ -144,9 +144,7 @@ class Energy(NamedQuantities):
         return self._result.motions.zeros() if found is None else found
 
     def _friction_loss(self) -> np.ndarray:
-        """Energy lost in friction of contacts since the start; for contact points it is a work, integrated with the
-        motion.
-        """
+        """Energy lost in friction of contacts since the start; for contact points a work, integrated with the motion."""
         r = self._result
         at = r.values.structure.state_at
         own = (at.get(f"{e.name}.work") for e in r.values.structure.model.forces if isinstance(e, Touch))
@@ -285,9 +283,7 @@ def connected_parts(S: System) -> np.ndarray:
 
     Bodies are connected by joints, couplings and forces.
     """
-    first = list(
-        range(len(S.tree.parent))
-    )  # union-find parents: a body before it in the same part, or itself
+    first = list(range(len(S.tree.parent)))  # union-find parents: a body before it in the same part, or itself
     pairs = [(b, parent) for b, parent in enumerate(S.tree.parent.tolist()) if parent >= 0]
     some = [
         *(_bodies_of_row(S, k) for k in range(len(S.rows.law))),
@@ -340,8 +336,7 @@ TURNING_POINT = 0.1  # relative to the largest kinetic energy: below it an oscil
 
 
 def lag_warning(x: EnergyBudget) -> str:
-    """Return a warning on the phase error of a motion with one degree of freedom, from its energy error; nothing if
-    small.
+    """A warning on the phase error of a motion with one degree of freedom, from its energy error; nothing if small.
 
     It is not evaluated if there are more steps than output times, which may then miss slow phases.
     """

@@ -160,7 +160,7 @@ class Equilibrium:
         """Everything as plain numbers and names, all curves included."""
         kept = ("t", "stability", "least", "unbalanced", "method", "weakest", "preload", "speeds", "parameters")
         out = {k: getattr(self, k) for k in kept}
-        out["least"] = self.least if math.isfinite(self.least) else None  # without free coordinates: JSON has no infinity
+        out["least"] = self.least if math.isfinite(self.least) else None  # JSON has no infinity
         out |= {"judged_by": self.judged_by} if self.judged_by else {}
         out |= {"freedoms": list(self.freedoms), "stiffness": self.stiffness.tolist(), "kinks": list(self.kinks)}
         out |= {"touching": [asdict(k) for k in self.touching], "notes": list(self.notes)}

@@ -91,9 +91,7 @@ class EquilibriumSeries:
         return out
 
     def telling(self) -> list[str]:
-        """Return up to three of the most important curves: coordinates of the degrees of freedom, else of the first
-        body.
-        """
+        """Up to three of the most important curves: coordinates of the degrees of freedom, else of the first body."""
         known = self.equilibria[0].result.channels() if self.equilibria else {}
         names = [f for f in self.equilibria[0].freedoms if f in known] if self.equilibria else []
         return (names or [n for n in known if n.partition(".")[2] in ("x", "y", "z", "angle")])[:3]

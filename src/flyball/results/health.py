@@ -1,6 +1,4 @@
-"""Health report of a motion: accuracy figures, contact solves, and deviations of the initial state from the
-description.
-"""
+"""Health report of a motion: accuracy figures, contact solves, and deviations of the start from the description."""
 
 from __future__ import annotations
 
@@ -290,9 +288,7 @@ class Health:
     engine: str = ""  # engine or generated code, and where the code comes from
     crowd: int = 0  # bodies in sets, whose degrees of freedom are not counted
     remarks: tuple[str, ...] = ()  # warnings of the analysis itself
-    departures: tuple[
-        InitialDeviation, ...
-    ] = ()  # unsatisfied numbers of the description: element, given, got
+    departures: tuple[InitialDeviation, ...] = ()  # unsatisfied numbers of the description: element, given, got
     watched: str = ""  # resolution of event detection
     compiling: float = 0.0  # part of these seconds for compiling or loading code at first calls [s]
     events: str = ""  # number of events, and how often each occurred

@@ -228,8 +228,7 @@ class InverseDynamics:
         return (d.count > fewest) | (d.least < SINGULAR_TOLERANCE * usual)
 
     def _size(self, kind: str) -> float:
-        """Return the largest force (``"f"``) or torque (``"t"``) of any joint or drive, a torque divided by the length.
-        """
+        """The largest force (``"f"``) or torque (``"t"``) of any joint or drive, a torque divided by the length."""
         (force, torque), length = self._sizes, self.result.values.length
         return max(force, torque / length) if kind == "f" else max(torque, force * length)
 

@@ -119,8 +119,7 @@ class Descriptor:
         return f"descriptor form: {3 * nv + m} states ({nv} positions, {m} constraints), {self.A.nnz} entries in A"
 
     def response(self, omega: Sequence[float], input: int, output: int) -> np.ndarray:
-        """Return the frequency response of an output to an input, by their indices, at angular frequencies [rad/s];
-        complex, (n,).
+        """Frequency response of an output to an input, by their indices, at frequencies [rad/s]; complex, (n,).
 
         At an undamped pole it is infinite.
         """
@@ -151,8 +150,7 @@ class Descriptor:
         return complex((self.C[[k]] @ z)[0] + self.D[k, i])
 
     def nearest(self, count: int = 10, near: complex = 0.0) -> np.ndarray:
-        """Return eigenvalues [1/s] nearest to a number, by shift and invert, (k,) complex: ``count`` and their
-        conjugates.
+        """Eigenvalues [1/s] nearest to a number, by shift and invert, (k,) complex: ``count`` and their conjugates.
 
         Parameters
         ----------

@@ -94,7 +94,8 @@ class FreedomGeometry:
         said = []
         if self.singular and self.nearby == 0 and not self.positions:
             said.append(
-                f"{_freedom_count(self.here)} for the moment only: it can shake, but not move, from this singular position"
+                f"{_freedom_count(self.here)} for the moment only: it can shake, but not move, from this "
+                f"singular position"
             )
         elif self.singular:
             said.append(f"singular position: {_freedom_count(self.here)} here, {self.nearby} next to it")

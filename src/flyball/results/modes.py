@@ -17,9 +17,7 @@ from ..model.output_files import PAGE, write_file
 from .health import Health
 from .result import Result
 
-AXIS_TOLERANCE = (
-    1e-8  # relative to an eigenvalue: real parts below this count as on the axis in a locus
-)
+AXIS_TOLERANCE = 1e-8  # relative to an eigenvalue: real parts below this count as on the axis in a locus
 
 
 def is_growing(values: np.ndarray) -> np.ndarray:

@@ -285,8 +285,7 @@ def _find_stored_by_events(result: Any) -> dict[str, list[float]]:
 
 
 def _stored_energies(result: Any, by: tuple[Any, Any], y: np.ndarray) -> dict[str, float]:
-    """Return the energy [J] of a state with given tables and switches (none: all active): of every force, and in total.
-    """
+    """The energy [J] of a state with given tables and switches (none: all active): of every force, and in total."""
     values, switch = by
     s = values.structure
     q, v, z = np.split(y[None, :], [s.nq, s.nq + s.nv], axis=1)

@@ -101,9 +101,7 @@ class JointReactions:
         return -W.FB
 
     def _acting(self) -> SimpleNamespace:
-        """Return kinematics, and the wrenches on every body except those of tree joints: gravity, inertia, forces,
-        rows.
-        """
+        """Kinematics, and the wrenches on every body except those of tree joints: gravity, inertia, forces, rows."""
         result, s = self._result, self._result.values.structure
         W = self._inertial()
         for f in s.forces:

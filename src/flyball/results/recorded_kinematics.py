@@ -184,9 +184,7 @@ def extra_turns(coordinate_angles: Mapping[str, float], angles: Mapping[str, flo
 
 
 def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, Any], tuple[int, Any], Coordinate]:
-    """Return (frame, extra rotation or ()) twice: the frames between which a joint's coordinate is measured, from F and
-    M.
-    """
+    """(frame, extra rotation or ()) twice: the frames between which a joint's coordinate is measured, from F and M."""
     c = joint.coordinates[what]
     ends = []
     for role in c.frames:

@@ -104,9 +104,7 @@ class Result:
         self.model, self.values, self.health = model, values, health
         self.t, self.q, self.v, self._vdot, self._multipliers = t, q, v, vdot, multipliers
         self._turn, self._states = OwnedLock(), states
-        self.deferred_accelerations: DeferredArrays | None = (
-            None  # computes accelerations and multipliers on demand
-        )
+        self.deferred_accelerations: DeferredArrays | None = None  # computes accelerations and multipliers on demand
         self.deferred_works: DeferredArrays | None = None  # computes works on demand
         self._final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
         self.wound: dict[str, float] = {}

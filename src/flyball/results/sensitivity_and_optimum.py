@@ -49,8 +49,7 @@ class Sensitivity:
     verification: np.ndarray | None = None
 
     def __getitem__(self, key: tuple[str, str] | str) -> Any:
-        """Return the derivative of a quantity with respect to a parameter; without a parameter those for all, as a
-        dict.
+        """The derivative of a quantity with respect to a parameter; without a parameter those for all, as a dict.
 
         Raises
         ------

@@ -17,9 +17,7 @@ MAX_COMPONENTS = 6  # number of printed coordinates of a vector
 
 
 class Motion(NamedTuple):
-    """Motion of one branch for a given motion of the driver: finite velocities and accelerations at the singular
-    position.
-    """
+    """Motion of one branch for a given driver motion: finite velocities and accelerations at the singular position."""
 
     branch: int
     rate: float  # a' of the driver's coordinate [1/s times its unit]

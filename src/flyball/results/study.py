@@ -370,8 +370,7 @@ class Study:
         return dict(zip(self.parameters, self.points[run].tolist(), strict=True))
 
     def question(self, run: int) -> dict[str, Any]:
-        """Return the arguments of the analysis that reproduce a run to the last bit:
-        ``m.simulate(**study.question(17))``.
+        """The arguments of the analysis that reproduce a run to the last bit: ``m.simulate(**study.question(17))``.
 
         For ``"kinematics"`` and ``"equilibrium"`` they are arguments of these methods; also for ``"modes"`` and
         ``"linearize"`` about the assembled position. About the equilibrium they are arguments of `equilibrium`, whose

@@ -272,7 +272,8 @@ def derivatives(s: Subject) -> str:
             if all(_differ(exact, d, SLOPE, size) for d in near):
                 return (
                     f"the derivatives of {state.signature} by a complex step are {_array_text(exact)}, and "
-                    f"{_array_text(near[1])} by differences; abs(), max(), math.sqrt() and the like lose imaginary parts: "
+                    f"{_array_text(near[1])} by differences; abs(), max(), math.sqrt() and the like lose "
+                    f"imaginary parts: "
                     f"use functions of flyball.math.scalar"
                 )
     return ""
@@ -397,7 +398,8 @@ def axes(s: Subject) -> str:
         if _differ(list(flat_numbers(wanted)), list(flat_numbers(there)), WORLD, 1e-3):
             return (
                 f"{state.signature} depends on the axes or the origin of the world: frames turned and shifted together "
-                f"give {_array_text(list(flat_numbers(there)))}, and must give {_array_text(list(flat_numbers(wanted)))}. For an element that "
+                f"give {_array_text(list(flat_numbers(there)))}, and must give "
+                f"{_array_text(list(flat_numbers(wanted)))}. For an element that "
                 f"is given in the world's axes skip the checks 'axes' and 'turned'"
             )
     return ""
@@ -414,7 +416,8 @@ def units(s: Subject) -> str:
         if _differ(wanted, found, WORLD):
             return (
                 f"{state.signature} in other units of length, mass and time is {_array_text(found)}, and must be "
-                f"{_array_text(wanted)}: a constant in it has a unit, or a field has another unit than its formula needs"
+                f"{_array_text(wanted)}: a constant in it has a unit, or a field has another unit than "
+                f"its formula needs"
             )
     return ""
 

@@ -251,8 +251,7 @@ def _force_line(e: Any, places: AttachedFrames, every: np.ndarray) -> RecordedLi
 
 
 def _free_length(numbers: Any, points: list[np.ndarray]) -> np.ndarray:
-    """Return the free length of a rope: as given, else that at the first time, in place of the reference configuration.
-    """
+    """The free length of a rope: as given, else that at the first time, in place of the reference configuration."""
     if getattr(numbers, "length", None) is not None:
         return np.full(len(points[0]), float(numbers.length))
     steps = [b[:1] - a[:1] for a, b in pairwise(points)]
@@ -299,8 +298,7 @@ def _recorded_path(result: Result, path: PathRequest) -> RecordedPath:
 
 
 def _recorded_channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]:
-    """Return all curves of a small mechanism; of a large one energies, drivers, forces, joint coordinates, then bodies.
-    """
+    """All curves of a small mechanism; of a large one energies, drivers, forces, joint coordinates, then bodies."""
     if 8 * (len(result.model.bodies) + len(result.model.joints)) <= 400:
         curves = result.channels()
         curves = {k: c for k, c in curves.items() if np.isfinite(c[1]).any()}

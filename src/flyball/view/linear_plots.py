@@ -41,9 +41,7 @@ MIN_DAMPING_RATIO = 1e-4  # damping ratio of resonances: sharper ones are drawn 
 
 
 def bode_frequencies(model: LinearModel, pairs: Sequence[tuple[str, str]]) -> np.ndarray:
-    """Return angular frequencies [rad/s], a decade beyond poles and zeros of (input, output) pairs, denser at
-    resonances.
-    """
+    """Angular frequencies [rad/s], a decade beyond poles and zeros of (input, output) pairs, denser at resonances."""
     if model.large:
         roots = model.descriptor.nearest(LARGE_MODEL_POLES)
     else:

@@ -147,8 +147,7 @@ class RecordedJoint:
 
 @dataclass(frozen=True)
 class RecordedFrame:
-    """Axes that can be shown: a frame on a body; ``of`` is ``joint`` or ``frame``. Bodies' own frames are not listed.
-    """
+    """Axes that can be shown: a frame on a body; ``of`` is ``joint`` or ``frame``. Bodies' own frames are omitted."""
 
     name: str
     of: str

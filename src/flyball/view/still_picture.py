@@ -65,8 +65,7 @@ def _cross_product(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, .
 
 
 def visible_faces(shape: Shape, view: np.ndarray) -> Iterator[Face]:
-    """Return the visible faces of a shape from the body's origin; the columns of ``view`` are the body's axes as seen.
-    """
+    """The visible faces of a shape from the body's origin; the columns of ``view`` are the body's axes as seen."""
     turn = view @ quaternion_to_matrix(np.array(shape.quaternion))
     at = view @ np.array(shape.position)
     for f in _shape_faces(shape, turn):
@@ -190,7 +189,8 @@ def still_svg(recording: Recording) -> str:
     body = "".join(_stroke_svg(s, placed(s.points)) for s in back_to_front)
     title = escape(f"{recording.name} as drawn")
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {PICTURE_WIDTH:g} {height:.0f}" width="{PICTURE_WIDTH:g}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {PICTURE_WIDTH:g} {height:.0f}" '
+        f'width="{PICTURE_WIDTH:g}" '
         f'height="{height:.0f}" role="img" stroke-linejoin="round" stroke-linecap="round"><title>{title}</title>'
         f'<rect width="100%" height="100%" fill="{PAPER_COLOR}"/>{body}</svg>'
     )
@@ -305,8 +305,7 @@ def _pin_svg(pin: str, x: float, y: float) -> str:
 
 
 def mechanism_html(model: Model) -> str:
-    """Return the parts of a mechanism and a picture of the reference configuration, for ``_repr_html_``; nothing is
-    compiled.
+    """The parts of a mechanism and a picture of the reference configuration, for ``_repr_html_``; nothing is compiled.
 
     An incomplete description that cannot be drawn yet is shown without a picture; analyses report its errors.
     """

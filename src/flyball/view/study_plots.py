@@ -319,9 +319,7 @@ def _plot_scatter(row: Any, found: Study, name: str) -> None:
 
 
 def _plot_samples(ax: Any, x: np.ndarray, y: np.ndarray, z: np.ndarray, scattered: bool) -> Any:
-    """Draw by triangles between samples; by the smooth mean if other parameters vary; by colours if samples are on a
-    line.
-    """
+    """Draw triangles between samples; the smooth mean if other parameters vary; colours if samples are on a line."""
     from scipy.spatial import Delaunay, QhullError
 
     if len(z) < 3:

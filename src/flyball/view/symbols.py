@@ -85,7 +85,7 @@ def float_triple(p: np.ndarray) -> tuple[float, float, float]:
     return tuple(float(c) for c in p)  # type: ignore[return-value]
 
 
-DEFAULT_TEETH = 18  # number of teeth of the smaller wheel of a pair, if radii were given, or there are too many teeth to be visible
+DEFAULT_TEETH = 18  # of the smaller wheel of a pair, if radii were given, or there are too many teeth to be visible
 MAX_TEETH = 120
 
 
@@ -352,7 +352,7 @@ POINTS_PER_VERTEX, MIN_PROFILE_POINTS, MAX_PROFILE_POINTS = (
 )  # points of a drawn profile: for each given point, and in total
 SymbolPart = RecordedJoint | RecordedCurve | RecordedLine
 
-BODY_SYMBOLS = ("gear", "rack", "wheel", "ball")  # symbols that represent the body itself, if it has no shape of its own
+BODY_SYMBOLS = ("gear", "rack", "wheel", "ball")  # symbols of the body itself, if it has no shape of its own
 
 
 def element_symbols(e: Any, places: AttachedFrames, every: np.ndarray, wheels: list[GearWheel]) -> Iterator[SymbolPart]:
@@ -414,8 +414,7 @@ def ends_by_carrier(F: AttachedFrame, M: AttachedFrame) -> tuple[AttachedFrame, 
 
 
 def wheel_radius(e: Any, places: AttachedFrames) -> float:
-    """Return the radius of a rolling wheel: as given, with its tread; else the distance of its centre from the surface.
-    """
+    """The radius of a rolling wheel: as given, with its tread; else the distance of its centre from the surface."""
     n = places.result.values.numbers[e.name]
     if hasattr(n, "radius"):
         return float(n.radius) + float(getattr(n, "tread", 0.0))

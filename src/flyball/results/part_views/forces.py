@@ -201,9 +201,7 @@ class ForceView(PartView):
 
     @property
     def work(self) -> np.ndarray:
-        """Work done on the bodies since the start [J]: integrated with the motion, or the decrease of its stored
-        energy.
-        """
+        """Work done on the bodies since the start [J]: integrated with the motion, or the decrease of stored energy."""
         name = f"{self.element.name}.work"
         states = self._x.structure.state_at
         if name in states:
@@ -217,8 +215,7 @@ class ForceView(PartView):
         return (force[:, :2], torque[:, 2]) if self._result.planar else (force, torque)
 
     def _found(self, name: str) -> np.ndarray:
-        """Return one of its outputs: length, rate and tension of a two-point force; angle, rate and torque about a
-        joint.
+        """One of its outputs: length, rate and tension of a two-point force; angle, rate and torque about a joint.
 
         For a force on a body, or between two frames: force and torque.
         """
