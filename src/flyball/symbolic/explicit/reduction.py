@@ -257,7 +257,7 @@ def reduce_equations(
 
     Parameters
     ----------
-    x : Traced
+    x : TracedEquations
     start : mapping
         An assembled position: values of t, q and v by symbol name. It determines the branch of every
         dependent coordinate.
