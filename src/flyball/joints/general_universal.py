@@ -61,9 +61,7 @@ class GeneralUniversal(Joint):
         return (p, _with_x(a, b)), (r, _with_x(b, a))
 
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
-        """Return the angle between the axes, and the vector between them along f, m and f x m, in the reference
-        configuration.
-        """
+        """Return the angle between the axes, and the vector between them along f, m and f x m, as drawn."""
         f, m = F[1][:, 2], M[1][:, 2]
         across = np.cross(f, m)
         if not np.sqrt((across * across).sum()).real > PARALLEL:

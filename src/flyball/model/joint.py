@@ -217,9 +217,7 @@ class Coupling(Element):
         raise NotImplementedError
 
     def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
-        """Return a weight for each coordinate; ``axes(joint)`` is a joint's axis in the world in the reference
-        configuration.
-        """
+        """Return a weight for each coordinate; ``axes(joint)`` is a joint's axis in the world, as drawn."""
         raise NotImplementedError
 
     def first_weight(self, n: SimpleNamespace) -> float:

@@ -144,7 +144,7 @@ class Energy(NamedQuantities):
         return self._result.motions.zeros() if found is None else found
 
     def _friction_loss(self) -> np.ndarray:
-        """Energy lost in friction of contacts since the start; for contact points a work, integrated with the motion."""
+        """Energy lost in friction of contacts since the start; for contact points an integrated work."""
         r = self._result
         at = r.values.structure.state_at
         own = (at.get(f"{e.name}.work") for e in r.values.structure.model.forces if isinstance(e, Touch))
@@ -365,7 +365,7 @@ def lag_warning(x: EnergyBudget) -> str:
 
 
 def _speed_excess(x: EnergyBudget) -> np.ndarray:
-    """Return the relative speed error at every output time, dE / 2T, at most half of the moving energy."""
+    """Return the relative speed error at every output time, dE / 2T, limited to 1/2."""
     return x.balance / (2.0 * (x.kinetic + np.abs(x.balance)) + 1e-300)
 
 

@@ -332,7 +332,7 @@ def write_table(path: str | os.PathLike, header: Sequence[str], rows: Iterable[S
 
 
 def save(result: Result, path: str | os.PathLike, *, with_labelled: bool = True) -> None:
-    """Write everything, the model included, to one NetCDF file; with labelled quantities for other programs on request."""
+    """Write everything, the model included, to one NetCDF file; on request with labelled quantities."""
     folder = Path(path).parent
     write_file(path, sealed_file_bytes(lambda file: _write_result(result, file, with_labelled, folder)))
 

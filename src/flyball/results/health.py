@@ -222,7 +222,8 @@ def velocity_not_allowed(d: InitialDeviation) -> str:
     """Return the message on an unsatisfied, or unexpected, initial velocity, with remedies."""
     if not d.given:
         return (
-            f"{d.text}: more than {LARGE_VELOCITY:g} times the largest velocity that is given; the constraints need it to keep "
+            f"{d.text}: more than {LARGE_VELOCITY:g} times the largest velocity that is given; the "
+            f"constraints need it to keep "
             f"given velocities as nearly as they can. Check those, and whether the position is near a dead centre, or "
             f"give {d.element!r} a velocity too"
         )

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class RecordedModes(NamedTuple):
-    """Recorded data of every switch, (ns,) each: see `tables.system.Modes`."""
+    """Recorded data of every switch, (ns,) each: see `tables.table_definitions.Modes`."""
 
     mode: np.ndarray
     hold: np.ndarray

@@ -249,7 +249,10 @@ def complex_numbers(s: Subject) -> str:
             real, plain, fast = state.at(x.tolist()), state.at(given.tolist()), state.compiled(given, True)
             for found, how in ((plain, "in Python"), (fast, "compiled")):
                 if _differ(real, np.real(found), ROUNDING):
-                    return f"{state.signature} is {_array_text(real)} on floats and {_array_text(found)} on complex numbers {how}"
+                    return (
+                        f"{state.signature} is {_array_text(real)} on floats and {_array_text(found)} on complex "
+                        f"numbers {how}"
+                    )
             if _differ(np.imag(plain) / STEP, np.imag(fast) / STEP, ROUNDING, np.abs(real).max()):
                 return f"{state.signature}: derivatives by complex numbers differ between Python and compiled code"
     return ""

@@ -164,7 +164,7 @@ def event_names_text(names: Sequence[str]) -> str:
 
 
 def draw_marks(axes: Sequence[Axes], every: Sequence[Mark]) -> None:
-    """Draw thin vertical lines through the panels, with names above the first if space permits; other marks are ticks."""
+    """Draw thin vertical lines through the panels, with names above the first if space permits; the rest are ticks."""
     if not every:
         return
     low, high = axes[0].get_xlim()

@@ -82,7 +82,7 @@ def _time_differences(grid: np.ndarray, width: int) -> np.ndarray:
 
 
 def pack_forces(force: np.ndarray) -> tuple[np.ndarray, float]:
-    """Encode forces (k, 3) as integers 0 to 65534, square roots of their fractions of the largest; return that too [N]."""
+    """Encode forces (k, 3) as integers 0 to 65534, square roots of their fractions of the largest; return that too."""
     force = np.where(np.isfinite(force), force, 0.0)
     largest = float(np.abs(force).max(initial=0.0))
     part = np.sign(force) * np.sqrt(np.abs(force) / largest) if largest > 0.0 else force

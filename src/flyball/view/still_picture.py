@@ -291,9 +291,15 @@ def _stroke_svg(s: Stroke, points: np.ndarray) -> str:
 
 def _pin_svg(pin: str, x: float, y: float) -> str:
     if pin == "circle":
-        return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{PIN_RADIUS}" fill="{PAPER_COLOR}" stroke="{INK_COLOR}" stroke-width="1.6"/>'
+        return (
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{PIN_RADIUS}" fill="{PAPER_COLOR}" '
+            f'stroke="{INK_COLOR}" stroke-width="1.6"/>'
+        )
     if pin == "block":
-        at = f'x="{x - BLOCK_HALF_SIZE:.1f}" y="{y - BLOCK_HALF_SIZE:.1f}" width="{2 * BLOCK_HALF_SIZE}" height="{2 * BLOCK_HALF_SIZE}"'
+        at = (
+            f'x="{x - BLOCK_HALF_SIZE:.1f}" y="{y - BLOCK_HALF_SIZE:.1f}" width="{2 * BLOCK_HALF_SIZE}" '
+            f'height="{2 * BLOCK_HALF_SIZE}"'
+        )
         return f'<rect {at} rx="1.5" fill="{PAPER_COLOR}" stroke="{INK_COLOR}" stroke-width="1.6"/>'
     foot, half = y + 12.0, 9.0
     ticks = "".join(f"M{x + d:.1f} {foot:.1f}l-4 5" for d in (-5.0, 0.0, 5.0, 10.0))
