@@ -112,8 +112,10 @@ def difference_derivative(
     for _ in range(MAX_STEP_CHANGES):
         try:
             error, found_, rounded = at(h)
-        except (AnalysisError, ModelError) as error_:  # of a model: what a parameter so far off makes of it is none
-            if type(error_) is AnalysisError:  # what is asked for is not there aside: no smaller step makes it so
+        # ModelError: the model is invalid with so large a change of the parameter.
+        except (AnalysisError, ModelError) as error_:
+            # The quantity does not exist at other values: a smaller step does not help.
+            if type(error_) is AnalysisError:
                 raise AnalysisError(f"a little to the side of {name!r} = {value:g}, {error_}") from None
             if way > 1.0:
                 break

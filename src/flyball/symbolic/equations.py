@@ -120,7 +120,7 @@ class EquationSymbols(SymbolTable):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the inputs, in the order asked for; their symbols are 0 unless they are given."""
+        """Names of the inputs, in the requested order; their symbols are 0 unless they are given."""
         return self._asked.inputs
 
     def expression(self, name: str) -> Expressions:

@@ -4,9 +4,8 @@ An expression is expanded into a sum of terms (`terms`, `simplify`). Products of
 cosines of sums of angles, so that equal expressions of a chain of joints become equal terms and cancel. Sums of angles
 are then contracted where that is shorter (`terms`) and common factors are extracted (`factors`). `simplify` takes the
 shorter of this result and of the original operation on simplified arguments. `arctangents` replaces sines and cosines
-of arctangents by algebraic expressions, `common_subexpressions` introduces symbols for common subexpressions. Imports
-`expression_graph.graph` and `expression_graph.evaluation` only.
+of arctangents by algebraic expressions, `common_subexpressions` introduces symbols for common subexpressions.
 
-Results are for reading: they can be evaluated, and tests do, but no numbers are made of them. Imports
-`expression_graph` only.
+Results are for reading; numerical code does not use them, but they can be evaluated (as the tests do). Imports
+`expression_graph.graph` and `expression_graph.evaluation` only.
 """

@@ -29,6 +29,7 @@ def extract_common_subexpressions(
     nodes : sequence of Node or number
     gain, long : float
         Symbols that a name must save; length above which a factor or an argument gets a name even if it occurs once.
+
     Returns
     -------
     list, list of (Node, Node)

@@ -276,6 +276,7 @@ def simplified(
         Expressions that are treated like symbols.
     most : int, optional
         Largest number of terms of expanded sums; by default fewer where expressions are large.
+
     Returns
     -------
     list of Node, or array of the shape given

@@ -174,7 +174,7 @@ def _fulfil_equations(g: Sequence[Node], definitions: Sequence[Definition], plac
 
 @dataclass(frozen=True)
 class ExtraSymbols:
-    """Symbols of equations besides coordinates, velocities and multipliers.
+    """Symbols of equations other than coordinates, velocities and multipliers.
 
     Attributes
     ----------

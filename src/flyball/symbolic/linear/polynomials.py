@@ -105,7 +105,7 @@ class PolynomialRing:
         return field.ring, relations, found[:at]
 
     def _kernels(self, texts: Sequence[Any]) -> list[Any]:
-        """Generators besides symbols: roots first, then functions."""
+        """Generators other than symbols: roots first, then functions."""
         sp = self.sympy
         roots: dict[Any, None] = {}
         functions: dict[Any, None] = {}
@@ -289,7 +289,7 @@ def scale_fraction(ring: PolynomialRing, num: Any, den: Any) -> tuple[Any, Any]:
 
 
 def _content(numbers: Sequence[Any]) -> Any:
-    """The greatest common divisor of fractions that makes them short whole numbers; 0 if there is none."""
+    """Greatest common divisor of fractions that makes them short integers; 0 if there is none."""
     from math import gcd, lcm
 
     above, below = 0, 1
