@@ -181,7 +181,7 @@ def event_energies(result: Any) -> dict[str, np.ndarray]:
 def stored_reference(result: Any, name: str) -> np.ndarray:
     """Return the energy stored in a force at the start, plus that stored in it by events since [J] (n,).
 
-    Minus the currently stored energy, this is its work on the bodies since the start.
+    The work on the bodies since the start is this value minus the currently stored energy.
     """
     whole, at = result.within or (result, slice(None))
     if isinstance(at, int):  # a moment of that phase

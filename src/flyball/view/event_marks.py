@@ -76,7 +76,8 @@ def shortened_name(text: str) -> str:
 def place_names(named: Sequence[Mark], at: Sequence[float], width: float) -> list[PlacedName]:
     """Return rows for the names of marks at positions [pt] on an axis of some width: as many as fit, by rank.
 
-    Lines to higher rows pass beside names, not through them: a name is above all names that cover its mark's line.
+    Lines to higher rows pass beside names, not through them: a name is above all names whose
+    marks are under it.
     """
     kept: list[tuple[Mark, float, bool, tuple[float, float]]] = []
     lanes: list[int] = []
@@ -107,7 +108,7 @@ def _assign_lanes(at: Sequence[float], spans: Sequence[tuple[float, float]]) -> 
 def _must_be_above(
     at: Sequence[float], spans: Sequence[tuple[float, float]], lanes: Sequence[int], j: int, k: int
 ) -> bool:
-    """Return whether name j has to be above name k: k covers the line of j, or they overlap and j comes first."""
+    """Return whether name j has to be above name k: the mark of k is under j, or they overlap and j is first."""
     (a, b), (c, d) = spans[j], spans[k]
     if a - NAME_GAP < at[k] < b + NAME_GAP and at[k] != at[j]:
         return True
